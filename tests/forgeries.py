@@ -1,4 +1,4 @@
-"""What somebody may alter in a certificate, so that it says what it does not prove."""
+"""What may be altered in a certificate, so that it says what it does not prove."""
 
 import base64
 import zlib

@@ -61,4 +61,4 @@ def _different_keys(stated: dict[str, Any], found: dict[str, Any], place: str) -
             yield from _differences(shape, value, f"{place}.{key}")
     for key, shape in stated.items():
         if key not in found and not key.startswith("<") and not str(shape).startswith("only"):
-            yield f"{place}.{key} is told, but not there"
+            yield f"{place}.{key} is described, but not there"

@@ -13,7 +13,7 @@ from gen_profile.units import AxisScale
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants
 
-UNSTATED_LAG = 0.03  # s, of drives of which nobody states one: a position loop of some 33/s
+UNSTATED_LAG = 0.03  # s, of drives of which none is stated: a position loop of some 33/s
 
 
 @attrs.frozen(kw_only=True)

@@ -11,7 +11,7 @@ import attrs
 
 from gen_profile_exporters.block_source import BlockVariable
 
-# What follows a vendor's statements: an axis that failed is told nothing any more.
+# What follows a vendor's statements: an axis that failed is commanded no more.
 LET_GO = """\
 IF bTaken{n} AND (nCause <> 0) THEN
     bTaken{n} := FALSE;
@@ -37,7 +37,7 @@ class MotionLibrary:
     power_instances : dict of str to str
         Likewise, of what powers it.
     setpoint, speed, actual : str
-        Where the axis is told to be, at which velocity, and where it is.
+        Where the axis is commanded to be, at which velocity, and where it is.
     power : str
         Powers the axis while ``bOn`` is set and resets it with ``bAcknowledge``; sets ``bResets`` as long as
         that takes.

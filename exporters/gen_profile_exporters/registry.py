@@ -55,7 +55,7 @@ class Format(NamedTuple):
     suffix : str
         Of the artefact's name, such as ``".csv"``.
     may_end_at_speed : bool
-        What plays it does not hold the last setpoint: what comes next is somebody else's.
+        What plays it does not hold the last setpoint: what comes next is not from here.
     holds_block : bool
         It carries the playback block: its module is a `gen_profile_exporters.exporter.BlockContainer`.
     """

@@ -32,7 +32,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
     """Reach the workers: those of a scheduler, or so many processes of this computer.
 
     Raises SpecError where no worker answers. Processes of this computer speak TLS with a key of their own, as
-    whoever reaches a scheduler can run what he likes.
+    any program that reaches a scheduler can run code there.
     """
     stack = ExitStack()
     try:

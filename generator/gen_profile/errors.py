@@ -16,7 +16,7 @@
     └── StreamAborted        6   streaming was stopped
 
 A message is one or more whole sentences: what is wrong, where (a spec path such as ``limits.jerk``, or a
-file and line), and what to do about it. Why there is no motion is told in values, too: by reasons, each with
+file and line), and what to do about it. Why there is no motion stands in values, too: by reasons, each with
 a code, and by suggestions that were tried.
 """
 

@@ -1,4 +1,4 @@
-"""Folders that nobody else may write: whether one is, and temporary ones that do not outlive their owner."""
+"""Folders that no other user may write: whether one is, and temporary ones that end with their owner."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tempfile import mkdtemp
 from filelock import FileLock, Timeout
 
 LOCK = ".lock"
-ROOT, NOBODY = 0, 65534  # the latter owns what a container's user has no number for
+ROOT, OVERFLOW_USER = 0, 65534  # the latter owns what a container's user has no number for
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def is_private(folder: Path) -> bool:
-    """Whether this is a folder of this user's, no link to one, into which nobody else can look.
+    """Whether this is a folder of this user's, no link to one, into which no other user can look.
 
     Windows keeps users apart by access lists, which are not judged.
     """
@@ -33,7 +33,7 @@ def is_private(folder: Path) -> bool:
 
 
 def others_may_write(path: Path, within: Path | None = None) -> bool:
-    """Whether anybody but this user and root may change a file or folder, or put another in its place.
+    """Whether any user but this one and root may change a file or folder, or put another in its place.
 
     They may where it is theirs or its mode lets them, and where they may rename one of the folders above it,
     which the sticky bit forbids. The same holds for what a link leads to. Not judged in Windows.
@@ -56,7 +56,7 @@ def others_may_write(path: Path, within: Path | None = None) -> bool:
         if part == within:
             break
         status = part.lstat()
-        if status.st_uid not in (ROOT, user) and (part is path or status.st_uid != NOBODY):
+        if status.st_uid not in (ROOT, user) and (part is path or status.st_uid != OVERFLOW_USER):
             return True
         if stat.S_ISLNK(status.st_mode):
             if others_may_write(part.parent / part.readlink()):
@@ -86,7 +86,7 @@ def make_private(folder: Path) -> None:
 def temporary_folder(parent: Path, prefix: str) -> Iterator[Path]:
     """Make a folder in another one, which is gone afterwards.
 
-    It is locked as long as its process lives, so that what a killed one left can be told, and goes, too.
+    It is locked as long as its process lives, so that what a killed one left is recognised, and goes, too.
 
     Raises
     ------

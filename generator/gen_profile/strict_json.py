@@ -1,4 +1,4 @@
-"""JSON that somebody sent: finite numbers only, and nested no deeper than Python takes."""
+"""JSON from outside: finite numbers only, and nested no deeper than Python takes."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ class Summarised:
     __slots__ = ()
 
     def summary(self) -> Mapping[str, object]:
-        """Name what is told, in the order in which it is told."""
+        """Name what is shown, in the order in which it is shown."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

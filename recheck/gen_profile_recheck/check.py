@@ -35,7 +35,7 @@ KINDS = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}
 ALLOWED = 1.01  # of limits.sway
 SHORTEST_WATCH = 4.0  # s; or two of the slowest periods
 
-Progress = Callable[[int, int], None]  # told how many boxes are done, of how many
+Progress = Callable[[int, int], None]  # gets how many boxes are done, of how many
 
 TRUST = """Trusted: that python-flint (Arb) encloses what it computes, Python runs this program as it is
 written, and SHA-256 has no collisions; that the controller issues the artefact's positions at their
@@ -63,7 +63,7 @@ class Case:
 def check(
     artefact: bytes, spec: bytes, certificate: bytes, progress: Progress = lambda done, boxes: None
 ) -> str:
-    """Prove again what a certificate says of an artefact and a spec (or its manifest), and say it.
+    """Prove again what a certificate says of an artefact and a spec (or its manifest), and report it.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def read_json(text: bytes) -> Any:
 
 @dataclass(frozen=True)
 class TimedSetpoints:
-    """Where the axes are told to be: times in s, and positions in m (or rad) of each axis."""
+    """Where the axes are commanded to be: times in s, and positions in m (or rad) of each axis."""
 
     times: Sequence[float]
     cycle: float

@@ -1,4 +1,4 @@
-"""An hour of 4 ms on a clock that nobody waits for: nothing drifts. Takes minutes."""
+"""An hour of 4 ms on a simulated clock: nothing drifts. Takes minutes."""
 
 from collections.abc import Sequence
 

@@ -85,10 +85,10 @@ def _orders(axis, random):
     state = axis.state()
     if abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
         axis.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
-        begins = axis.hold(3.0 * period, fVelocityCommand=speed)
+        starts = axis.hold(3.0 * period, fVelocityCommand=speed)
         soonest = quickest(axis.promise, state, speed=speed, travel=limits.travel)
         if soonest:
-            reached = np.argmax(begins["bInVelocity"] > 0.0) * axis.cycle
+            reached = np.argmax(starts["bInVelocity"] > 0.0) * axis.cycle
             yield f"stick to {speed / limits.velocity:.0%}", reached / soonest[0], 1.0
         axis.hold(6.0 * period, bVelocity=0.0, bStop=1.0)
         axis.hold(0.0, bStop=0.0)

@@ -80,7 +80,7 @@ class Page:
         )
 
     async def answer(self, patience: float = 600.0) -> str:
-        """Wait for the last question's answer: the part that it ended in, or what should not be told."""
+        """Wait for the last question's answer: the part that it ended in, or what should not be shown."""
         until = time.monotonic() + patience
         while (left := until - time.monotonic()) > 0.0:
             try:

@@ -156,9 +156,9 @@ def test_what_a_target_cannot_take_is_refused_with_the_cure(tmp_path, monkeypatc
     refused = run_here(*bus)
     assert refused.code == 5
     (error,) = refused.errors
-    enough = re.search(r"set ([\d.]+) s or more", error)[1]
+    period = re.search(r"set ([\d.]+) s or more", error)[1]
     assert list(tmp_path.iterdir()) == []
-    assert run_here(*bus, "--set", f"can.sync_period={enough}").code in (0, 4)
+    assert run_here(*bus, "--set", f"can.sync_period={period}").code in (0, 4)
 
 
 def test_an_impossible_move_is_refused_with_the_cure(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""A stream watched while it runs: what is drawn, and that those who draw disturb nobody."""
+"""A stream watched while it runs: what is drawn, and that drawing disturbs nothing."""
 
 import json
 import multiprocessing
@@ -114,7 +114,7 @@ def test_on_a_terminal(log):
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=slave, env=environment)
     os.close(slave)
     drawn = b""
-    with suppress(OSError):  # which is how its end is told
+    with suppress(OSError):  # which is how its end shows
         while part := os.read(master, 65536):
             drawn += part
     os.close(master)

@@ -284,7 +284,7 @@ def test_of_many_uncertain_parameters_those_that_matter_have_curves_and_the_wors
 
 
 def test_a_judge_and_a_machine_of_one_s_own_are_told_by_their_hashes(tmp_path, request):
-    """The FMU that judges is ours, written as anybody's."""
+    """The FMU that judges is ours, written as another's."""
     machine = request.config.rootpath / "examples/inclined_crane.py"
     (tmp_path / machine.name).write_bytes(machine.read_bytes())
     judge, path = tmp_path / "customer.fmu", tmp_path / "spec.toml"

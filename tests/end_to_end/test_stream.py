@@ -161,7 +161,7 @@ def test_a_log_that_cannot_be_written_is_refused_before_anything_moves(deployed,
 
 
 def test_a_silent_bus_is_told_once(deployed):
-    bus = ("--interface", "virtual", "--channel", "nobody")
+    bus = ("--interface", "virtual", "--channel", "empty")
     done = run_process("stream", deployed / "paper.log", *bus, cwd=deployed)
     assert done.code == 6
     assert "node 1 does not answer properly" in done.err
@@ -312,7 +312,7 @@ def test_nobody_who_takes_the_outcome(deployed):
     """As with `2>&1 | head -n 4`, on a full disk besides."""
     reader, writer = os.pipe()
     os.close(reader)
-    bus = ("--interface", "virtual", "--channel", "nobody")
+    bus = ("--interface", "virtual", "--channel", "empty")
     with Path("/dev/full").open("w") as full:
         command = [PROGRAM, "stream", deployed / "paper.log", *bus]
         done = subprocess.run(command, check=False, stdout=full, stderr=writer)

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptio
 
 @pytest.fixture(autouse=True)
 def _collected():
-    """Let it say so here, and not in the midst of somebody else's test."""
+    """Let it say so here, and not in the midst of another test."""
     yield
     gc.collect()
 

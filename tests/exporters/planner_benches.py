@@ -53,7 +53,7 @@ class PlannerBench(Bench):
         return self.until(lambda row: row["benabled"], most=40, **ON, **inputs)
 
     def positions(self):
-        """What the axes were told, in m."""
+        """What the axes were commanded, in m."""
         return np.array(self.commanded) / UNITS
 
 

@@ -42,13 +42,13 @@ class State:
         """Read it off the setpoints up to now."""
         past = cycle * (np.arange(len(velocity)) - len(velocity) + 1)
         weighed = cycle * np.append(velocity[:-1], 0.5 * velocity[-1])
-        turned = 1j * promise.frequencies[:, None] * past
+        phases = 1j * promise.frequencies[:, None] * past
         return cls(
             place[-1],
             velocity[-1],
             acceleration[-1],
-            np.exp(turned) @ weighed,
-            (turned * np.exp(turned)) @ weighed * promise.errors,
+            np.exp(phases) @ weighed,
+            (phases * np.exp(phases)) @ weighed * promise.errors,
         )
 
 
@@ -74,13 +74,13 @@ def quickest(promise, state, target=None, speed=0.0, travel=(-1e6, 1e6), most=40
 
 def _motion(promise, state, pieces, step, target, speed, travel):
     """Way of a motion in so many pieces, the least one; none where there is none."""
-    begins = step * np.arange(pieces)
+    starts = step * np.arange(pieces)
     below = np.tri(pieces)
     accelerations = step * below
     velocities = step * (below @ accelerations) - 0.5 * step**2 * below
-    ends = begins + step
+    ends = starts + step
     places = np.where(
-        below > 0, ((ends[:, None] - begins) ** 3 - np.maximum(ends[:, None] - ends, 0.0) ** 3) / 6, 0.0
+        below > 0, ((ends[:, None] - starts) ** 3 - np.maximum(ends[:, None] - ends, 0.0) ** 3) / 6, 0.0
     )
     v, a = state.velocity, state.acceleration
     drift, drifted = v + a * ends, v * ends + 0.5 * a * ends**2
@@ -90,10 +90,10 @@ def _motion(promise, state, pieces, step, target, speed, travel):
     above, most = [], []
     total = float(promise.gains @ promise.errors)
     for mode, (rate, error) in enumerate(zip(promise.frequencies, promise.errors, strict=True)):
-        row, rest = _wave(rate, begins, step, v, a)
+        row, rest = _wave(rate, starts, step, v, a)
         equal, due = [*equal, row.real, row.imag], [*due, *(-c for c in _parts(rest + state.waves[mode]))]
         (up, rest_up), (down, rest_down) = (
-            _wave(rate * (1.0 + way * STEP), begins, step, v, a) for way in (1.0, -1.0)
+            _wave(rate * (1.0 + way * STEP), starts, step, v, a) for way in (1.0, -1.0)
         )
         slope, rest = (
             (one - other) / (2.0 * STEP) * error for one, other in ((up, down), (rest_up, rest_down))
@@ -119,10 +119,10 @@ def _motion(promise, state, pieces, step, target, speed, travel):
     return float(places[-1] @ found.x + drifted[-1]) if found.status == 0 else None
 
 
-def _wave(rate, begins, step, velocity, acceleration):
+def _wave(rate, starts, step, velocity, acceleration):
     """∫ v exp(iωt) dt by the jerk of each piece, and without any; the end's own speed is no swing."""
     i = 1j * rate
-    return (np.exp(i * (begins + step)) - np.exp(i * begins)) / i**3, (acceleration / i - velocity) / i
+    return (np.exp(i * (starts + step)) - np.exp(i * starts)) / i**3, (acceleration / i - velocity) / i
 
 
 def _parts(number):

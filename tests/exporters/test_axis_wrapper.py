@@ -63,7 +63,7 @@ def test_a_healthy_axis_gets_every_setpoint_and_is_let_go_at_the_end(vendor, mov
         assert bench.cycle(bExecute=True)["bdone"]
     outputs = bench.until(lambda row: not row["bdone"], bExecute=False)
     assert not outputs["berror"]
-    for axis in bench.axes:  # somebody else may have it now
+    for axis in bench.axes:  # another block may have it now
         axis.call(bAway=True)
     for _ in range(10):
         outputs = bench.cycle(bExecute=False)
@@ -93,7 +93,7 @@ def test_a_mishap_on_the_way_is_told_and_never_followed_by_a_jump(vendor, mishap
     stood = bench.commanded[-1][-1]
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=True)
     assert outputs["berror"] and not outputs["bdone"]
-    # The lost axis is told nothing any more; the others stopped where the motion leads.
+    # The lost axis is commanded no more; the others stopped where the motion leads.
     assert bench.commanded[-1][-1] == stood
     assert (steps(bench) <= fastest.max() * 1.6).all()
     for _ in range(50):
@@ -133,7 +133,7 @@ def test_another_edge_while_the_others_still_stop_waits_for_them(vendor):
 
 @pytest.mark.parametrize("mishap", MISHAPS)
 def test_an_axis_that_cannot_be_taken_is_an_error_at_once(vendor, mishap):
-    """TwinCAT's Enable fails, too; what follows the axis is told nothing."""
+    """TwinCAT's Enable fails, too; what follows the axis is commanded nothing."""
     happen, due = MISHAPS[mishap]
     bench = bench_of(vendor)
     happen(bench)

@@ -40,7 +40,7 @@ def text_of(value):
 
 
 def refuses(fb, begin):
-    """Whether the block stands still although it is told to start, and is not done either."""
+    """Whether the block stands still although it is commanded to start, and is not done either."""
     try:
         for _ in range(60):
             fb.call(**IDLE)

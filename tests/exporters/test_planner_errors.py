@@ -69,7 +69,7 @@ def test_stated_errors_leave_less_of_new_targets_in_time_with_the_fast_mode():
 
 @pytest.mark.parametrize("distance", [0.15, 0.6, 1.2])
 def test_less_sensitive_motions_take_little_longer(distance):
-    """And as told, nothing is left."""
+    """And as stated, nothing is left."""
     orders = [(15.0, distance)]
     unaware, aware = (played(errors, orders, 0.0) for errors in ("{}", "{L1=0.05, m2=0.1}"))
     assert np.argmax(aware["bDone"]) - 500 <= 1.08 * (np.argmax(unaware["bDone"]) - 500)

@@ -33,12 +33,12 @@ def test_a_motion_far_longer_than_a_swing_is_as_insensitive_as_a_short_one(text,
     """Its frequencies differ by 2.5 %, and what sways in the beginning is not left until it brakes."""
     driver = Driver(text, fL1=9.0, fm2=1776.0, fActPosition=1.0).hold(2.0)
     driver.hold(40.0, bExecute=1, fTarget=39.0, fVelocityLimit=0.39)
-    begins = driver.outputs["fPosition"][-1]
+    place = driver.outputs["fPosition"][-1]
     out = driver.hold(75.0, bStop=float(stops)).outputs
     require_limits(out)
     assert not out["bBusy"][-1]
     if stops:
-        assert abs(out["fPosition"][-1] - begins) < 2.0
+        assert abs(out["fPosition"][-1] - place) < 2.0
         assert not out["bBusy"][round(52.0 / CYCLE)]
     else:
         assert out["fPosition"][-1] == 39.0
@@ -118,12 +118,12 @@ def test_an_axis_that_turned_round_goes_its_way_at_full_speed(text, rope, load):
     driver = Driver(text, fL1=rope, fm2=load, fActPosition=20.0).hold(3.6)
     driver.hold(5.0, bExecute=1, fTarget=5.0).hold(CYCLE, bExecute=0)
     before = driver.outputs
-    turned, begins, speed = len(before["fPosition"]), before["fPosition"][-1], abs(before["fVelocity"][-1])
+    reversal, place, speed = len(before["fPosition"]), before["fPosition"][-1], abs(before["fVelocity"][-1])
     shaped = 2.0 * np.pi * np.sum(1.0 / frequencies(rope, load))  # what zero-vibration shapers add to a ramp
     stop = speed / ACCELERATION + shaped
-    way = (39.5 - begins + 0.5 * speed * stop) / VELOCITY + VELOCITY / ACCELERATION + shaped
+    way = (39.5 - place + 0.5 * speed * stop) / VELOCITY + VELOCITY / ACCELERATION + shaped
     out = driver.hold(50.0, bExecute=1, fTarget=39.5).outputs
     assert out["fVelocity"].max() == pytest.approx(1.0)
     assert (out["bDone"][-1], out["fPosition"][-1]) == (1.0, 39.5)
-    assert np.argmax(out["bDone"][turned:]) * CYCLE < 1.02 * (stop + way)
+    assert np.argmax(out["bDone"][reversal:]) * CYCLE < 1.02 * (stop + way)
     require_limits(out)

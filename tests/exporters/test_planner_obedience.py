@@ -1,4 +1,4 @@
-"""A planner block does what it is told: soon, no more than that, and says so truly."""
+"""A planner block does what is commanded: soon, no more than that, and says so truly."""
 
 import numpy as np
 import pytest
@@ -102,7 +102,7 @@ def test_without_enable_it_guides_nothing_and_then_takes_the_axis_over_where_tha
     assert (tripped["bEnabled"][-1], tripped["fPosition"][-1], tripped["bCommandAborted"][-1]) == (0, 4.5, 1)
     driver.hold(1.0).hold(8.0, bEnable=1)
     assert set(driver.parts[-1]["fPosition"]) == {4.5}
-    assert last(driver, "nPromise") == 2  # nobody knows how the load swings
+    assert last(driver, "nPromise") == 2  # it is not known how the load swings
     assert last(driver.hold(CYCLE, bLoadAtRest=1), "bPromise")
 
 
@@ -413,6 +413,6 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
 
 
 def write_plain(folder):
-    """A block without events, and what it is told."""
+    """A block without events, and its commands."""
     (folder / "plain.st").write_text(planner_block(SPEC).text)
     return folder / "plain.st", "--commands", folder / "commands.csv", "--out", folder / "plain.csv"

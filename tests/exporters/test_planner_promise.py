@@ -86,8 +86,8 @@ def test_what_may_be_left_makes_short_motions_quicker(text, quiet):
 @pytest.mark.parametrize(("rope", "within"), [(3.0, 5.0), (6.0, 6.6), (9.0, 7.4)])
 def test_a_stick_has_its_velocity_soon_and_stops_without_speeding_up(text, rope, within):
     driver = standing(text, rope, 2000.0, 10.0).hold(0.5, bVelocity=1, fVelocityCommand=0.0)
-    begins = len(driver.outputs["fVelocity"])
-    velocity = driver.hold(12.0, fVelocityCommand=VELOCITY).outputs["fVelocity"][begins:]
+    count = len(driver.outputs["fVelocity"])
+    velocity = driver.hold(12.0, fVelocityCommand=VELOCITY).outputs["fVelocity"][count:]
     assert np.argmax(velocity >= 0.9 * VELOCITY) * CYCLE < within
     assert velocity[-1] == pytest.approx(VELOCITY, abs=1e-9)
     stops = len(driver.outputs["fVelocity"])

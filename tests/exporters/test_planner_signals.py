@@ -59,7 +59,7 @@ RULES = {
         (GO_ON, 50, "A"),
         (LOW, 50, ""),
     ],
-    "An axis that is told to stop takes no other command": [
+    "An axis that is stopping takes no other command": [
         (MOVE, 200, "B"),
         (LOW, 1, "B"),
         (STOP, 1, "BA"),

@@ -166,7 +166,7 @@ class TestOneAxis:
         assert stopped[-1] < 20.0
         powered = bench.part(bench.axes[0])[bench.vendor.state] == bench.vendor.fit
         assert powered == (dropped == "bEnable")
-        bench.axes[0].call(bAway=True)  # somebody else may have it now
+        bench.axes[0].call(bAway=True)  # another block may have it now
         for _ in range(10):
             assert not bench.cycle(**left)["berror"]
 

@@ -2,7 +2,7 @@
 
 The library blocks are Structured Text: a rising edge takes the axis, an axis that is not fit is an error, and
 another command takes it away (``bAway``). Members of an axis are inputs, so that tests can write them. A
-drive does at once what its axis is told; it takes some cycles to be powered or reset.
+drive does at once what its axis is commanded; it takes some cycles to be powered or reset.
 """
 
 import attrs
@@ -268,7 +268,7 @@ VENDORS = {
 
 
 class Bench:
-    """A wrapper on its axes, which keep to what they are told, cycle after cycle."""
+    """A wrapper on its axes, which keep to their commands, cycle after cycle."""
 
     def __init__(self, vendor, source, block, names, starts):
         """Make axes, by the names that the wrapper has for them; ``block`` is the inner one."""

@@ -1,6 +1,6 @@
 """Simulations of FMUs by FMI's own functions: co-simulation, and model exchange by a fixed-step method.
 
-The same few names for FMI 2 and 3; what FMPy's classes call differently is told apart here.
+The same few names for FMI 2 and 3; what FMPy's classes call differently is distinguished here.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ class Instance:
 def cosimulate(
     instance: Instance, times: Array, before: Callable[[float, float], None], names: Sequence[str]
 ) -> Array:
-    """Step from time to time; `before` is told the step's beginning and end. The outputs at all times."""
+    """Step from time to time; `before` takes the step's beginning and end. The outputs at all times."""
     rows = [instance.read(*names)]
     for time, end in pairwise(times):
         before(time, end)

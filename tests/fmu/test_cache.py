@@ -204,10 +204,10 @@ class TestFoldersOfOthers:
 
     @pytest.fixture
     def laid(self, tmp_path, monkeypatch):
-        """Lay an entry whose checksums fit into a cache, as somebody else would."""
+        """Lay an entry whose checksums fit into a cache, as another user would."""
         folder = tmp_path / "shared"
         folder.mkdir()
-        write_entry(folder / "entry", {"library": b"somebody else's"})
+        write_entry(folder / "entry", {"library": b"another user's"})
         monkeypatch.setenv("GEN_PROFILE_CACHE", str(folder))
         return folder
 
@@ -215,19 +215,19 @@ class TestFoldersOfOthers:
         return (cached("entry", lambda _: {"library": b"our own"}) / "library").read_bytes()
 
     def test_what_this_user_laid_is_taken(self, laid, temporary_folder):
-        assert self.found() == b"somebody else's"
+        assert self.found() == b"another user's"
         assert not list(temporary_folder.iterdir())
 
     @pytest.mark.parametrize("whose", ["cache", "entry", "file", "list"])
     @pytest.mark.parametrize(
-        "trap", ["somebody else's", *["open to a group"][: os.geteuid() == 0], "open to all"]
+        "trap", ["another user's", *["open to a group"][: os.geteuid() == 0], "open to all"]
     )
     def test_what_others_could_have_laid_is_not(self, laid, temporary_folder, monkeypatch, whose, trap):
         entry = laid / "entry"
         place = {"cache": laid, "entry": entry, "file": entry / "library", "list": entry / "checksums.json"}[
             whose
         ]
-        if trap == "somebody else's":
+        if trap == "another user's":
             give_away(place, monkeypatch)
         else:
             place.chmod(place.stat().st_mode | (0o020 if trap == "open to a group" else 0o002))
@@ -246,17 +246,17 @@ class TestFoldersOfOthers:
     @pytest.mark.parametrize("renamed_by", ["all", "owners"])
     def test_a_cache_in_a_folder_where_others_rename_is_not_used(self, laid, temporary_folder, renamed_by):
         laid.parent.chmod(0o777 if renamed_by == "all" else 0o1777)
-        assert self.found() == (b"our own" if renamed_by == "all" else b"somebody else's")
+        assert self.found() == (b"our own" if renamed_by == "all" else b"another user's")
 
     def test_a_link_into_a_folder_of_others_is_not_followed(self, laid, temporary_folder, monkeypatch):
         link = laid.with_name("link")
         link.symlink_to(laid)
         monkeypatch.setenv("GEN_PROFILE_CACHE", str(link))
-        assert self.found() == b"somebody else's"
+        assert self.found() == b"another user's"
         laid.chmod(0o777)
         assert self.found() == b"our own"
 
-    @pytest.mark.parametrize("trap", ["open to others", "a link", "a file", "somebody else's"])
+    @pytest.mark.parametrize("trap", ["open to others", "a link", "a file", "another user's"])
     def test_nor_the_one_among_temporary_files(self, laid, temporary_folder, trap, monkeypatch):
         laid.chmod(0o777)
         private = temporary_folder / f"gen-profile-{os.geteuid()}"
@@ -287,7 +287,7 @@ class TestFoldersOfOthers:
 
 
 def give_away(path, monkeypatch):
-    """Make a file somebody else's, which only root can; for others it says that it is."""
+    """Make a file another user's, which only root can; for others it says that it is."""
     if os.geteuid() == 0:
         os.chown(path, 12345, -1)
         return

@@ -1,4 +1,4 @@
-"""Somebody else's FMU as the judge: ours in disguise, and such as crash, hang, leave, or lie."""
+"""An external FMU as the judge: ours in disguise, and such as crash, hang, leave, or lie."""
 
 import io
 import json

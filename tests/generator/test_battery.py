@@ -1,4 +1,4 @@
-"""A sample of the battery: what is found keeps its limits and costs least, what is refused is told a cure."""
+"""A sample of the battery: what is found keeps its limits and costs least, what is refused has a cure."""
 
 import json
 

@@ -68,9 +68,9 @@ def test_every_command_s_document_is_told():
     ("document", "fault"),
     [
         ({"presets": {"paper": "text"}, "more": 1}, r"presets\.more is not told"),
-        ({}, r"presets\.presets is told, but not there"),
+        ({}, r"presets\.presets is described, but not there"),
         ({"presets": {"paper": {"deep": 1}}}, r"presets\.presets\.paper has keys that are not told"),
-        ({"error": {"type": "SpecError"}}, r"presets\.error\.message is told, but not there"),
+        ({"error": {"type": "SpecError"}}, r"presets\.error\.message is described, but not there"),
     ],
 )
 def test_keys_that_differ_are_found(document, fault):

@@ -1,4 +1,4 @@
-"""Nobody ever sees half of an output folder."""
+"""Half of an output folder is never seen."""
 
 import errno
 import os
@@ -117,7 +117,7 @@ with staged(Path(sys.argv[1])) as staging:
 
 
 def test_what_a_killed_run_left_goes_and_what_is_at_work_stays(tmp_path):
-    (tmp_path / ".gen-profile-mine").mkdir()  # no lock: made by somebody, or not locked yet
+    (tmp_path / ".gen-profile-mine").mkdir()  # no lock: made by hand, or not locked yet
     (tmp_path / ".gen-profile-mine" / "file").write_bytes(b"")
     precious = tmp_path / "precious"
     precious.mkdir(mode=0o700)

@@ -172,8 +172,8 @@ def test_a_limit_that_makes_the_cost_of_sway_steep_is_kept():
 def test_where_programs_on_a_finer_mesh_fail_a_coarser_one_does(monkeypatch):
     plainly, problem = direct.sequence, limited(acceleration=0.4)
 
-    def failing(start, goal, *enough):
-        found = plainly(start, goal, *enough)
+    def failing(start, goal, *rest):
+        found = plainly(start, goal, *rest)
         fine = goal.setup.transcription.intervals > set_up.INTERVALS
         return attrs.evolve(found, verdict=direct.ConicStatus.FAILED) if fine else found
 

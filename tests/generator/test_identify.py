@@ -231,7 +231,7 @@ def test_a_log_is_read_and_told_of(tmp_path):
     assert (run.code, run.errors) == (0, [])
     stages = ["reading the log", "fitting", "looking at what the fit leaves", "finding the ranges"]
     lines = [line.removesuffix(" …").partition(",")[0] for line in run.err.splitlines()]
-    assert list(dict.fromkeys(lines)) == stages  # a long stage is told again, with its seconds
+    assert list(dict.fromkeys(lines)) == stages  # a long stage is reported again, with its seconds
     assert "log of payload" in run.out
     assert "200 samples of its angle" in run.out
     assert read_spec(tmp_path / "new.toml").plant.parameters["L0"] == pytest.approx(3.0, abs=0.02)

@@ -1,4 +1,4 @@
-"""What is named to whoever's planner block leaves too much sway."""
+"""What is suggested where a planner block leaves too much sway."""
 
 from types import SimpleNamespace
 

@@ -60,7 +60,7 @@ def proof(spec, text):
 
 
 def test_a_history_against_other_equations(spec, text):
-    """The setpoints are those of `planner play`; the machine's rope is 4 % longer than the block is told."""
+    """The setpoints are those of `planner play`; the machine's rope is 4 % longer than the block is given."""
     machine = dict(spec.plant.parameters) | {"L1": 1.04 * 6.0}
     commands = (
         Command(time=0.4, command="position", values=(9.0,), live={}),

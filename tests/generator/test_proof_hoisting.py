@@ -49,7 +49,7 @@ def followed(spec, text, ratio=1.0, corners=HOISTED):
 
 @pytest.mark.slow
 def test_a_rope_that_changes_on_the_way_against_other_equations(hoisting):
-    """The rope is 2 % longer than the block is told, and takes up its speed within a tenth period."""
+    """The rope is 2 % longer than the block is given, and takes up its speed within a tenth period."""
     run, out = followed(*hoisting, ratio=1.02)
     time = CYCLE * np.arange(run.cycles)
     rounding = round(0.1 * Histories.of(hoisting[0]).period / CYCLE)

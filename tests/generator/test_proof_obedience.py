@@ -265,7 +265,7 @@ INPUTS = Inputs(
 
 
 def read(*rows, facts=None):
-    """What is told by cycles and inputs that differ from those before."""
+    """What is commanded by cycles and inputs that differ from those before."""
     begin = {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5, "fCycleTime": CYCLE}
     values, given = dict.fromkeys(NAMES, 0.0) | begin, []
     for _, changes in rows:

@@ -71,12 +71,12 @@ def mode_amplitude(problem, profile, which):
     omega, turn = np.sqrt(squares[k].real), 1j * np.sqrt(squares[k].real)
     drive = np.linalg.solve(modes, np.linalg.solve(mass, oracle.lever(np.zeros(2), p)))[k].real
     acceleration = PPoly(profile.coefficients[:, ::-1, 0].T, profile.knots).derivative(2)
-    begins, ends = np.exp(-turn * profile.knots[:-1]), np.exp(-turn * profile.knots[1:])
+    starts, ends = np.exp(-turn * profile.knots[:-1]), np.exp(-turn * profile.knots[1:])
     lengths, total = np.diff(profile.knots), 0.0
     for order in range(len(acceleration.c)):
         piece = acceleration.derivative(order).c
         last = sum(c * lengths ** (len(piece) - 1 - i) for i, c in enumerate(piece))
-        total += ((piece[-1] * begins - last * ends) / turn ** (order + 1)).sum()
+        total += ((piece[-1] * starts - last * ends) / turn ** (order + 1)).sum()
     hook, payload = np.cumsum([p["L1"], p["L2"]] * modes[:, k].real)
     return np.abs(drive / omega * total) * max(abs(hook), abs(payload))
 

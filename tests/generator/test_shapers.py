@@ -224,7 +224,7 @@ def test_the_papers_table(name):
 
 
 def swing(profile, parameters, times):
-    """Sway of hook and payload by absolute angles; knot by knot, lest a step straddle a jump of the jerk."""
+    """Sway of hook and payload by absolute angles; knot by knot: no step may straddle a jump of the jerk."""
 
     def rates(time, x):
         push = profile.derivative(np.array([time]), 2)[0, 0]

@@ -1,4 +1,4 @@
-"""Values that cannot be meant are refused, doubtful ones told, and ordinary ones left alone."""
+"""Impossible values are refused, implausible ones reported, and ordinary ones left alone."""
 
 import pytest
 from command_line import run_here
@@ -83,8 +83,8 @@ def test_what_is_hardly_meant_is_told(name, override, place, cure):
 
 
 def test_a_doubt_is_told_once_and_is_among_the_warnings_of_the_check(tmp_path):
-    doubtful = ("--set", "can.start_tolerance=1")
-    outcome = run_here("--preset", "paper", *doubtful, "--out", tmp_path, "--json")
+    implausible = ("--set", "can.start_tolerance=1")
+    outcome = run_here("--preset", "paper", *implausible, "--out", tmp_path, "--json")
     (said,) = (line for line in outcome.err.splitlines() if line.startswith("Beware: "))
     assert outcome.code == 0
     assert [f"Beware: {warning}" for warning in outcome.document["check"]["warnings"]] == [said]

@@ -1,4 +1,4 @@
-"""The studio without a browser: states and their address, knobs, and what a page is told."""
+"""The studio without a browser: states and their address, knobs, and what a page gets."""
 
 import base64
 import json

@@ -32,7 +32,7 @@ def moments(count, **how):
 
 
 def test_a_drive_arrives_without_sway_and_begins_anew():
-    """At 0.45 m of rope, which the block is told of, and for the nominal machine, which has it."""
+    """At 0.45 m of rope, which the block is given, and for the nominal machine, which has it."""
     moments(10, drive=1, live={"L1": 0.45})
     away = moments(60, drive=1, command="target", values=(0.6,))
     assert away[-1]["axes"][0]["position"] == pytest.approx(0.6) and not away[-1]["busy"]

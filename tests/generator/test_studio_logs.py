@@ -1,4 +1,4 @@
-"""Logs that are dropped on the studio's page: how they are read, and what is told of them."""
+"""Logs that are dropped on the studio's page: how they are read, and what is reported of them."""
 
 import json
 import shlex
@@ -31,7 +31,7 @@ def answer_to(content, name="log.csv", **how):
 
 @pytest.fixture(scope="module")
 def swing():
-    """A hook's angle in degrees over milliseconds, under names of nobody's."""
+    """A hook's angle in degrees over milliseconds, under names that mean nothing."""
     times = np.arange(0.0, 8.0, 0.02)
     parameters = {**preset_spec("paper").plant.parameters, "L1": TRUE}
     angle = states(parameters, times, [0.1, 0.1, 0.0, 0.0], (0.3,), "double-pendulum-crane")[0]

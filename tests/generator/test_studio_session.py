@@ -185,7 +185,7 @@ def test_a_page_that_leaves_takes_its_workers_along():
 
 
 def test_a_page_that_is_closed_takes_no_worker_any_more():
-    """What is looked at later was asked for after the page had gone, by a process that nobody ended."""
+    """What is looked at later was asked for after the page had gone, by a process that was not ended."""
     clock, hands, _, session = page()
     session.show(0, "state")
     for name in (BEGUN, "verdict", ENDED):

@@ -1,4 +1,4 @@
-"""What an infeasible problem is told: the requirement to blame, and values that work and are the nearest."""
+"""Of an infeasible problem, the requirement to blame, and values that work and are the nearest."""
 
 import json
 import re

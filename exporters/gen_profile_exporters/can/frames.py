@@ -214,7 +214,7 @@ def period_digits(can: CanSpec) -> tuple[int, int]:
     Raises
     ------
     ExportError
-        It cannot be told.
+        It is not known.
     """
     period = Decimal(repr(can.sync_period)).normalize()
     _, digits, exponent = period.as_tuple()

@@ -31,7 +31,7 @@ from gen_profile_exporters.can.cia402 import IP_ENABLE, MODES, Controlword
 RPDO1, RPDO2, RPDO3, RPDO4 = RPDOS = (0x200, 0x300, 0x400, 0x500)  # by the COB-ID of node 0
 TPDO1, TPDO2, TPDO3, TPDO4 = TPDOS = (0x180, 0x280, 0x380, 0x480)
 MOST_BITS = 64  # that one PDO carries
-_DUMMIES = range(1, 8)  # objects that stand for bits which nobody uses (CiA 301)
+_DUMMIES = range(1, 8)  # objects that stand for unused bits (CiA 301)
 
 
 @attrs.frozen(kw_only=True)
@@ -44,7 +44,7 @@ class Field:
         Of the object dictionary.
     code : str
         Its type, as `struct` spells it: ``"H"`` for UNSIGNED16, ``"i"`` for INTEGER32 …; ``"4x"`` for four
-        bytes that nobody here reads or sets.
+        bytes that are neither read nor set here.
     name : str
         As a DBC calls it.
     """
@@ -66,7 +66,7 @@ class Field:
 
     @property
     def used(self) -> bool:
-        """Whether anybody here reads or sets it."""
+        """Whether it is read or set here."""
         return not self.code.endswith("x")
 
 
@@ -154,7 +154,7 @@ def layout(can: CanSpec) -> Layout:
     Raises
     ------
     ExportError
-        The drive's fixed mapping lacks what the mode needs, or takes what nobody knows.
+        The drive's fixed mapping lacks what the mode needs, or takes an unknown object.
     """
     if not can.fixed_pdos.stated:
         return Layout(
@@ -217,7 +217,7 @@ def _sent(entry: int, needed: Sequence[Field], place: str) -> Field:
     if entry >> 16 in _DUMMIES or entry in {field.mapping for field in harmless}:
         return _unused(entry, place)
     raise ExportError(
-        f"{place}: nobody knows what to send as {entry >> 16:04X}h:{entry >> 8 & 0xFF:02X} beside setpoints; "
+        f"{place}: cannot tell what to send as {entry >> 16:04X}h:{entry >> 8 & 0xFF:02X} beside setpoints; "
         "choose another RPDO, or a drive whose PDOs can be mapped."
     )
 

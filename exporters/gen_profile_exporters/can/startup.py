@@ -1,6 +1,6 @@
 """What the drives must be set to before they follow: the SDO start-up list, as a table and as concise DCF.
 
-The list makes a drive stop by itself when nobody feeds it any more: it watches the master's heartbeat (1016h)
+The list makes a drive stop by itself when setpoints cease: it watches the master's heartbeat (1016h)
 and the setpoints' arrival (1401h:05 if they come by RPDO2), and answers both with a quick stop (6007h, 605Ah,
 6085h).
 

@@ -102,7 +102,7 @@ def axis_words(axes: Sequence[AxisConstants]) -> dict[str, str]:
 
 
 def axis_interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
-    """Declare what each axis is told and tells, and carry it to and from the arrays."""
+    """Declare what each axis takes and gives, and carry it to and from the arrays."""
 
     def declared(name: str, comment: str) -> str:
         return "\n".join(

@@ -31,7 +31,7 @@ HEADER = """\
     Not tried on a controller: watch the first motion with the hand at the emergency stop.
 
     bPower powers the axes, to be homed and moved otherwise, too. A rising edge of bEnable takes them over
-    where they are told to be, as fast as they go, and guides them: bEnabled is set, and commands are obeyed.
+    at their setpoints, as fast as they go, and guides them: bEnabled is set, and commands are obeyed.
     Dropping bEnable or bPower stops without sway first (with bQuickStop: at once) and then lets them go.
 
     An axis that fails is let go and left to its own reaction, the others brake at once. Then it takes bReset,
@@ -116,7 +116,7 @@ IF (nStage = cPowering) AND (nFault = 0) THEN
 END_IF;
 {let_go}
 bGuided := bGuided OR bTaken{n};
-(* Taken over where it is told to be, then supervised where it is. *)
+(* Taken over where it is commanded to be, then supervised where it is. *)
 fPlace{n} := {setpoint} / cUnits{n};
 IF fbPlanner.bEnabled THEN fPlace{n} := {actual} / cUnits{n}; END_IF;"""
 # Until it is enabled, the block follows the axis, which goes on as fast as it does.

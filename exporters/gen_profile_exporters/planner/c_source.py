@@ -76,7 +76,7 @@ SOURCE = """\
 #include <string.h>
 
 #ifdef __FAST_MATH__
-#error "-ffast-math: inputs that are no numbers could not be told from others."
+#error "-ffast-math: inputs that are no numbers could not be distinguished from others."
 #endif
 /* A product and a sum in one rounding would give other bits; GCC keeps to -std=c99 by itself. */
 #if defined(__clang__)

@@ -17,7 +17,7 @@ from gen_profile.motion.profile import Array, read_only
 
 POSITION_ERROR = 1e-9  # m (or rad), of a segment at the cycles inside it
 ACCELERATION_ERROR = 1e-6  # m/s²
-LEAST = 0.01  # of the length that would fit, below which it is not told how much longer it could be
+LEAST = 0.01  # of the length that would fit, below which it is not said how much longer it could be
 POINTS = 16, 4096  # where peaks are looked for: per segment, and of all, at least
 
 

@@ -1,8 +1,8 @@
 """A per-user cache of built files: entries by content hash, verified when read, written atomically.
 
-What lies there is loaded and run, so the folders are the user's own: nobody else may write them. Builds are
+What lies there is loaded and run, so the folders are the user's own: no other user may write them. Builds are
 reproducible, so two processes that write the same entry at once write the same bytes, and each file takes its
-place by a rename: whoever reads sees whole files only. The list of checksums comes last.
+place by a rename: a reader sees whole files only. The list of checksums comes last.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _warn(refusal: str) -> None:
 
 
 def is_intact(entry: Path) -> bool:
-    """Whether an entry is complete, and every file as it was written, where nobody else may write.
+    """Whether an entry is complete, and every file as it was written, where no other user may write.
 
     Files that have not been touched since this process read them are not read again.
     """

@@ -18,7 +18,7 @@ from gen_profile_fmu.model.contents import Model
 from gen_profile_fmu.model.variables import FmuVariable
 
 STRUCTURE = "SystemStructure.ssd"
-PARAMETER_SET = "initialValues"  # as others call it, and as Ecos is told to take
+PARAMETER_SET = "initialValues"  # as others call it, and as Ecos is asked to take
 _OSP = "com.opensimulationplatform"  # whose annotation states a step, for which SSP 1.0 has no words
 _NAMESPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",

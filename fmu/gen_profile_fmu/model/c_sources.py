@@ -59,7 +59,7 @@ def equations_source(equations: Dynamics) -> str:
 def _bare(text: str) -> str:
     """Leave of CasADi's text what is called: the functions, under their own names, and what helps them.
 
-    All of it becomes static, lest it clash where several FMUs are linked into one program. What CasADi adds,
+    All of it becomes static: it would clash where several FMUs are linked into one program. What CasADi adds,
     to ask functions for their names, sparsity and memory, would be unused.
     """
     names = {internal: name for name, internal in re.findall(_WRAPPER, text)}

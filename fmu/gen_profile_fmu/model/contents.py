@@ -31,7 +31,7 @@ from gen_profile_fmu.model.variables import VariableTable
 INPUT_ORDER = 3  # of the time derivatives that a step takes of an input: N_SLOPES in model.h
 PLANT_FILES = ("driven_plant.h", "driven_plant.c", "equations.h")
 MOTION_FILES = ("motion.h", "motion.c")
-AUTHOR = "gen-profile"  # where nobody else is named
+AUTHOR = "gen-profile"  # where no other is named
 OUTPUT_ORDER = 3  # of the time derivatives that a motion's outputs have
 PLAIN = {"N_SLOPED_INPUTS": "0", "SLOPED_INPUTS": "0", "OUTPUT_ORDERS": "0"}
 

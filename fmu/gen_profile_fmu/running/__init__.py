@@ -1,1 +1,1 @@
-"""FMUs run: ours in memory, one or thousands, and somebody else's in a child process."""
+"""FMUs run: ours in memory, one or thousands, and external ones in a child process."""

@@ -51,7 +51,7 @@ class CalledBlock:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Script:
-    """What a block is told.
+    """What a block is given.
 
     Attributes
     ----------

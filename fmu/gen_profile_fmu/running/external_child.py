@@ -1,4 +1,4 @@
-"""The child process that runs somebody else's FMU: ``python -m`` this module, then a folder.
+"""The child process that runs an external FMU: ``python -m`` this module, then a folder.
 
 Reads job.json and motion.npz from the folder, writes result.npy, or refusal.txt with a sentence.
 """
@@ -22,7 +22,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.running.safe_archive import unpack
 
-LONGEST_MESSAGE = 300  # characters, of what somebody else's FMU says
+LONGEST_MESSAGE = 300  # characters, of what an external FMU says
 
 
 def main(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Somebody else's FMU, co-simulated in a child process: whatever its native code does, it does it there."""
+"""An external FMU, co-simulated in a child process: whatever its native code does, it does it there."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Instance:
     logs: bool
 
     def give_back(self) -> None:
-        """Leave the instance to whoever next wants one of the same FMU; those of others are freed."""
+        """Leave the instance to the next run of the same FMU; those of others are freed."""
         while _idle and not _idle[-1].is_like(self.fmu, self.version, logs=self.logs):
             _idle.pop().slave.freeInstance()
         _idle.append(self)

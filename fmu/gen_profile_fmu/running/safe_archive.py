@@ -1,4 +1,4 @@
-"""Unpacking an archive that somebody else made."""
+"""Unpacking an archive from outside."""
 
 from __future__ import annotations
 

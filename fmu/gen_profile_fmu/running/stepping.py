@@ -1,4 +1,4 @@
-"""A plant FMU that is led on step by step, by somebody who does not know the next setpoint yet."""
+"""A plant FMU that is led on step by step, by a caller that does not know the next setpoint yet."""
 
 from __future__ import annotations
 

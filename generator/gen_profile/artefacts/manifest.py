@@ -21,7 +21,7 @@ FORMAT_VERSION = 1
 UNVERIFIED = "unverified"
 PLANNER = "planner"  # format of every file that is a planner block
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")  # that shape the numbers
-SEAL = "manifest_sha256"  # of everything else in it, so that nobody changes a limit or a verdict by hand
+SEAL = "manifest_sha256"  # of everything else in it, so that no limit or verdict is changed by hand
 
 
 @cache

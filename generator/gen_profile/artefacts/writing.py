@@ -1,4 +1,4 @@
-"""Writing files, alone or as a folder of artefacts, so that nobody ever sees half of it."""
+"""Writing files, alone or as a folder of artefacts, so that half of it is never seen."""
 
 from __future__ import annotations
 

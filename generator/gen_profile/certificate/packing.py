@@ -12,7 +12,7 @@ import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import Array
 
-MOST_BYTES = 2**32  # of an array, lest a small file fill the memory
+MOST_BYTES = 2**32  # of an array: a small file must not fill the memory
 GREATEST = 2.0**45  # whole number that is a coefficient, so that sums of them are exact
 LEVEL = 6  # of compression; more takes far longer
 

@@ -27,7 +27,7 @@ from gen_profile.motion.profile import Array
 
 SAMPLES = 500  # of each curve
 PAPERS = ("nzv", "zvd")  # the shapers that the paper compares with
-OUTLYING = 10.0  # times the middle peak, beyond which a curve may leave its axes, lest it flatten the others
+OUTLYING = 10.0  # times the middle peak, beyond which a curve may leave its axes, as it flattens the others
 ROOM = 1.05  # of what is drawn
 
 

@@ -1,4 +1,4 @@
-"""Figures of curves, whoever draws them: `plotly_json` for pages, `picture` for files.
+"""Figures of curves, whatever draws them: `plotly_json` for pages, `picture` for files.
 
 A figure is a group of panels under one legend. Every panel is a plot of its own, so that a narrow screen can
 put them below one another; panels of one figure zoom together where their horizontal axis is the same.
@@ -14,7 +14,7 @@ import attrs
 from gen_profile.motion.profile import Array
 
 FRAME, LIMIT, INK, PAPER = "#6b7680", "#b3261e", "#17212b", "#fff"
-HEADROOM = 3.0  # limits up to which values are told apart, lest the worst ones hide the others
+HEADROOM = 3.0  # limits up to which values differ in colour, as the worst would hide the others
 SHADES = 12
 
 # told apart by the colour-blind: M. Okabe, K. Ito, Color universal design, 2008; black for what matters most
@@ -39,7 +39,7 @@ class Style:
     width : float
         In pixels.
     shown : bool
-        Whether it is drawn before anybody asks for it.
+        Whether it is drawn before it is asked for.
     """
 
     colour: str = PALETTE[0]

@@ -1,4 +1,4 @@
-"""How the curves of every method look: the same in all pictures, whoever else takes part."""
+"""How the curves of every method look: the same in all pictures, whichever others take part."""
 
 from __future__ import annotations
 

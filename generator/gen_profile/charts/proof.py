@@ -62,7 +62,7 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
     panels += [
         Panel(
-            title=f"What the block is told of {name}",
+            title=f"{name} as given to the block",
             x_label=TIME,
             y_label=_labelled(spec, name),
             lines=[Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)],
@@ -99,7 +99,7 @@ def _arrival(trace: Trace) -> float:
 
 
 def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
-    """Draw what an axis was told and led to, within its limits."""
+    """Draw the commands and setpoints of an axis, within its limits."""
     number, axis = list(trace.history.axes.items())[place]
     own, few = spec.limits.of(number), slice(None, None, -(-len(trace.times) // SAMPLES))
     assert own.velocity and own.acceleration and own.travel
@@ -155,7 +155,7 @@ def map_figure(spec: Spec, proof: Proof) -> Figure:
             levels=[Level(value=100.0)],
         )
     return Figure(
-        caption="Over what the block is told; white: no history there.",
+        caption="Over what the block is given; white: no history there.",
         panels=[panel],
         columns=1,
     )

@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Lead streams that the caller closed nowhere, lest a file that is opened gets their number."""
+    """Lead streams that the caller closed nowhere: a file that is opened would get their number."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(number)

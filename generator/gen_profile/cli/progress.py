@@ -25,7 +25,7 @@ class _Step:
         self.began, self.before = 0.0, 0  # when, and after how many steps, the stage began
 
     def take(self, stage: str, done: int, total: int, remark: str) -> bool:
-        """Take what is told, and find out whether a stage begins."""
+        """Take a report, and find out whether a stage begins."""
         new = stage != self.stage
         if new:
             self.began, self.before = time.monotonic(), done
@@ -33,7 +33,7 @@ class _Step:
         return new
 
     def words(self) -> str:
-        """Say it: the stage, steps, remark, time so far and, where it can be known, time to go."""
+        """Put it into words: the stage, steps, remark, time so far and, where it can be known, time to go."""
         seconds = time.monotonic() - self.began
         parts = [self.stage]
         if self.total:
@@ -85,7 +85,7 @@ class _InLog:
 
     def _remind(self) -> None:
         while not self._over.wait(FIRST_LINE / 4.0):
-            with self._lock, suppress(OSError):  # who is told may be gone
+            with self._lock, suppress(OSError):  # the reader may be gone
                 if time.monotonic() >= self._due:
                     self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
                     self._print()

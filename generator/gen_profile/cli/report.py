@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     multiple=True,
     help="What the page shall also say, as Customer=ACME; without a value, a line to sign. Repeatable.",
 )
-@export_option("Format whose file is checked and told by its hash")
+@export_option("Format whose file is checked and named by its hash")
 @click.option(
     "--measured",
     "log",
@@ -123,7 +123,7 @@ for parameter in report.params:
 
 
 class _Subject(NamedTuple):
-    """What a report is about: its name, and how a page is made and told of."""
+    """What a report is about: its name, and how a page is made and described."""
 
     name: str
     make: Callable[..., Any]

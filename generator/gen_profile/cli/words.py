@@ -163,7 +163,7 @@ def block_judgement(judged: BlockJudgement) -> str:
     )
     rows += [
         ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
-        ("told", worst.history.reported(judged.spec.machine().units)),
+        ("given", worst.history.reported(judged.spec.machine().units)),
         ("commands", "; ".join(commands)),
         ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
         ("sway on the way", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.on_the_way.items())),

@@ -52,9 +52,9 @@ def machine(name: str) -> str:
 
 
 def place_unit(spec: Spec, column: int) -> tuple[str, float]:
-    """Say in which unit an axis's places are told, its controller's, and how many of it make one SI unit.
+    """Say in which unit an axis's places are shown, its controller's, and how many of it make one SI unit.
 
-    Counts of an encoder tell nobody anything; they are told in SI units.
+    Counts of an encoder mean nothing to a reader; they are shown in SI units.
     """
     scale, axis = spec.axis_scales()[column], spec.machine().actuated[column]
     if scale.unit not in UNITS:

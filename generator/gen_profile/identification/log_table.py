@@ -73,7 +73,7 @@ class LogTable:
         return value if math.isfinite(value) else math.nan
 
     def seconds(self, row: int, place: int) -> float:
-        """Time of a cell: a number, or a date and time as of ISO 8601, which is told in s; else NaN."""
+        """Time of a cell: a number, or a date and time as of ISO 8601, which is given in s; else NaN."""
         value = self.number(row, place)
         if not math.isnan(value):
             return value

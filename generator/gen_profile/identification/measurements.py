@@ -180,7 +180,7 @@ def parse_swing(
     source : str
         Where it comes from, for errors.
     columns : (str, str)
-        Of time, and of the value: names, or numbers from 1. Dates and times are told in s from the first.
+        Of time, and of the value: names, or numbers from 1. Dates and times are given in s from the first.
     per_second : float or None
         How many of the time's unit make a second; None for what the column's name says, or s.
     per_unit : float or None

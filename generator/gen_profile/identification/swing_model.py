@@ -18,7 +18,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import linearize
 
 STEP = 1e-6  # relative, of numerical slopes
-WIDEST_SWING = math.pi / 4.0  # rad, beyond which nobody lets a load swing
+WIDEST_SWING = math.pi / 4.0  # rad, beyond which no load is let swing
 STILL = 1e-9  # SI units, which no sensor tells from rest
 APART = 1e-3  # periods, between angles whose difference is a rate; at most half the time between samples
 MOST_SAMPLES, SWINGS = 6000, 300  # of a log that is fitted: twenty averages of each swing

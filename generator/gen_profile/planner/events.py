@@ -18,7 +18,7 @@ WORDS = {  # {:g} is the event's value
     12: "the axis moves, from {:g}",
     13: "the axis is braked at once, from {:g}: the load swings",
     20: "no command: the axis stops, or stands",
-    21: "told to move to {:g}",
+    21: "commanded to move to {:g}",
     22: "a stick is followed, at first {:g} per second",
     23: "held by an override of 0",
     24: "goes on after a hold",
@@ -56,7 +56,7 @@ class Event(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Say it."""
+        """Put it into words."""
         known = WORDS.get(self.code, "an event {code} that is not known here")
         return f"{self.time:.3f} s: {known.format(self.value, code=self.code)}"
 

@@ -1,6 +1,6 @@
 """What a machine looks like.
 
-A machine's own picture stands with its equations. One that nobody drew is drawn from its outputs: loads that
+A machine's own picture stands with its equations. One without a picture is drawn from its outputs: loads that
 hang are drawn as hanging, others as blocks that trail.
 """
 
@@ -76,7 +76,7 @@ def _rail(plant: Plant, pose: Pose) -> tuple[Drawing, ...]:
 
 
 def _from_outputs(plant: Plant, pose: Pose) -> tuple[Drawing, ...]:
-    """Draw a machine that nobody drew: its first axis, and its loads as they hang or trail."""
+    """Draw a machine without a picture of its own: its first axis, and its loads as they hang or trail."""
     _, height = pose.at_rest().loads()
     if not np.abs(height).max() > 0.0:
         return _rail(plant, pose)

@@ -61,7 +61,7 @@ def _pendulum(odd: int, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     omega, viscosity = np.sqrt(p.g / length), p.mu / p.rho
     at_walls = 1.0 / p.a + 1.0 / p.b
     at_walls += wave_number * (1.0 - 2.0 * p.h / p.a) / np.sinh(2.0 * wave_number * p.h)
-    # a root for each, lest slopes by h and ρ be 0/0 where nothing is viscous
+    # a root for each: slopes by h and ρ would be 0/0 where nothing is viscous
     boundary = np.sqrt(p.mu) / (np.sqrt(p.rho) * np.sqrt(2.0 * omega))
     ratio = boundary * at_walls + 2.0 * viscosity * wave_number**2 / omega
     return length, 2.0 * ratio * omega * length

@@ -1,4 +1,4 @@
-"""Whether a machine that somebody else wrote is what the project expects of one."""
+"""Whether a machine from outside is what the project expects of one."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def dynamics(plant: Plant) -> Dynamics:
         bodies = plant.mechanics(sym.split(q_u), sym.split(q_a), named)
         place = [x for _, place in zip(plant.bodies, bodies.place, strict=True) for x in place]
         energy = [_energy(bodies, q, dq)] if plant.bodies else []
-    except Exception as error:  # of whoever wrote the machine
+    except Exception as error:  # of the machine's author
         raise SpecError(
             f"plant.type: the equations of {plant.type!r} do not take symbols "
             f"({type(error).__name__}: {str(error).partition(chr(10))[0]}); write them with NumPy functions "

@@ -34,7 +34,7 @@ class Breach:
     allowed: float
 
     def sentence(self) -> str:
-        """Say it."""
+        """Put it into words."""
         template = "{place}: {allowed:g} is allowed, the motion needs {found:.4g}."
         return Phrase(template, **attrs.asdict(self))
 

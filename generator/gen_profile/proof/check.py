@@ -1,4 +1,4 @@
-"""Proving a planner block that lies on disk, whoever wrote or altered it, and replaying its histories."""
+"""Proving a planner block that lies on disk, whatever wrote or altered it, and replaying its histories."""
 
 from __future__ import annotations
 

@@ -105,13 +105,13 @@ class ClosedLoop:
         ----------
         history : History
         period : float
-            s, of the slowest swing that the block is told of.
+            s, of the slowest swing that the block is given.
 
         Returns
         -------
         run : BlockRun
         faults : tuple of str
-            What it did other than it was told, each in words that end a sentence.
+            What it did other than commanded, each in words that end a sentence.
 
         Raises
         ------
@@ -251,7 +251,7 @@ class ClosedLoop:
         return range(len(cycles)), np.column_stack([inputs, *true])
 
     def _noisy(self, start_cycles: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
-        """Let what is told of live parameters be off by their noise, another one in every cycle."""
+        """Let the given live parameters be off by their noise, another one in every cycle."""
         noise, random = self._spec.planner.live_noise, np.random.default_rng(0)
         if not noise:
             return start_cycles, inputs
@@ -286,7 +286,7 @@ class ClosedLoop:
         return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:
-        """Tell how axes follow what the block is told."""
+        """Describe how axes follow the block's inputs."""
         axes, inputs = [axis.name for axis in self._machine.actuated], len(self._block.inputs)
         return [
             Hoist(

@@ -1,4 +1,4 @@
-"""What a planner block was told and issued in a history, and how long each command may take it."""
+"""What a planner block was given and issued in a history, and how long each command may take it."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Followed:
 
     @property
     def orders(self) -> Sequence[TimedOrder]:
-        """Of what it is told."""
+        """Of the commands that it received."""
         return self.received.orders
 
     def room(self, axis: int, position: Array, way: Array) -> Array:
@@ -137,7 +137,7 @@ class Followed:
 
 @attrs.frozen(kw_only=True)
 class IssuedMotion:
-    """Setpoints, and what was told in each cycle.
+    """Setpoints, and what was commanded in each cycle.
 
     Attributes
     ----------
@@ -147,11 +147,11 @@ class IssuedMotion:
     guided : (cycles,) array of bool
         Whether the block is enabled.
     goes : (cycles,) array of bool
-        Whether a position is told.
+        Whether a position is commanded.
     way : (axes, cycles) array
-        To that position; the stick's velocity where one is told, and 0 at a stop or hold.
+        To that position; the stick's velocity where one is commanded, and 0 at a stop or hold.
     away : (cycles,) array
-        Greatest distance of an axis from its position where one is told.
+        Greatest distance of an axis from its position where one is commanded.
     """
 
     position: Array

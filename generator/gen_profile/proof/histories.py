@@ -1,7 +1,7 @@
 """Histories of commands that a planner block is proved on.
 
 A history is made of *choices*, shares from 0 to 1: where it starts, the live parameters that the block is
-told, by how much the machine differs from them, what is commanded when, and how ropes change on the way. So
+given, by how much the machine differs from them, what is commanded when, and how ropes change on the way. So
 histories are drawn as a Latin hypercube, corners are choices of 0 and 1, and a search moves through the same
 cube.
 """
@@ -56,7 +56,7 @@ class History:
     Attributes
     ----------
     live : mapping of str to float
-        What the block is told of the live parameters.
+        What the block is given of the live parameters.
     parameters : mapping of str to float
         Of the machine.
     places : tuple of float
@@ -65,7 +65,7 @@ class History:
     axes : mapping of int to BlockAxis
         Which of the machine's axes the block plans.
     hoisting : mapping of str to tuple of (float, float)
-        What the block is told of live parameters that change on the way: corners (time in s, value) of a
+        What the block is given of live parameters that change on the way: corners (time in s, value) of a
         line, which begins with the value in `live` and ends constant.
     changes : tuple of Change
         Of inputs, beside the commands.
@@ -93,7 +93,7 @@ class History:
         )
 
     def reported(self, units: Mapping[str, str]) -> str:
-        """Say what the block is told of live parameters, whose units are given by name."""
+        """Say what the block is given of live parameters, whose units are given by name."""
         return ", ".join(
             f"{name} {phrases.number(value)} {units[name]}" + " at first" * (name in self.hoisting)
             for name, value in self.live.items()
@@ -145,7 +145,7 @@ class History:
 
     @property
     def reassured(self) -> bool:
-        """Whether the block is told that the load hangs still, true or not."""
+        """Whether the block gets the report that the load hangs still, true or not."""
         return self._has("bLoadAtRest")
 
     def _has(self, name: str) -> bool:
@@ -163,7 +163,7 @@ class Histories:
     axes : mapping of int to BlockAxis
         That the block plans.
     uncertain : mapping of str to (float, float)
-        Ranges of the machine's parameters; of a live one, of its ratio to what the block is told.
+        Ranges of the machine's parameters; of a live one, of its ratio to what the block is given.
     period : float
         Of the slowest mode over all ranges, in s.
     fastest : float
@@ -203,7 +203,7 @@ class Histories:
         )
 
     def slowest(self, history: History) -> float:
-        """Find the longest period in s of the machine that a block is told of in a history."""
+        """Find the longest period in s of the machine that a block is given in a history."""
         live = dict(history.live)
         ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
         ends = [live] + [
@@ -337,7 +337,7 @@ class Histories:
         return hoisting
 
     def perturbed(self, history: History, errors: Mapping[str, float]) -> dict[str, float]:
-        """Parameters of a machine that differs by some errors from what the block is told in a history."""
+        """Parameters of a machine that differs by some errors from what the block is given in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
     def _manners(self, rows: Array, first: float, manner: float, ending: Sequence[float]) -> Iterator[Manner]:
@@ -460,7 +460,7 @@ def _bouncing(
 def _machine(
     spec: Spec, live_values: Mapping[str, float], errors: Mapping[str, float]
 ) -> tuple[dict[str, float], list[float]]:
-    """Parameters of a machine and places of its axes: as the block is told, but for the errors."""
+    """Parameters of a machine and places of its axes: as the block is given, but for the errors."""
     plant, parameters = spec.machine(), dict(spec.plant.parameters)
     for known in plant.parameters:
         value = live_values.get(known.name, parameters[known.name])

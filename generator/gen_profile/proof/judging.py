@@ -38,7 +38,7 @@ def judge_run(
     history : History
         Of that run.
     disobeyed : sequence of str
-        What the block did other than it was told, in words that end a sentence.
+        What the block did other than commanded, in words that end a sentence.
     cycle : float
         s.
     number : int

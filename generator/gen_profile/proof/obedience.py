@@ -1,4 +1,4 @@
-"""Whether a planner block did what it was told, in time, and whether what it told was true."""
+"""Whether a planner block did what was commanded, in time, and whether what it reported was true."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ WORDS = {
     STOP: "a stop ends later than allowed by {over:.3g} s",
     "left": "a target is left again by {needed:.3g} m",
     "against": "an axis moves against its command longer than allowed by {over:.3g} s",
-    "idle": "the axis stands though it is told to move, longer than allowed by {over:.3g} s",
+    "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
     "reaction": "a command is obeyed later than stated by {over:.3g} s",
     "ends": "a stop leaves its stated ends by {over:.3g} m",
     "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",

@@ -1,4 +1,4 @@
-"""What a planner block is told, from its inputs: which command holds from which cycle to which.
+"""What a planner block is commanded, from its inputs: which command holds from which cycle to which.
 
 Beside its inputs, what a command means depends on what the block did: one that is done ends with bExecute,
 and none is taken while a quick stop lasts. Before a run nothing is known of that.
@@ -114,7 +114,7 @@ class Facts:
 
 @attrs.frozen(kw_only=True)
 class ReceivedOrders:
-    """What a block is told, and what it must say of that.
+    """The commands that a block receives, and what it must report of them.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ def _events(start_cycles: Sequence[int], facts: Facts) -> list[int]:
 
 
 def _same(order: TimedOrder, before: TimedOrder) -> bool:
-    """Whether nothing new is told; stops know no velocity limit."""
+    """Whether nothing new is commanded; stops know no velocity limit."""
     again = (order.kind, order.values, order.edge) == (before.kind, before.values, before.edge)
     return again and (order.kind not in (POSITION, VELOCITY) or order.tops == before.tops)
 
@@ -359,7 +359,7 @@ class _Reader:
             lowest, highest = facts.low[axis, cycle - 1], facts.high[axis, cycle - 1]
             if (beyond and highest <= low + ROUNDING) or (before and lowest >= high - ROUNDING):
                 touches = min(abs(highest - low), abs(lowest - high)) <= ROUNDING
-                return not touches or facts.errors[cycle] == BLOCKED  # else it is told a cycle later
+                return not touches or facts.errors[cycle] == BLOCKED  # else it is reported a cycle later
         return False
 
     def _is_in_the_way(self, cycle: int, row: Mapping[str, float]) -> bool:

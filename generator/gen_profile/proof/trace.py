@@ -31,7 +31,7 @@ class Trace:
         By names of the block's outputs.
     sway : mapping of str to (cycles,) array
         Of the end load in m (its magnitude where it has two directions), by machines: that of the history,
-        the one that the block is told of, and some at corners of the uncertain ranges.
+        the one that the block is given, and some at corners of the uncertain ranges.
     """
 
     history: History
@@ -52,7 +52,7 @@ def trace(
     progress("following a history")
     end_load = spec.machine().end_load
     reported, *perturbed = [histories.perturbed(history, errors) for errors in _errors(histories)]
-    machines = {"this history": history.parameters, "as told": reported}
+    machines = {"this history": history.parameters, "as given": reported}
     machines |= {f"perturbed {number}": machine for number, machine in enumerate(perturbed, start=1)}
     sways = {}
     with ClosedLoop(spec, text, histories) as loop:

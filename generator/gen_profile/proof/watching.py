@@ -1,4 +1,4 @@
-"""Watching a block in a history: what it is told, and what it would have done without each command."""
+"""Watching a block in a history: what it is commanded, and what it would have done without each command."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class BlockWatch:
         Parameters
         ----------
         period : float
-            s, of the slowest swing that the block is told of.
+            s, of the slowest swing that the block is given.
         script : Script
             Of a history.
         expected : sequence of TimedOrder

@@ -90,7 +90,7 @@ def report(
     ----------
     spec : Spec
     formats : sequence of str
-        Whose artefacts are checked and told by their hashes.
+        Whose artefacts are checked and named by their hashes.
     log : Path, optional
         What the machine really did, as a table; see `gen_profile.report.log`.
     log_start : float, optional

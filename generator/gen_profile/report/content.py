@@ -95,7 +95,7 @@ class Table:
 
 @attrs.frozen(kw_only=True)
 class Listing:
-    """A text that is folded away until somebody wants it."""
+    """A text that is folded away until it is wanted."""
 
     title: str
     text: str
@@ -141,7 +141,7 @@ class Page:
     colophon : str
         What made the page.
     papers : sequence of (str, str)
-        What whoever files the page wants to have on it, such as a customer.
+        What the reader wants to have on it, such as a customer.
     signatures : sequence of str
         Lines to be filled in by hand.
     """

@@ -30,7 +30,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.units import COUNTS, UNITS
 
 # what loggers in some countries write, `gen-profile stream --log` among them: in English, German, French,
-# Italian and Spanish; the longest first, lest a part of one be taken for another
+# Italian and Spanish; the longest first: a part of one could be taken for another
 WORDS = {
     **dict.fromkeys(
         ("position_actual", "actual_position", "istposition", "position", "posizione"), "position"
@@ -90,7 +90,7 @@ def read_log(path: Path, spec: Spec, columns: str | None = None) -> MeasuredLog:
     path : Path
     spec : Spec
     columns : str, optional
-        Which column holds what, as in ``time_ms=Zeit,payload_sway_mm=4``; told by their names by default. A
+        Which column holds what, as in ``time_ms=Zeit,payload_sway_mm=4``; by their names by default. A
         number before a unit is the size of one count, ``hook_angle_0.09deg``.
 
     Raises
@@ -281,7 +281,7 @@ def _with_unit(name: str, below: str) -> str:
 
 
 def _column(name: str, spec: Spec, where: str) -> _Column | None:
-    """Tell what a column holds from its name; None where it is somebody else's."""
+    """Tell what a column holds from its name; None where it is of none here."""
     match = _COLUMN.fullmatch(name)
     if match is None:
         return None

@@ -1,4 +1,4 @@
-"""A measured move, told and drawn beside the plan."""
+"""A measured move, in figures and curves beside the plan."""
 
 from __future__ import annotations
 

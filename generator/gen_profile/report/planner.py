@@ -134,7 +134,7 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
         title="The worst history",
         words=(
             f"History {worst.number}: {commands} commands from {worst.history.start_words} on"
-            + (f"; the block is told {reported}." if reported else "."),
+            + (f"; the block is given {reported}." if reported else "."),
         ),
         blocks=[
             history_figure(spec, proof, followed),

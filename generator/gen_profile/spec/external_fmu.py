@@ -1,4 +1,4 @@
-"""The keys of ``[check]`` that name somebody else's FMU, and which of its variables are what."""
+"""The keys of ``[check]`` that name an external FMU, and which of its variables are what."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FILE = Annotated[
 def external_fmu(
     check: dict[str, Any], plant: Plant | None, folder: Path, structurer: Structurer
 ) -> ExternalFmu | None:
-    """Take the keys of somebody else's FMU out of the table ``[check]``.
+    """Take the keys of an external FMU out of the table ``[check]``.
 
     Parameters
     ----------

@@ -212,7 +212,7 @@ class LimitsSpec(Checked, table="limits"):
 
 @attrs.frozen(kw_only=True)
 class ExternalFmu(Checked, table="check"):
-    """Somebody else's FMU that judges in place of ours.
+    """An external FMU that judges in place of ours.
 
     Attributes
     ----------
@@ -310,7 +310,7 @@ class CheckSpec(Checked, table="check"):
         Of what is random.
     path : PathSpec
     foreign : ExternalFmu or None
-        Somebody else's FMU that judges in place of ours.
+        An external FMU that judges in place of ours.
     """
 
     residual_sway: Mapping[LoadName, Sway]
@@ -346,7 +346,7 @@ class ExportSpec(Checked, table="export"):
 
 @attrs.frozen(kw_only=True)
 class PlannerSpec(Checked, table="planner"):
-    """What a planner block is told at run time, and how it brakes at once.
+    """What a planner block is given at run time, and how it brakes at once.
 
     Attributes
     ----------
@@ -355,7 +355,7 @@ class PlannerSpec(Checked, table="planner"):
     live_rate : mapping of str to float
         How fast some of them may change on the way, each in its unit per second.
     live_noise : mapping of str to float
-        By how much what the controller is told of some may be off from cycle to cycle, each in its unit.
+        By how much what the controller is given of some may be off from cycle to cycle, each in its unit.
     events : bool
         Whether the last events are outputs of the block, for an operator's screen.
     zones : bool
@@ -467,7 +467,7 @@ class Spec(Summarised, Checked):
         return document
 
     def files(self) -> dict[str, bytes]:
-        """Read the files that it names, by their names: an own machine, somebody else's FMU."""
+        """Read the files that it names, by their names: an own machine, an external FMU."""
         own, judge = self.plant.file, self.check.foreign
         files = {} if own is None else {own.name: own.content}
         return files if judge is None else files | {judge.name: judge.path.read_bytes()}

@@ -20,7 +20,7 @@ from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import RESIDUAL_SHARE, Spec
 
 STEP = 1e-6  # m (or rad), for differences of forces and outputs about rest
-# (unit of the axis, what) → beyond which it is hardly meant, and cannot be
+# (unit of the axis, what) → beyond which it is implausible, and impossible
 FAST = {
     ("m", "velocity"): (15.0, 100.0),
     ("m", "acceleration"): (200.0, 1e4),
@@ -40,7 +40,7 @@ LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
 
 @attrs.frozen(kw_only=True)
 class Doubt:
-    """A value that is hardly meant, or cannot be: its place, what is wrong and the cure."""
+    """A value that is implausible, or impossible: its place, what is wrong and the cure."""
 
     place: str
     problem: str
@@ -87,7 +87,7 @@ def refuse_implausible(spec: Spec) -> None:
 
 
 def plausibility_warnings(spec: Spec) -> tuple[str, ...]:
-    """Say which values are hardly meant, a sentence each."""
+    """Say which values are implausible, a sentence each."""
     return tuple(doubt.sentence for doubt in _doubts(spec) if not doubt.refused)
 
 
@@ -189,7 +189,7 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
     ends = spec.machine().loads[end_load]  # others, such as a hook, may be left to swing
     for load, limit in reversed(list(limits.items())):  # the end load, which hangs lowest, speaks for all
         if spec.check.default or math.isclose(limit, usual):
-            continue  # what nobody typed is no slip
+            continue  # what was not typed is no slip
         column = list(limits).index(load)
         place = "check.residual_sway" if one_limit else f"check.residual_sway.{load}"
         directions = end_load if load in ends else slice(column, column + 1)
@@ -248,7 +248,7 @@ def _drive(spec: Spec) -> Iterator[Doubt]:
 
 
 def _scale(spec: Spec) -> Scale:
-    """Estimate what the loads can do; nothing is told of a machine whose equations fail at the target."""
+    """Estimate what the loads can do; nothing is said of a machine whose equations fail at the target."""
     try:
         with np.errstate(divide="raise", over="raise", invalid="raise"):
             return _scale_at_target(spec)

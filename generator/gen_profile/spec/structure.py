@@ -243,7 +243,7 @@ def finite(value: object) -> float | None:
 
 
 def place(outer: str, step: object) -> str:
-    """Join a place and a key of it; a key that is no bare TOML key is quoted, lest it pose as more."""
+    """Join a place and a key of it; a key that is no bare TOML key is quoted, as it could pose as more."""
     key = str(step)
     bare = key if key.isidentifier() or re.fullmatch(r"[A-Za-z0-9_-]+", key) else repr(key[:60])
     return f"{outer}.{bare}" if outer else bare

@@ -288,7 +288,7 @@ def _by_axis(limits: Table, can: Table, plant: Plant) -> None:
 
 
 def _check(table: Table, move: MoveSpec, plant: Plant | None, folder: Path, structurer: Structurer) -> Table:
-    """Give every load its limit, and take the keys of somebody else's FMU together."""
+    """Give every load its limit, and take the keys of an external FMU together."""
     table = structurer.known(table, CHECK_KEYS, "check")
     given = table.pop("residual_sway", None)
     foreign = external_fmu(table, plant, folder, structurer)

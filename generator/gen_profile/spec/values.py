@@ -73,7 +73,7 @@ class Words:
         self._template, self._values = template, values
 
     def of(self, value: object) -> Phrase:
-        """Say it of a value."""
+        """Put it into words for a value."""
         return Phrase(self._template, **self._values, found=found(value))
 
 

@@ -99,7 +99,7 @@ class Keys:
 
 
 def _in_foreground(terminal: int) -> bool:
-    """Tell whether keys can be read, as nobody in the background can."""
+    """Tell whether keys can be read, as no process in the background can."""
     if sys.platform == "win32":
         return False
     return os.isatty(terminal) and os.tcgetpgrp(terminal) == os.getpgrp()

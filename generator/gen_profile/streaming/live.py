@@ -62,7 +62,7 @@ class Glance:
     cycle : int
         How far the motion is.
     actual : (cycles, axes) array
-        Positions told, in the axes' units; not a number where none was.
+        Positions reported, in the axes' units; not a number where none was.
     apart : (axes,) array
         Greatest distance from the motion so far.
     late : float

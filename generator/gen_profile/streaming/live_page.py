@@ -44,7 +44,7 @@ def show(view: View, look: Callable[[], Glance], over: Callable[[], bool]) -> No
 
 
 class Server(ThreadingHTTPServer):
-    """Answers on the loopback interface, under a path that nobody can guess."""
+    """Answers on the loopback interface, under a path that cannot be guessed."""
 
     daemon_threads = True
 

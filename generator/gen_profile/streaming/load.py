@@ -34,7 +34,7 @@ class CraneLoad:
     def __init__(self, spec: Spec, progress: Progress = no_progress) -> None:
         if spec.move.initial:
             raise CosimulationError(
-                "move.initial: the simulated crane would swing on while its drives start up, and nobody "
+                "move.initial: the simulated crane would swing on while its drives start up, and it is not "
                 "knows how it swings when the motion begins; leave move.initial out."
             )
         machines = scenarios(spec)

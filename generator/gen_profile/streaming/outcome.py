@@ -67,7 +67,7 @@ class StreamOutcome:
 
     @property
     def actual(self) -> Array:
-        """Position that each drive told at each SYNC, in m; not a number where none was told."""
+        """Position that each drive reported at each SYNC, in m; not a number where none was."""
         return np.where(self._answered[:, None], self.source.si(self._actual), np.nan)
 
     @property

@@ -84,7 +84,7 @@ class CommandList:
         return not self._left
 
     def operated(self) -> AbstractContextManager[object]:
-        """Nobody else is needed."""
+        """Need no operator."""
         return nullcontext()
 
     def due(self, cycle: int) -> Iterable[Command]:
@@ -106,7 +106,7 @@ class PlannedMotion:
     live : mapping of str to float
         Live parameters by name that differ from what the block takes them for.
     watched : bool
-        Whether anybody sees how the axes are, now and then.
+        Whether feedback of the axes is read, now and then.
 
     Raises
     ------

@@ -33,7 +33,7 @@ def to_start(source: Source, port: Port, *, simulate_drive: bool, tell: Progress
     Raises
     ------
     StreamAborted
-        The drives do not tell where their axes stand, or somebody else is in command.
+        The drives do not tell where their axes stand, or another master is in command.
     CheckFailed, InfeasibleProblem, SolverDiverged
         There is no such motion.
     """

@@ -55,7 +55,7 @@ def require_rest(spec: Spec) -> None:
     """
     if spec.move.initial:
         raise SpecError(
-            "move.initial: drives need a while to start up, and nobody knows how the load swings by then; "
+            "move.initial: drives need a while to start up, and it is not known how the load swings by then; "
             "let it come to rest, leave move.initial out, and export again."
         )
 
@@ -142,7 +142,7 @@ def actual_positions(source: Source, port: Port, tell: Progress) -> tuple[float,
     SpecError
         The interface cannot be opened.
     StreamAborted
-        Somebody else is in command, or a drive does not tell.
+        Another master is in command, or a drive does not tell.
     """
     from gen_profile_exporters.can.streaming.configuration import positions  # noqa: PLC0415  # canopen
     from gen_profile_exporters.can.streaming.discovery import listen  # noqa: PLC0415  # is an extra
@@ -190,7 +190,7 @@ def rehearsed_cycles(source: Source) -> int:
 def self_test(source: Source) -> Lateness:
     """Keep the cycle without a bus for as long as the motion lasts, and refuse what this machine cannot hold.
 
-    Where nobody knows how long that is, for `SELF_TEST`.
+    Where it is not known how long that is, for `SELF_TEST`.
 
     Raises
     ------
@@ -369,6 +369,6 @@ def _simulated(source: Source, port: Port, tell: Progress) -> Iterator[_Simulati
 
 
 def _clock(refused: tuple[str, ...]) -> SystemClock:
-    """Spin before each cycle where that takes the processor from nobody."""
+    """Spin before each cycle where that takes the processor from no other work."""
     spare = not refused and sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
     return SystemClock(SPIN if spare else 0)

@@ -179,7 +179,7 @@ class Drive:
         return np.array([drawing.rest[-1, _load(drawing)] for drawing in drawings])
 
     def _tell_live(self, live: Mapping[str, float]) -> None:
-        """Give the machines the ropes that the planner was told of."""
+        """Give the machines the ropes that the planner was given."""
         self._live = {**self._live, **live}
         for column, axis in enumerate(self._plant.actuated):
             self._places[column] = self._live.get(axis.name, self._places[column])

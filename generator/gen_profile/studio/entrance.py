@@ -174,7 +174,7 @@ class Guarded(RequestHandler):
         raise HTTPError(404)
 
     def set_default_headers(self) -> None:
-        """Let nothing but the page's own scripts run, and nothing be kept, framed or told to others."""
+        """Let nothing but the page's own scripts run, and nothing be kept, framed or sent to others."""
         self.set_header(
             "Content-Security-Policy",
             f"{NOTHING}; script-src 'self'; style-src 'self'; img-src 'self' data:; "

@@ -44,7 +44,7 @@ USUAL = {"cost.sway_weight": 50.0, "actuator.tau": 0.1, "cost.sway_scale": 50.0,
 USUAL |= {"planner.quick_stop": 1.0, "planner.quick_stop_jerk": 10.0, "can.torque_per_acceleration": 1.0}
 USUAL |= {"can.timeout": 0.02, "can.following_error": 0.01, "can.quick_stop": 1.0}
 LEFT_OUT = {
-    "can.vendor",  # numbers of one drive, which nobody turns
+    "can.vendor",  # numbers of one drive, which are no knobs
     "can.product",
     "check.foreign",
     "check.default",
@@ -290,7 +290,7 @@ def _range(one: Parameter, place: str, group: str, value: Any) -> Knob:
 
 
 def _planner(spec: Spec) -> Iterator[Knob]:
-    """Tell what the planner block is told at run time, and how fast that may change."""
+    """Give the block's inputs at run time, and how fast they may change."""
     live, rates = spec.planner.live, spec.planner.live_rate
     for one in spec.machine().parameters:
         yield _range(one, "planner.live", "planner", live.get(one.name))

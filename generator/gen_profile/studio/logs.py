@@ -114,7 +114,7 @@ def _only_swing(read: MeasuredLog, after: float) -> SwingLog:
     for quantity, signals in (("angle", read.angles), ("sway", read.sways)):
         for load, values in signals.items():
             return cut_swing(read.times, values, read.source, after=after, quantity=quantity, load=load)
-    template = "{source}: no column is told to be a sway or an angle of a load; choose one."
+    template = "{source}: no column's name is that of a sway or an angle of a load; choose one."
     raise OutputError(template, source=read.source)
 
 

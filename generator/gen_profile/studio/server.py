@@ -183,7 +183,7 @@ class Download(Guarded):
 
 
 class Conversation(Guarded, tornado.websocket.WebSocketHandler):
-    """What one page asks and is told; every page has its own, so they do not disturb each other."""
+    """What one page asks and gets; every page has its own, so they do not disturb each other."""
 
     def check_origin(self, origin: str) -> bool:
         """Let only the page itself talk."""

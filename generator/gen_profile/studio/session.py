@@ -13,7 +13,7 @@ from gen_profile.studio.workers import BEGUN, ENDED, LOST, Job, Message, Worker,
 
 PATIENCE = 0.6  # s that a question may wait for the first part of an older one's answer
 IDLE_TIME = 0.3  # s without a new question, after which what takes longer is asked for
-NOBODY = -2  # whose question no page asks
+NO_PAGE = -2  # whose question no page asks
 TRIES = 2  # of a new worker in the place of one that died before it began anything
 GONE = "The process that solved this has ended, and another one takes its place. Undo the last change."
 
@@ -66,7 +66,7 @@ class RequestQueue:
         self._worker, self._ended = None, self._job.number
 
     def _overtake(self, number: int) -> None:
-        """Ask somebody else where the worker is still at an older question."""
+        """Ask another worker where this one is still at an older question."""
         if self._worker is None or self._begun >= number:
             return
         if self._answers:
@@ -118,7 +118,7 @@ class Session:
         self._newest, self._solved, self._orders = -1, -1, 0
 
     def attach(self, tell: Tell) -> None:
-        """Tell somebody what was found so far, and from now on."""
+        """Pass on what was found so far, and from now on."""
         self._tell = tell
         for message in self._heard:
             tell(message)
@@ -157,7 +157,7 @@ class Session:
 
     def close(self) -> None:
         """Let go of all workers, and take none any more for what was due later."""
-        self._newest = NOBODY
+        self._newest = NO_PAGE
         for line in (self._picture, self._depth, self._files, self._log, self._drive):
             line.stop()
 

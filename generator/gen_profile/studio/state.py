@@ -27,11 +27,11 @@ MOST_NUMBERS = 16  # of a value
 MOST_SPEC = 262_144  # bytes of a spec that is dropped on a page
 MOST_ADDRESS, MOST_STATE = 16_384, 262_144  # bytes, as it is written and unpacked
 KEY = re.compile(r"[a-z]+(\.[A-Za-z0-9_-]+){0,4}")
-# which program runs is for whoever starts the studio to say, not for an address
+# which program runs is for the studio's user to say, not for an address
 FIXED = re.compile(r"(plant\.(type|file|file_sha256)|check\.(fmu|fmu_sha256|input|output|parameters))(\..*)?")
 
 
-@lru_cache(maxsize=8)  # asked for at every turn of a knob; nobody changes it
+@lru_cache(maxsize=8)  # asked for at every turn of a knob; it is never changed
 def _parsed(text: str) -> dict[str, Any]:
     return parse_toml(text)
 
@@ -72,7 +72,7 @@ class WrittenSpec:
     def programs(self) -> Mapping[str, Path]:
         """Files that the spec names and whose code would run, by key; nothing of them is looked at.
 
-        They are a machine of one's own, and somebody else's FMU.
+        They are a machine of one's own, and an external FMU.
         """
         keys = {"plant": "file", "check": "fmu"}
         tables = {name: self.document.get(name) for name in keys}
@@ -112,7 +112,7 @@ def preset_start(name: str) -> WrittenSpec:
 
 
 def opened_start(name: str, content: bytes, folder: Path) -> WrittenSpec:
-    """Begin with a spec that somebody handed over as a file.
+    """Begin with a spec that was handed over as a file.
 
     Raises
     ------

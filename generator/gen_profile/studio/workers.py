@@ -109,7 +109,7 @@ class Worker:
     Parameters
     ----------
     hear : callable
-        Is told every part of an answer, in that thread.
+        Takes every part of an answer, in that thread.
     """
 
     def __init__(self, hear: Hear | None = None) -> None:
@@ -122,8 +122,8 @@ class Worker:
         Thread(target=self._listen, daemon=True).start()
 
     def heard_by(self, hear: Hear) -> bool:
-        """Let somebody else hear it from now on; False where it is lost already."""
-        with self._lock:  # else it could be lost in between, and nobody would be told
+        """Let another receiver hear it from now on; False where it is lost already."""
+        with self._lock:  # else it could be lost in between, unnoticed
             if not self._lost:
                 self._hear = hear
             return not self._lost
@@ -204,7 +204,7 @@ class Workers:
 
 
 def _work(connection: Connection) -> None:
-    """Answer questions until nobody asks any more; in a process of its own."""
+    """Answer questions until none is asked any more; in a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # which is for the server
     if sys.platform != "win32":
         os.setpgrp()

@@ -141,12 +141,12 @@ def failed(case: int, values: Mapping[str, Any], status: str, reason: str) -> Ca
 
 
 def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, Any]:
-    document, check = outcome.to_dict(), cast("Check", outcome.check)  # nobody asked for none
+    document, check = outcome.to_dict(), cast("Check", outcome.check)  # it was asked for
     load, finding = check.worst
     solver = {
         key: ", ".join(value) if isinstance(value, list) else value
         for key, value in document["solver"].items()
-        if key not in {"status", "time_s"}  # of which one is told before, and the other differs every time
+        if key not in {"status", "time_s"}  # the one is stated before, and the other differs every time
     }
     return {
         "case": case,

@@ -202,7 +202,7 @@ def _is_whole(artefacts: Sequence[Mapping[str, str]], files: Mapping[str, bytes]
 
 @contextmanager
 def opened(store: Store) -> Iterator[Keeper]:
-    """Begin a sweep, or go on with it; nobody else may work in its folder or file meanwhile.
+    """Begin a sweep, or go on with it; no other process may work in its folder or file meanwhile.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The table of a sweep: a Parquet file with one row per case, whoever worked it out."""
+"""The table of a sweep: a Parquet file with one row per case, whichever process worked it out."""
 
 from __future__ import annotations
 

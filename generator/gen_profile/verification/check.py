@@ -1,4 +1,4 @@
-"""Judging an artefact that lies on disk, whoever wrote or altered it."""
+"""Judging an artefact that lies on disk, whatever wrote or altered it."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def check_artefact(
     Parameters
     ----------
     path : Path or str
-        Any artefact that the exporters write; its format is told by its suffix.
+        Any artefact that the exporters write; its suffix names its format.
     spec : Spec, or the path of one, optional
         Taken from ``manifest.json`` beside the file when not given.
     samples : int, optional

@@ -147,7 +147,7 @@ def beyond_equations(
         yield (
             f"The {plant.end_load_name} sways by {1e3 * swayed[worst]:.4g} mm on the way "
             f"({machines[worst].name}), and the linear equations of a {plant.type} hold up to "
-            f"{1e3 * small[worst]:.4g} mm: what is told of more is rough; allow more time (move.duration)."
+            f"{1e3 * small[worst]:.4g} mm: what is stated of more is rough; allow more time (move.duration)."
         )
 
 

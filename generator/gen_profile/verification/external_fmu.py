@@ -1,4 +1,4 @@
-"""A check by somebody else's FMU."""
+"""A check by an external FMU."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def judge_external(
     setpoints: SampledProfile,
     machines: Sequence[Scenario],
 ) -> Check:
-    """Let somebody else's FMU judge replayed setpoints.
+    """Let an external FMU judge replayed setpoints.
 
     Its inputs are held over communication steps; the same with steps of half the length tells how much its
     integration errs.

@@ -41,7 +41,7 @@ class MotionVariant:
         return np.array([self.offset.get(name, 0.0) for name in axes])
 
     def described(self) -> str | None:
-        """Say it in words, or nothing where the motion is as planned."""
+        """Describe it in words, or not at all where the motion is as planned."""
         words = [f"{name} {value:g} times as far" for name, value in self.scale.items()]
         words += [f"{name} the other way" for name in self.mirror]
         words += [f"{name} begins {value:+g} from its start" for name, value in self.offset.items()]

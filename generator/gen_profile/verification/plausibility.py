@@ -24,7 +24,7 @@ FEWEST_SETPOINTS = 20  # fewer say too little about what is usual among them
 
 
 def implausibilities(spec: Spec, setpoints: SampledProfile) -> tuple[str, ...]:
-    """Say where setpoints are not what the spec asks for, or no motion that anybody designed.
+    """Say where setpoints are not what the spec asks for, or no designed motion.
 
     Each bound leaves room for what the artefact's format can represent and for the rounding of its numbers.
 

@@ -14,7 +14,7 @@ from gen_profile.spec.model import PathSpec, Spec
 from gen_profile.verification.batch import Feed
 
 LEAP = 1e-3  # of a cycle, in which a drive that holds setpoints is given the next one
-MOST_JITTER = 0.45  # of a cycle, lest setpoints overtake one another
+MOST_JITTER = 0.45  # of a cycle: setpoints must not overtake one another
 
 
 def transmitted(spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario]) -> Feed:

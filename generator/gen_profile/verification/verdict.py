@@ -15,8 +15,8 @@ from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.summary import Summarised
 
 QUANTILES = (0.5, 0.9, 0.99)
-FINE = 1e3  # µm, up to which an error is told in these
-MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed, lest a manifest hold thousands
+FINE = 1e3  # µm, up to which an error is shown in these
+MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed: a manifest must not hold thousands
 
 
 @attrs.frozen(kw_only=True)
@@ -169,7 +169,7 @@ class Check(Summarised, Examination):
         return (*self._sentences(self.judged), *self.faults)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say what is wrong without counting: doubtful values, faults of timing."""
+        """Say what is wrong without counting: implausible values, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
         template = "{sentence} It counts where the check is strict."
         late = (Phrase(template, sentence=sentence) for sentence in self._sentences(timing))

@@ -1,4 +1,4 @@
-"""A streamer and drives on python-can's virtual bus, in one thread, on a clock that nobody waits for.
+"""A streamer and drives on python-can's virtual bus, in one thread, on a simulated clock.
 
 What the tests judge is the bus alone: a third party on it takes down every frame, as candump does.
 """
@@ -30,7 +30,7 @@ _channels = itertools.count()
 
 
 class HastyClock(SharedClock):
-    """A shared clock that waits for nobody: each sleep is over as soon as the others have worked."""
+    """A shared clock that does not wait: each sleep is over as soon as the others have worked."""
 
     passed = 0
 
@@ -68,7 +68,7 @@ class RigidLoad:
 
 
 class FakeClock:
-    """Time that passes only while somebody sleeps, and lets everybody else act meanwhile."""
+    """Time that passes only while one sleeps, and lets all others act meanwhile."""
 
     def __init__(self, step):
         self._now = BEGINNING
@@ -87,7 +87,7 @@ class FakeClock:
                 act()
 
     def stall(self, duration):
-        """Let time pass while nobody else acts: this machine was busy."""
+        """Let time pass while nothing else acts: this machine was busy."""
         self._now += duration
 
 
@@ -233,7 +233,7 @@ class Bench:
         self.clock.actors.insert(0, look)
 
     def say(self, cob_id, data=b"", **options):
-        """Speak up as somebody else on the bus; the witness hears itself, too."""
+        """Speak up as another node on the bus; the witness hears itself, too."""
         options.setdefault("is_extended_id", False)
         self.witness.send(can.Message(arbitration_id=cob_id, data=data, **options))
 
@@ -249,12 +249,12 @@ class Bench:
         return [frame for frame in self.heard if frame.cob_id == cob_id]
 
     def positions(self):
-        """What the first drive told: instants, and positions in counts."""
+        """What the first drive reported: instants, and positions in counts."""
         answers = self.of(0x180 + self.target.can.node)
         return [(frame.at, int.from_bytes(frame.data[2:6], "little", signed=True)) for frame in answers]
 
     def asked(self, index):
-        """Ask the first drive by SDO for an object, as anybody on the bus may; None without an answer."""
+        """Ask the first drive by SDO for an object, as any node on the bus may; None without an answer."""
         node, before = self.target.can.node, len(self.heard)
         self.say(0x600 + node, struct.pack("<BHB4x", 0x40, index, 0))
         self.wait(2)

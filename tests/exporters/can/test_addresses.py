@@ -46,7 +46,7 @@ def test_every_fault_of_such_a_drive_stops_both():
 def test_nobody_else_may_send_them(cob_id):
     with Bench("bridge", "trolley", profile=PROFILE, **ADDRESSES) as bench:
         bench.at_cycle(100, lambda: bench.say(cob_id, bytes(4)))
-        assert f"Frame {cob_id:03X}h came from somebody else" in bench.run().reason
+        assert f"Frame {cob_id:03X}h came from another node" in bench.run().reason
 
 
 def test_files_tell_them():
@@ -109,10 +109,10 @@ class TestOthersSdos:
     def test_they_may_not_write(self, command):
         with Bench() as bench:
             bench.at_cycle(100, lambda: bench.say(0x601, bytes([command, 0x40, 0x60, 0, 0, 0, 0, 0])))
-            assert "Frame 601h came from somebody else" in bench.run().reason
+            assert "Frame 601h came from another node" in bench.run().reason
 
     def test_they_may_not_read_while_drives_are_set_up(self):
         """A drive serves one client at a time: its answers would be taken for ours."""
         with Bench() as bench:
             bench.say(0x601, bytes([0x40, 0x41, 0x60, 0, 0, 0, 0, 0]))
-            assert "Frame 601h came from somebody else" in bench.run().reason
+            assert "Frame 601h came from another node" in bench.run().reason

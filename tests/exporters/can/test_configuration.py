@@ -349,5 +349,5 @@ class TestAfterAStreamThatWasKilled:
         with Bench() as bench:
             bench.drive.store(0x1016, 1, 5 << 16 | 500)
             bench.drive.store(0x6041, 0, State.ENABLED.bits)
-            refused(bench, "somebody else commands it")
+            refused(bench, "another controller commands it")
             assert bench.now < 200

@@ -162,9 +162,9 @@ class TestOnAChannel:
         )
 
     def test_nobody(self):
-        outcome = run_here("can", "list", "--interface", "virtual", "--channel", "nobody at all")
+        outcome = run_here("can", "list", "--interface", "virtual", "--channel", "an empty one")
         assert outcome.code == 0
-        assert outcome.out.splitlines()[-1].startswith("No node answers on virtual nobody at all: check")
+        assert outcome.out.splitlines()[-1].startswith("No node answers on virtual an empty one: check")
 
     def test_a_channel_without_its_interface(self):
         outcome = run_here("can", "list", "--channel", "can0")

@@ -89,7 +89,7 @@ class TestOneFrame:
     def test_nobody_else_may_send_it(self):
         with Bench(make=FIXED, fixed_pdos=TOGETHER) as bench:
             bench.at_cycle(100, lambda: bench.say(0x401, bytes(6)))
-            assert "Frame 401h came from somebody else" in bench.run().reason
+            assert "Frame 401h came from another node" in bench.run().reason
 
 
 SPLIT = FixedPdosSpec(
@@ -202,7 +202,7 @@ def test_a_log_whose_controlword_was_altered():
         ),
         (
             FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION, 0x60710010), tpdo3=(STATUSWORD, ACTUAL)),
-            r"rpdo3: nobody knows what to send as 6071h:00",
+            r"rpdo3: cannot tell what to send as 6071h:00",
         ),
         (
             FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION), tpdo2=(STATUSWORD,)),

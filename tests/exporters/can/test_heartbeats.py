@@ -89,7 +89,7 @@ def test_a_stream_begins_after_one_that_was_killed(timeout_of_the_killed):
         bench.drive._master_heard = bench.clock.now()
         bench.wait(100)
         assert bench.drive.state is State.FAULT
-        while bench.streamer_end.recv(0) is not None:  # nobody listens yet
+        while bench.streamer_end.recv(0) is not None:  # nothing listens yet
             pass
         bench.renew(reset_fault=True)
         bench.heard.clear()

@@ -41,11 +41,11 @@ def test_nothing_on_the_bus_crashes_it_or_moves_the_axis_elsewhere(make_frame, s
     generator = random.Random(seed)
     mode = [{}, {"mode": "ip"}, {"mode": "csv", "following_error": 0.01}][seed % 3]
     with Bench(profile=quintic((0.0, 0.3)), **mode) as bench:
-        begins = [0, 1, 150][seed // 3 % 3] * 1_000_000  # while it listens, configures or streams
+        start = [0, 1, 150][seed // 3 % 3] * 1_000_000  # while it listens, configures or streams
         count = [0]
 
         def chatter():
-            if bench.clock.now() > 1_000_000_000 + begins and count[0] < FRAMES // ROUNDS:
+            if bench.clock.now() > 1_000_000_000 + start and count[0] < FRAMES // ROUNDS:
                 for _ in range(50):
                     count[0] += 1
                     bench.streamer_end.inbox.append(make_frame(generator))

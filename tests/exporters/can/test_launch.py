@@ -11,7 +11,7 @@ from gen_profile_exporters.can.host.port import Port
 
 
 class Interface:
-    """One interface, as whoever sends on it and whoever listens see it.
+    """One interface, as its senders and listeners see it.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def test_whether_an_interface_keeps_them_is_tried(monkeypatch, late, keeps):
     monkeypatch.setattr(launch, "SocketcanBus", lambda channel, can_filters: interface)
     monkeypatch.setattr(launch, "time", interface)
     assert launch.LaunchingBus.keeps_instants(interface) is keeps
-    assert interface.sent == [0x780]  # which arms no drive's heartbeat watch, and stops nobody else's stream
+    assert interface.sent == [0x780]  # which arms no drive's heartbeat watch, and stops no other stream
 
 
 def test_an_interface_whose_queue_is_full(monkeypatch):

@@ -21,7 +21,7 @@ OPTIONS = {
 }
 OWN = {(0x6085, 0): 77, (0x6007, 0): 2, (0x6060, 0): 9, (0x1017, 0): 250, (0x607D, 1): -5, (0x607D, 2): 10**6}
 OTHER_MASTER, OURS = 5 << 16 | 500, 127 << 16 | 20
-FED = {0x6040, 0x6041, 0x6061, 0x6064, 0x607A, 0x60B1, 0x60B2}  # what is commanded and told, not set
+FED = {0x6040, 0x6041, 0x6061, 0x6064, 0x607A, 0x60B1, 0x60B2}  # what is commanded and reported, not set
 
 
 def held(drive):

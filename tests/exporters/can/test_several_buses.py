@@ -28,7 +28,7 @@ def bench():
 
 
 def quick_stopped(bench, *nodes):
-    """When drives were first told to stop, in ms."""
+    """When drives were first commanded to stop, in ms."""
     stops = (0x200 + node for node in nodes or (1, 2, 3))
     return [next(frame.at for frame in bench.of(cob_id) if frame.data == QUICK_STOP) for cob_id in stops]
 
@@ -108,7 +108,7 @@ def test_a_bus_without_sync_is_a_silent_drive(bench):
 @pytest.mark.parametrize("channel", ["can0", "can1"])
 def test_a_second_controller_on_any_bus(bench, channel):
     bench.at_cycle(50, lambda: bench.witness.buses[channel].send(frames.message(frames.SYNC)))
-    assert "Frame 080h came from somebody else" in bench.run().reason
+    assert "Frame 080h came from another node" in bench.run().reason
 
 
 def test_what_another_bus_has_under_a_drives_cob_id_is_not_its_own(bench):

@@ -1,4 +1,4 @@
-"""The simulated drive by itself: states, faults, and what it does when nobody feeds it."""
+"""The simulated drive by itself: states, faults, and what it does when setpoints stop."""
 
 import gc
 import itertools

@@ -90,16 +90,16 @@ def on(name):
 class TestWhole:
     def test_every_setpoint_once_in_order_byte_for_byte(self, scenario):
         exported = [line.split()[2] for line in scenario.log.splitlines()]
-        seen = [
+        frames_seen = [
             f"{cob_id:03X}#{data.hex().upper()}"
             for _, cob_id, data in scenario.frames
             if cob_id in {0x301, 0x080}
         ]
-        begins = [k for k in range(len(seen)) if seen[k : k + len(exported)] == exported]
-        assert begins
-        around = {*seen[: begins[0]], *seen[begins[0] + len(exported) :]}
+        starts = [k for k in range(len(frames_seen)) if frames_seen[k : k + len(exported)] == exported]
+        assert starts
+        around = {*frames_seen[: starts[0]], *frames_seen[starts[0] + len(exported) :]}
         assert around == {exported[0], exported[-2], "080#"}
-        assert seen[::2] == [frame for frame in seen if frame != "080#"]
+        assert frames_seen[::2] == [frame for frame in frames_seen if frame != "080#"]
         assert len(exported) == 2 * CYCLES
 
     def test_it_ends_well(self, scenario):

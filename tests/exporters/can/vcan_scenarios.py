@@ -76,7 +76,7 @@ def run(place, log, queue, disturb):
             running = "aborted" not in (place / "stream.err").read_text()
             try:
                 disturb(streamer, drive)
-            except (ProcessLookupError, _StalledError):  # it has ended by itself, or nobody could act
+            except (ProcessLookupError, _StalledError):  # it has ended by itself, or none could act
                 running = False
         codes = {"stream": _ended(streamer), "drive": _ended(drive, patience=10.0)}
         time.sleep(0.1)

@@ -1,4 +1,4 @@
-"""The terminal that a stream was started from: its signals stop the axes, and nobody waits for it."""
+"""The terminal that a stream was started from: its signals stop the axes, and nothing waits for it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def stopped_by_signals(ask_to_stop: Callable[[str], None]) -> Iterator[None]:
 
 
 def _name(number: int) -> str:
-    """Name a signal; of those for anybody's use only the first and the last have names."""
+    """Name a signal; of those for any use only the first and the last have names."""
     with suppress(ValueError):
         return signal.Signals(number).name
     return f"signal {number}"

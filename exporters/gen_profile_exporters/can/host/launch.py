@@ -26,7 +26,7 @@ _FRAME = struct.Struct("=IB3x8s")  # struct can_frame of linux/can.h
 
 
 class LaunchingBus(SocketcanBus):
-    """A SocketCAN interface that is also told when to send.
+    """A SocketCAN interface that is also given the instant at which to send.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """A bus between processes without any CAN hardware: python-can's UDP multicast, made deaf to itself.
 
-python-can's own hears everything it sends. On a CAN bus nobody does, and a frame of ours that we hear is
-somebody else's who commands our drives.
+python-can's own hears everything it sends. On a CAN bus no node does, and a frame of ours that we hear is
+another master's that commands our drives.
 """
 
 from __future__ import annotations

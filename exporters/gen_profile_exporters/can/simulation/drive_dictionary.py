@@ -132,7 +132,7 @@ def refusal(
     place : (int, int)
         Index and subindex of an object that is there.
     value : int
-        What somebody writes to it, unsigned.
+        What is written to it, unsigned.
     """
     index, sub = place
     if index == 0x6060:

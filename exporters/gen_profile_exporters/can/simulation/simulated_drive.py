@@ -138,7 +138,7 @@ class SimulatedDrive:
 
     def _take(self, pdo: int, data: bytes) -> None:
         for index, sub, value in _unpacked(self._mapping(0x1600 + pdo), data):
-            if index not in self.local.object_dictionary:  # it stands for bits that nobody uses
+            if index not in self.local.object_dictionary:  # it stands for unused bits
                 continue
             self.store(index, sub, value)
             self._fresh |= index in SETPOINTS
@@ -173,7 +173,7 @@ class SimulatedDrive:
         return self.command
 
     def arrive(self, actual: float) -> None:
-        """Be told where the axis is at the end of the period."""
+        """Take where the axis is at the end of the period."""
         self.actual = actual
         self._watch_following_error()
         self._pack_feedback()

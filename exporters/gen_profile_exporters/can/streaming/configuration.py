@@ -1,7 +1,7 @@
 """Set the drives up by SDO before anything moves, and read back that they are.
 
 Whatever matters to safety is read back from the drive, not believed: identity, mode, mapping, interpolation
-period, what it does when nobody feeds it any more, the window of the following error, limits, and where the
+period, what it does when setpoints cease, the window of the following error, limits, and where the
 axis stands.
 """
 
@@ -158,7 +158,7 @@ def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
     """
     for number in frames.nodes(target):
         with suppress(StreamAborted):
-            link.send(nmt(PRE_OPERATIONAL, number))  # first, lest it miss setpoints while it answers
+            link.send(nmt(PRE_OPERATIONAL, number))  # first: it would miss setpoints while it answers
     for number in frames.nodes(target):
         with suppress(StreamAborted, SdoError, struct.error):
             link.sdo(number).download(*HEARTBEAT_WATCHED, bytes(4))
@@ -250,7 +250,7 @@ def _require_rest(link: Link, node: Node) -> None:
         )
     if state in MOVING:
         raise StreamAborted(
-            f"axis {node.name}: the drive is in the state {state.words!r}: somebody else commands it, "
+            f"axis {node.name}: the drive is in the state {state.words!r}: another controller commands it, "
             "or left it so; have it switched off there (controlword 6040h = 0)."
         )
 

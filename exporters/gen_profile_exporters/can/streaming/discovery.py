@@ -1,4 +1,4 @@
-"""Which nodes answer on a bus, and what they are; only reads, and not where somebody else is in command."""
+"""Which nodes answer on a bus, and what they are; only reads, and not where another master is in command."""
 
 from __future__ import annotations
 
@@ -87,12 +87,12 @@ def discover(link: Link) -> tuple[IdentifiedNode, ...]:
 
 
 def listen(link: Link) -> _BusMonitor:
-    """Hear for a while that nobody is in command.
+    """Listen for a while that no other master is in command.
 
     Raises
     ------
     StreamAborted
-        Somebody is, or the bus is disturbed.
+        One is, or the bus is disturbed.
     """
     heard = _BusMonitor()
     link.subscribe(heard.take)

@@ -96,7 +96,7 @@ class Following:
         self._led = led
 
     def require(self) -> None:
-        """Require that each position told since the last time is near where the axis was to be.
+        """Require that each position reported since the last time is near where the axis was to be.
 
         Raises
         ------

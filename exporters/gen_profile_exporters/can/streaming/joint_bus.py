@@ -20,7 +20,7 @@ FAILURES = (can.CanError, OSError)
 class JointBus(can.BusABC):
     """Buses by the names of their channels.
 
-    A bus that fails keeps no frame from the others: it is told once they have theirs.
+    A bus that fails keeps no frame from the others: it is reported once they have theirs.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class JointBus(can.BusABC):
         """
 
         def send(bus: can.BusABC) -> None:
-            assert isinstance(bus, Launching)  # or nobody asks for it
+            assert isinstance(bus, Launching)  # else it is not asked for
             bus.send_at(message, instant)
 
         self._for_each(self._ways(message), send)

@@ -1,4 +1,4 @@
-"""One CAN bus and one clock: frames go out, frames that came in are handed to whoever asked for them.
+"""One CAN bus and one clock: frames go out, frames that came in are handed to those who asked for them.
 
 Nothing here has a thread of its own: frames are taken in when the streamer has time for them, in the order in
 which they came. That also makes it run on a clock that a test holds.
@@ -19,7 +19,7 @@ from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 POLL = NANOSECONDS // 5000  # between two looks for an awaited answer
 ANSWER_TIMEOUT = NANOSECONDS // 2
-FRAMES_AT_ONCE = 64  # a flooded bus must keep nobody from looking at the clock
+FRAMES_AT_ONCE = 64  # a flooded bus must not keep a loop from looking at the clock
 
 
 @runtime_checkable
@@ -132,7 +132,7 @@ class _Sdo(SdoClient):
         self._link = link
 
     def send_request(self, request: bytes) -> None:
-        """Send as everything is sent, so that a bus that fails is told as everywhere."""
+        """Send as everything is sent, so that a bus that fails is reported as everywhere."""
         self._link.send(frames.message(self.rx_cobid, bytes(request)))
 
     def read_response(self) -> bytes:

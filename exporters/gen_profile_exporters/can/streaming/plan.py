@@ -136,7 +136,7 @@ class StreamPlan:
         return np.asarray(self.motion.position[-1])
 
     def operated(self) -> AbstractContextManager[object]:
-        """Nobody commands it."""
+        """Take no commands."""
         return nullcontext()
 
     def begin(self, rest_counts: Sequence[int]) -> Step:

@@ -45,11 +45,11 @@ class Record:
         Cycles of the motion that were sent.
     lateness : Lateness
     actual : (cycles, axes) integer array
-        Position that each drive told after each cycle's SYNC, in counts.
+        Position that each drive reported after each cycle's SYNC, in counts.
     answered : (cycles,) boolean array
         For which cycles there is one.
     final : tuple of int
-        Last position that each drive told.
+        Last position that each drive reported.
     """
 
     phase: Phase
@@ -97,7 +97,7 @@ class Book:
 
     @classmethod
     def blank(cls, cycles: int, axes: int) -> Book:
-        """Begin one that nobody else reads."""
+        """Begin one that no other process reads."""
         return cls(bytearray(cls.size(cycles, axes)), cycles, axes)
 
     @property

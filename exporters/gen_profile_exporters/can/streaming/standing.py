@@ -15,7 +15,7 @@ LEAST = 2  # counts, likewise
 
 @attrs.define
 class Standing:
-    """For how long an axis has told the same place.
+    """For how long an axis has reported the same place.
 
     Attributes
     ----------

@@ -1,11 +1,11 @@
 """The quick stop: the one place that stops axes, and does nothing else.
 
 It is sent at once by PDO and repeated every cycle until every drive says, after it was sent, that it is not
-powered to move, and has told the same place for a while. The drives brake on their own ramp (6085h), which
+powered to move, and has reported one place for a while. The drives brake on their own ramp (6085h), which
 needs nothing more from a controller or a bus that just proved unreliable. A drive that does not obey at once,
 such as one that left the NMT state operational and takes no PDOs, gets it by SDO as well; and when one still
 does not after its time-out, our heartbeat ends, and it stops by itself, as it was set up to. What happened is
-told by a value; whoever reports it does so afterwards.
+given by a value, to be reported afterwards.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ class Streamer:
         self._say(phase.value)
 
     def _say(self, words: str) -> None:
-        with suppress(OSError, ValueError):  # whoever is told may be gone
+        with suppress(OSError, ValueError):  # the receiver may be gone
             self._tell(words)
 
     def _listen(self) -> None:
@@ -231,7 +231,7 @@ class Streamer:
             before, heard = heard, min(axis.heard for axis in self._watch.axes)
             if any(a > b for a, b in zip(apart, allowed, strict=True)):
                 settled = 0
-            elif heard > before:  # what was told once counts once
+            elif heard > before:  # each report counts once
                 settled += 1
             if self._clock.now() > deadline:
                 raise StreamAborted(f"The axes do not settle at the target; they stand {apart} counts off.")

@@ -44,7 +44,7 @@ class WatchedAxis:
     feedback : mapping of int to tuple of Field
         What the drive tells at each SYNC, by COB-ID: statusword and position, together or apart.
     standstill : Standing
-        Whether it stands, by what it told of its position.
+        Whether it stands, by the positions that it reported.
     statusword, position : int
         The latest; 0 before the first ones.
     stated, placed, beat : int
@@ -72,7 +72,7 @@ class WatchedAxis:
         return state_of(self.statusword)
 
     def take(self, field: Field, value: int, now: int) -> None:
-        """Take down what it told."""
+        """Take down what it reported."""
         if field == pdos.STATUSWORD:
             self.statusword, self.stated = value, now
         elif field == pdos.ACTUAL_POSITION:
@@ -88,7 +88,7 @@ class WatchedAxis:
         return self.stated > since and self.state not in {State.ENABLED, State.UNKNOWN}
 
     def known(self, since: int) -> str:
-        """Say what is known of an axis since an instant that does not stand, as far as anybody knows."""
+        """Say what is known of an axis since an instant that does not stand, as far as is known."""
         if self.heard <= since:
             return "no answer"
         if self.state is State.UNKNOWN:
@@ -109,7 +109,7 @@ class Watch:
     timeout : int
         How long a drive may leave SYNC unanswered, in ns.
     ours : iterable of int
-        COB-IDs of commands and setpoints, which nobody else may send.
+        COB-IDs of commands and setpoints, which no other node may send.
     """
 
     def __init__(
@@ -169,7 +169,7 @@ class Watch:
 
     def _find_second_controller(self, cob_id: int) -> None:
         self._find(
-            f"Frame {cob_id:03X}h came from somebody else: a second controller is on the bus; disconnect it, "
+            f"Frame {cob_id:03X}h came from another node: a second controller is on the bus; disconnect it, "
             "or choose other nodes."
         )
 

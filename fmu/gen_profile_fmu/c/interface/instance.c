@@ -210,7 +210,7 @@ static int can_be_set(unsigned reference, int mode) {
 
 /*
  * Whether a state or parameter may be set by name in continuous-time mode, where FMI takes states as a whole and no
- * parameters: CasADi's DaeBuilder does it. Nobody else may: it evaluates only, and so leaves the functions alone that
+ * parameters: CasADi's DaeBuilder does it. No other importer may: it evaluates only, and so leaves the functions alone that
  * an integrator calls.
  */
 static int is_explored(const State *state, unsigned reference) {
@@ -465,7 +465,7 @@ static int are_values_sound(const Model *model) {
     return 1;
 }
 
-/* Whether a state can be gone on from, whoever made it. */
+/* Whether a run can go on from a state, whichever instance made it. */
 static int is_sound(const State *state) {
     const Model *model = &state->model;
     const int mode = state->mode, is_one_mode = mode > 0 && (mode & (mode - 1)) == 0 && (mode & ANY_MODE) == mode;

@@ -21,7 +21,7 @@
 enum { N_X = 2 * N_U };                /* q_u and dq_u lie side by side in the values */
 static const double STEPS_PER_LAG = 30.0;  /* at first */
 static const double GROWTH = 5.0;          /* lags in which steps become e times as long */
-static const double MOST_FADING = 155.0;   /* steps until they are as long as anybody likes */
+static const double MOST_FADING = 155.0;   /* steps until they are as long as wanted */
 static const double NEGLIGIBLE = 1e-13;    /* m/s (or rad/s) by which a step may miss what is left of a lag */
 
 typedef struct {

@@ -193,7 +193,7 @@
   }
 
   window.playAnimation = stage;
-  window.castAnimation = cast; // for what moves as it is told: (frame, factor, the actor's new places) of every machine
+  window.castAnimation = cast; // for what moves by steps given from outside: (frame, factor, the actor's new places) of every machine
   const data = document.getElementById("data");
   const animations = data ? JSON.parse(data.textContent).animations : [];
   document.querySelectorAll(".animation").forEach((host, index) => animations[index] && stage(host, animations[index]));

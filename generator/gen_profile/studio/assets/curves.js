@@ -170,7 +170,7 @@ const curves = (() => {
     holder.chart = make(host, holder, options);
   }
 
-  // what nobody sees is drawn when it comes into sight: the hand does not wait for it
+  // what is out of sight is drawn when it comes into sight: the hand does not wait for it
   const sight = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
       const holder = figures.get(target);

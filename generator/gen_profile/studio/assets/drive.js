@@ -155,7 +155,7 @@ const driving = (() => {
     });
     $("driven").replaceChildren(...lines.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
     const kept = part.promise ? "promise" : "open";
-    if ($("promise").dataset.kept !== kept) { // a screen reader is told of changes only
+    if ($("promise").dataset.kept !== kept) { // a screen reader gets changes only
       $("promise").dataset.kept = kept;
       $("promise").className = `pill ${part.promise ? "passed" : "open"}`;
       $("promise").textContent = page.phrase(`drive.${kept}`);

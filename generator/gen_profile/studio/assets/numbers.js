@@ -18,7 +18,7 @@ const numbers = (() => {
     return local((rounded !== 0 && Math.abs(rounded) < 1e-4 ? rounded.toExponential() : String(rounded)).replaceAll("-", "−"));
   }
 
-  /** A length in mm with four digits at most; what nobody could measure is not told by its powers of ten. */
+  /** A length in mm with four digits at most; what could not be measured is not shown by its powers of ten. */
   const millimetres = (value) => (value !== 0 && Math.abs(value) < SMALLEST ? `< ${local(SMALLEST)}` : local(digits(value, 4)));
 
   /** Places of a few round numbers from one end to another. */

@@ -140,7 +140,7 @@
     say({ say: "show", serial, state });
   }
 
-  /** Say so when the answer takes its time, lest an older one be taken for it. */
+  /** Say so when the answer takes its time: an older one could be taken for it. */
   function expect() {
     clearTimeout(waiting);
     waiting = setTimeout(() => {
@@ -382,7 +382,7 @@
   const send = (message) => socket.readyState === WebSocket.OPEN && socket.send(message);
   const say = (message) => send(JSON.stringify(message));
 
-  /** Talk to the studio; one that is back is told the state that this page has. */
+  /** Talk to the studio; one that is back gets the state that this page has. */
   function connect() {
     socket = new WebSocket(`ws://${location.host}/live`);
     socket.addEventListener("open", () => {
