@@ -1,7 +1,17 @@
 """The proof: an approximate motion of many machines, and a bound on how far every true one is from it.
 
 docs/certificate.md states the theorem and its proof; names here are those of that page. Nothing in here needs
-to be believed of the approximation: whatever it is, the bound holds.
+to be believed of the approximation x̃: whatever it is, the bound holds. Piece by piece of time, the error e
+of x̃ is bounded in the norm |S e| by::
+
+    d|S e|/dt ≤ μ |S e| + |S| (|defect| + |r|)
+
+1. `defect`: x̃' − f(x̃), at Chebyshev's nodes, and between them by what interpolation misses.
+2. `_tubes`, wherever |S e| ≤ R: r (`_disturbance`) and μ (`_still`, `_growth`), logarithmic norm of S J S⁻¹
+   (Söderlind, BIT 46, 2006).
+3. `_accumulated`: the error from piece to piece. Where it is within the R that was assumed, it is proved;
+   `_bounds` guesses R and makes it wider until it is.
+4. `_sway`: the greatest sway of x̃, and by how much |S e| can change it.
 """
 
 from __future__ import annotations
@@ -284,11 +294,6 @@ class Enclosure:
         f = self.equations.rate(*self._state_on_ellipses())
         most = stack([dx - row[0] for dx, row in zip(rate, f, strict=True)], axis=-1).most
         return np.concatenate(defects, axis=1) + self._interpolation_error(most, self.fine)
-
-    def _size(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Array:
-        """Bound what is interpolated at nodes, (boxes, pieces)."""
-        series = chebyshev.interpolated(self._whole(values, counts, rows), self.variables)
-        return chebyshev.total(series, self.variables)
 
     def _whole(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Ball:
         """Give values at nodes, of which some may be alike, their full shape."""

@@ -1,8 +1,18 @@
 """The beat of a stream: setpoints and SYNC at absolute instants, and heartbeats between them.
 
-Cycle k is sent at ``start + k * period``, setpoints first, so that nothing drifts; what came late is never
-made up for by a burst. A bus that sends at given instants by itself gets each cycle a quarter of a period
-ahead.
+::
+
+    start            + period         + 2 periods
+      | k              | k + 1          | k + 2
+      setpoints, SYNC  setpoints, SYNC  setpoints, SYNC        drives take setpoints over at SYNC
+        answers .... | (look: answers are judged a quarter of a period before the next cycle)
+
+Cycle k is sent at ``start + k * period``, an absolute instant, so that nothing drifts: a sleep that ends late
+delays one cycle, not all that follow. What came late is never made up for by a burst, which drives would take
+for a leap: whole periods that were missed are counted (`skipped`), and the streamer goes on with the
+setpoints of now or stops. A bus that sends at given instants by itself gets each cycle a quarter of a period
+ahead. The heartbeat (CiA 301, 1017h) goes out with a cycle, at least three times in the time that drives wait
+for it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,20 @@
 """A problem as conic programs over piecewise polynomial motions and the machines' states at the nodes.
 
-Variables, all dimensionless: for every interval the local coordinates of every axis (see
-`solvers.bezier.Piece`), then the nominal machine's state y at every node, then what a goal adds. Whatever
-couples, couples neighbours only, so the work grows with the number of intervals. Of other machines only the
-state at the end counts: their states at the nodes are eliminated.
+With l the local coordinates of all axes on interval k (`bezier.Piece`: its initial derivatives, then the
+control's coefficients) and y the nominal machine's state at a node, both dimensionless, the constraints are::
+
+    lₖ₊₁ begins with the derivatives with which lₖ ends            continuity of the axes
+    l of the last interval ends with (target, final velocity, 0 …)
+    yₖ₊₁ = Φₖ yₖ + Γₖ lₖ + oₖ                                      Gauss collocation, linearised
+    C y at the end = 0                                             rest of the load and its sensitivities
+    lower ≤ Bézier coefficients of lₖ ≤ upper                      limits, at every instant
+
+The collocation points are eliminated from each interval, which gives Φ, Γ and o (`condensing`; Bock and
+Plitt, A multiple shooting algorithm for direct solution of optimal control problems, 1984). What couples,
+couples neighbours only: the matrices are banded, and the work grows with the number of intervals. Of other
+machines only the state at the end counts, so their nodes are eliminated, too: y(end) = M (l₁, l₂, …) + offset
+(`end_state`). `solver.sequence` solves the program, linearises about its solution and repeats (sequential
+convex programming).
 """
 
 from __future__ import annotations
