@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Halve the intervals of limited motions: what is refused, named and found to work is so on any mesh."""
-    monkeypatch.setattr("gen_profile.solvers.direct.set_up.INTERVALS", 20)
+    set_up = "gen_profile.solvers.direct.set_up"
+    monkeypatch.setattr(f"{set_up}.USUAL", import_module(set_up).DirectOptions(intervals=20))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -16,11 +16,10 @@ from scipy.integrate import solve_bvp
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.indirect import full_newton
+from gen_profile.solvers.direct.set_up import DirectOptions
 from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem
+from gen_profile.solvers.indirect.boundary_value_problem import IndirectOptions, canonical_problem
 
 JERK_AT_START = 25.867416  # m/s³, β = 50
 REPEATS = 15
@@ -130,19 +129,17 @@ def test_beside_general_tools():
 
 
 @pytest.mark.parametrize("intervals", [20, 60, 200, 600, 2000])
-def test_growth_with_intervals(intervals, monkeypatch):
+def test_growth_with_intervals(intervals):
     problem = crane_problem()
-    for module, meshes in ((indirect, full_newton), (direct, set_up)):
-        monkeypatch.setattr(meshes, "INTERVALS", intervals)
-        monkeypatch.setattr(meshes, "MAX_INTERVALS", max(480, intervals))
-        monkeypatch.setattr(indirect, "LONG_INTERVALS", intervals)  # so many that short ones are taken
-        module.solve(problem)
+    for module, kind in ((indirect, IndirectOptions), (direct, DirectOptions)):
+        options = kind(intervals=intervals, max_intervals=max(480, intervals))
+        module.solve(problem, options=options)
         tracemalloc.start()
-        module.solve(problem)
+        module.solve(problem, options=options)
         memory = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         began = time.perf_counter()
-        solution = module.solve(problem)
+        solution = module.solve(problem, options=options)
         spent = time.perf_counter() - began
         print(
             f"\n{module.METHOD:9} {intervals:5} intervals {1e3 * spent:9.1f} ms {memory / 2**20:7.1f} MB "

@@ -10,9 +10,9 @@ from gen_profile.designs.plan import plan
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import keeps_residual_sway
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.relaxation import Relaxation
+from gen_profile.solvers.direct.set_up import DirectOptions
 from gen_profile.spec.reading import overridden, spec_from_dict
 
 SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum, tower, chain, tank, gantry
@@ -20,7 +20,7 @@ ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 
 
 @pytest.mark.parametrize("index", SOLVED)
-def test_what_is_found_keeps_its_limits_and_costs_least(monkeypatch, index):
+def test_what_is_found_keeps_its_limits_and_costs_least(index):
     spec = spec_from_dict(random_spec(f"now-{index}"))
     found = plan(spec)
     for name, order in ORDERS.items():
@@ -29,8 +29,7 @@ def test_what_is_found_keeps_its_limits_and_costs_least(monkeypatch, index):
             assert np.abs(found.command.within_segments(33, order)[1]).max() <= limit * (1.0 + 1e-9)
     if spec.limits.sway is not None:
         assert found.figures["sway_transient_peak_m"] <= spec.limits.sway
-    monkeypatch.setattr(set_up, "INTERVALS", 120)
-    fine = direct.solve(problem_of(spec)).raise_for_status()
+    fine = direct.solve(problem_of(spec), options=DirectOptions(intervals=120)).raise_for_status()
     assert found.solution.raise_for_status().cost == pytest.approx(fine.cost, rel=2e-4)
 
 

@@ -153,12 +153,11 @@ def test_the_cost_within_a_limit_is_what_another_program_finds():
         ("paper", ["actuator.type=first-order", "actuator.tau=0.067", "limits.jerk=10"], 1e-4),
     ],
 )
-def test_few_programs_find_what_a_fine_mesh_does(monkeypatch, machine, task, loss):
+def test_few_programs_find_what_a_fine_mesh_does(machine, task, loss):
     problem = problem_of(preset_spec(machine, task))
     few = direct.solve(problem)
     assert few.iterations <= 20
-    monkeypatch.setattr(set_up, "INTERVALS", 120)
-    many = direct.solve(problem)
+    many = direct.solve(problem, options=set_up.DirectOptions(intervals=120))
     assert few.raise_for_status().cost == pytest.approx(many.raise_for_status().cost, rel=loss)
 
 
@@ -174,12 +173,12 @@ def test_where_programs_on_a_finer_mesh_fail_a_coarser_one_does(monkeypatch):
 
     def failing(start, goal, *rest):
         found = plainly(start, goal, *rest)
-        fine = goal.setup.transcription.intervals > set_up.INTERVALS
+        fine = goal.setup.transcription.intervals > set_up.USUAL.intervals
         return attrs.evolve(found, verdict=direct.ConicStatus.FAILED) if fine else found
 
     best = direct.solve(problem).raise_for_status()
     monkeypatch.setattr(direct, "sequence", failing)
     found = direct.solve(problem)
-    assert len(found.raise_for_status().knots) == set_up.INTERVALS + 1 < len(best.knots)
+    assert len(found.raise_for_status().knots) == set_up.USUAL.intervals + 1 < len(best.knots)
     assert best.cost < found.optimum.cost < 1.05 * best.cost
     assert choice.keeps_limits(found)

@@ -9,9 +9,9 @@ from scipy import sparse
 
 from gen_profile.interrupts import interrupts_collected
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicProgram
+from gen_profile.solvers.direct.set_up import DirectOptions
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
@@ -51,15 +51,14 @@ def test_a_search_that_costs_too_much_is_given_up(monkeypatch):
     assert "units" in solution.advice
 
 
-def test_a_motion_on_the_first_mesh_will_do_where_bisecting_costs_too_much(monkeypatch):
-    monkeypatch.setattr(set_up, "INTERVALS", 20)
-    problem = crane_problem(limits=LimitsSpec(acceleration=0.3))
-    fine = direct.solve(problem).raise_for_status()
+def test_a_motion_on_the_first_mesh_will_do_where_bisecting_costs_too_much():
+    problem, options = crane_problem(limits=LimitsSpec(acceleration=0.3)), DirectOptions(intervals=20)
+    fine = direct.solve(problem, options=options).raise_for_status()
     with budget(1e9):
-        coarse = direct.solve(problem, coarse=True).raise_for_status()
+        coarse = direct.solve(problem, coarse=True, options=options).raise_for_status()
         took = 1e9 - left()
     with budget(4.0 * took):
-        found = direct.solve(problem)
+        found = direct.solve(problem, options=options)
     assert len(found.raise_for_status().knots) == len(coarse.knots) < len(fine.knots)
     assert choice.keeps_limits(found)
 

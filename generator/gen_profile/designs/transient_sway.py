@@ -34,7 +34,7 @@ NEARLY_ACCEPTED = 1.008  # likewise where solving again takes long
 # looked at, and the worst machine's sway falls by at least a tenth as much as the nominal one's
 SPREAD = Search(precision=1e-3, aim=-2e-3, believed=(0.1, 10.0), tries=5)
 ACCURACY = 1e-6  # of the machines' integration, relative
-SAMPLES = 1001
+SAMPLES = 1001  # over the motion: n periods of a harmonic are met to (π n / 1000)² / 2
 
 
 def attempt(

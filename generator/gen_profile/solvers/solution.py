@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 
 import attrs
@@ -14,6 +15,7 @@ from gen_profile.summary import Summarised
 LONGER = "Allow more time (move.duration), or shorten the move."
 WIDER = "Allow more time (move.duration), or wider limits."
 LATER = "Allow more time (move.duration)."
+HORIZONTAL = math.pi / 2.0  # rad; beyond, a rope would go slack
 
 
 class Status(Enum):

@@ -27,7 +27,7 @@ from gen_profile.verification.plausibility import implausibilities
 from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
-LONGEST_STEP = 1e-3  # s, of the FMU's integrator
+LONGEST_STEP = 1e-3  # s, of the FMU's integrator; a quarter changes residuals of four machines by 3e-12 m
 STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
 ROUNDING = 1e-12  # of times, relative
 ERROR_FLOOR = 1e-8  # m; covers what both integrations leave

@@ -18,8 +18,8 @@ VELOCITY_TOLERANCE = 0.01  # of the greatest velocity, between a velocity column
 OVERSHOOT = {"velocity": 0.02, "acceleration": 0.4}
 # Second differences of a designed motion grow and fade over many cycles; one setpoint off its place makes
 # three that do not, in the ratio 1 : -2 : 1.
-STANDS_OUT = 5.0
-NEIGHBOURS = 2
+STANDS_OUT = 5.0  # times the greatest one elsewhere, from which on a second difference is a fault
+NEIGHBOURS = 2  # on either side, which the same fault may have made
 FEWEST_SETPOINTS = 20  # fewer say too little about what is usual among them
 
 

@@ -14,7 +14,7 @@ from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.summary import Summarised
 
-QUANTILES = (0.5, 0.9, 0.99)
+QUANTILES = (0.5, 0.9, 0.99)  # of the residual sways of a group, as they are reported
 FINE = 1e3  # µm, up to which an error is shown in these
 MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed: a manifest must not hold thousands
 

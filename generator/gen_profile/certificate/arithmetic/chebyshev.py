@@ -19,7 +19,7 @@ import numpy as np
 from gen_profile.certificate.arithmetic.balls import UNIT, Array, Ball
 
 COSINE = 32 * UNIT  # by which a cosine here may be off, its argument's rounding included
-ROUND_UP = 1.0 + 1e-12
+ROUND_UP = 1.0 + 1e-12  # outweighs the rounding of sums of up to 9000 terms, 2⁻⁵³ each
 TINY = 1e-5  # of a bound, up to which coefficients of the highest degrees are not halved any more
 PORTION, MOST_WORK = 2**18, 2**31  # coefficients that are halved at once, and in all
 NEAR = 1.005  # of the greatest value seen: how closely a bound is sought

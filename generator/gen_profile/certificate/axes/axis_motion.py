@@ -17,7 +17,7 @@ from gen_profile.certificate.axes.axis_track import FINER, Track
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import Profile
 
-DEGREE = 5
+DEGREE = 5  # position, velocity and acceleration at both ends
 FEWEST = 5  # setpoints in a piece
 ROUNDS = 12  # of halving pieces
 SAGITTA = 0.25  # share of what straight lines between setpoints leave out, to which a motion is fitted

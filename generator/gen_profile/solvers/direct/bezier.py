@@ -13,7 +13,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 
-CONTROL_DEGREE = 3
+CONTROL_DEGREE = 3  # of the control on an interval, jerk or snap: the position is of degree 6 or 7
 
 comb = np.vectorize(math.comb, otypes=[np.float64])  # SciPy's takes 0.1 s to load
 

@@ -16,7 +16,7 @@ from gen_profile.solvers.direct.bezier import CONTROL_DEGREE, Piece, halving
 from gen_profile.solvers.direct.set_up import Setup, on_mesh
 from gen_profile.solvers.direct.transcription import Iterate
 
-REACHED = 1e-4  # fraction of a limit, by which less than all of it is taken for all
+REACHED = 1e-4  # fraction of a limit that may lack of all of it; 1e-3 costs up to 1e-4, 1e-5 saves 5e-6
 
 
 def switching(setup: Setup, iterate: Iterate, sway_limit: float | None) -> NDArray[np.bool_]:

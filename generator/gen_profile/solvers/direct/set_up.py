@@ -28,10 +28,40 @@ from gen_profile.solvers.indirect.boundary_value_problem import (
     without,
 )
 
-INTERVALS = 40
-MAX_INTERVALS = 480
-GROWTH, MAX_GRADED = 1.4, 30  # of intervals from the ends on, and how many there are at most
-RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
+# of intervals from the ends on (snap costs 5e-5 more with 2.0, 6e-6 less with 1.2), and how many at most
+GROWTH, MAX_GRADED = 1.4, 30
+
+
+@attrs.frozen(kw_only=True)
+class DirectOptions:
+    """How exactly the direct method solves, and how far it goes; see docs/solvers.md for the evidence.
+
+    Attributes
+    ----------
+    intervals, max_intervals : int
+        Of the mesh before it is bisected, at least and at most.
+    radians_per_interval : float
+        rad of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost.
+    step_tolerance : float
+        Relative change of the motion between two programs at which they end; the cost is off by its square.
+    max_iterations : int
+        Programs on one mesh; most take ten.
+    max_bisections : int
+        Of a mesh where limits begin or cease to bind.
+    worth_bisecting : float
+        Relative change of the cost from one mesh to the next, below which it is bisected no more.
+    """
+
+    intervals: int = 40
+    max_intervals: int = 480
+    radians_per_interval: float = 1.5
+    step_tolerance: float = 1e-8
+    max_iterations: int = 50
+    max_bisections: int = 6
+    worth_bisecting: float = 1e-4
+
+
+USUAL = DirectOptions()
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -48,6 +78,7 @@ class Setup:
         Twice the effort of every axis, in units of `cost_scale`.
     cost_scale : float
         Of the running cost.
+    options : DirectOptions
     tried : tuple of Amplitudes
         Of every machine whose residual sway is to be bounded; empty where end states are zero instead.
     """
@@ -57,6 +88,7 @@ class Setup:
     effort_weights: Array
     forms: tuple[Array, ...]
     cost_scale: float
+    options: DirectOptions
     tried: tuple[goals.Amplitudes, ...] = ()
 
     @property
@@ -84,7 +116,9 @@ class Setup:
         return self.problem.duration * float(running)
 
 
-def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
+def set_up(
+    problem: Problem, others: Sequence[Mapping[str, float]] = (), options: DirectOptions | None = None
+) -> tuple[Setup, tuple[str, ...]]:
     """Transcribe a problem; also name the parameters whose sensitivities are left out, as others imply them.
 
     Parameters
@@ -92,12 +126,14 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     problem : Problem
     others : sequence of mapping of str to float
         Parameters of further machines whose residual sway shall be bounded, with the nominal one's.
+    options : DirectOptions, optional
     """
+    options = options or USUAL
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     canonical = canonical_problem(problem, system)
     asked, redundant = independence(canonical)
     if redundant:
-        return set_up(without(problem, redundant), others)[0], redundant
+        return set_up(without(problem, redundant), others, options)[0], redundant
     machines = (
         _nominal(problem, canonical, asked),
         *(_other(problem, canonical, parameters) for parameters in others),
@@ -105,7 +141,7 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
     commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
     order = 4 if problem.effort == "snap" or commands_jerk else 3
-    piece, reach = Piece(order=order, length=_mesh(problem)), axis_reach(problem)
+    piece, reach = Piece(order=order, length=_mesh(problem, options)), axis_reach(problem)
     transcription = Transcription(
         piece=piece,
         axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
@@ -122,6 +158,7 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
         effort_weights=weights,
         forms=_forms(problem, piece, weights),
         cost_scale=cost_scale,
+        options=options,
         tried=_amplitudes(problem, machines, others),
     )
     return setup, redundant
@@ -189,11 +226,11 @@ def _amplitudes(
     )
 
 
-def _mesh(problem: Problem) -> Array:
+def _mesh(problem: Problem, options: DirectOptions) -> Array:
     """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
     fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
-    needed = fastest * problem.duration / RADIANS_PER_INTERVAL
-    longest = 1.0 / float(np.clip(np.ceil(needed), INTERVALS, MAX_INTERVALS))
+    needed = fastest * problem.duration / options.radians_per_interval
+    longest = 1.0 / float(np.clip(np.ceil(needed), options.intervals, options.max_intervals))
     shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
     graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
     graded = graded[graded > shortest / GROWTH][::-1]

@@ -26,31 +26,26 @@ from gen_profile.solvers.direct.bezier import power_basis
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
 from gen_profile.solvers.direct.refinement import bisected, switching
-from gen_profile.solvers.direct.set_up import Setup, set_up
+from gen_profile.solvers.direct.set_up import DirectOptions, Setup, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
-from gen_profile.solvers.solution import LATER, LONGER, WIDER, Optimum, Solution, Status
+from gen_profile.solvers.solution import HORIZONTAL, LATER, LONGER, WIDER, Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.work import OutOfWork, afford, left
 
 METHOD = "direct"
-STEP_TOLERANCE = 1e-8  # of the motion, relative
 COARSE = 1e-2  # step after which a motion on even intervals will do to be measured
 ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones end at need not be exact
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
 # solved exactly; they cost their square
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
-SLOW = 0.3  # fraction of the step before from which on steps are combined
-MAX_ITERATIONS = 50
-MAX_BISECTIONS = 6
+SLOW = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
 BISECTING = 0.7  # fraction of the work that is left, after which a motion on the first mesh will do
-WORTH_BISECTING = 1e-4  # relative change of the cost from one mesh to the next; what is left is less
-WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
+WORTHWHILE = 1e-3  # relative change of the worst case worth another program; 1e-4 changes costs by 4e-7
 LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
 FAR = 1e-2  # likewise of how far that is from 1
 TINY = 1e-6  # below which how little it is does not matter
-HORIZONTAL = np.pi / 2.0
 UNWEIGHTED = SwayCost(beta=0.0, gamma=1.0)
 
 
@@ -126,7 +121,7 @@ class Goal:
             noticed = WORTHWHILE * max(abs(last), LEAST_FRACTION)
             if self.widened:
                 noticed = max(CHANGE * abs(last), FAR * abs(last - 1.0), TINY)
-            return STEP_TOLERANCE * abs(last - before) / noticed
+            return self.setup.options.step_tolerance * abs(last - before) / noticed
         columns = slice(0, start.local.size)
         moved = solutions[-2].x[columns] if len(solutions) > 1 else start.local.ravel()
         effort = self.setup.effort
@@ -158,7 +153,13 @@ class ProgramSequence:
         return len(self.solutions)
 
 
-def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False) -> Solution:
+def solve(
+    problem: Problem,
+    near: Iterate | None = None,
+    *,
+    coarse: bool = False,
+    options: DirectOptions | None = None,
+) -> Solution:
     """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
 
     Parameters
@@ -168,13 +169,14 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         A motion to begin at, in place of standing still, if it is on as many intervals.
     coarse : bool
         On even intervals only, which tell as well whether there is a motion.
+    options : DirectOptions, optional
 
     Returns
     -------
     Solution
         Never raises for a problem that has none: the status says why.
     """
-    setup, redundant = set_up(problem)
+    setup, redundant = set_up(problem, options=options)
     sway_cost, iterations = resolve_sway_cost(setup.problem)
     start = setup.transcription.rest()
     if near is not None and near.like(start):
@@ -186,7 +188,7 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         if problem.limits.stated() and not coarse:
             result = refined(start, goal)
         else:
-            result = sequence(start, goal, COARSE if coarse else STEP_TOLERANCE)
+            result = sequence(start, goal, COARSE if coarse else None)
         setup, start, iterations = result.setup, result.iterate, iterations + result.iterations
         return conclude(result, iterations)
 
@@ -220,7 +222,7 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     """Bisect a mesh where limits begin or cease to bind, and list what was begun on which mesh."""
     solutions: tuple[ConicSolution, ...] = ()
     cost = float("inf")
-    for _ in range(MAX_BISECTIONS):
+    for _ in range(goal.setup.options.max_bisections):
         result = sequence(start, goal, ROUGH)
         solutions += result.solutions
         if result.verdict is not ConicStatus.SOLVED:
@@ -228,7 +230,7 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
         start, before, cost = result.iterate, cost, goal.setup.cost(result.iterate, goal.sway_cost)
         begun.append((start, goal))
         where = switching(goal.setup, start, goal.sway_limit)
-        if abs(before - cost) < WORTH_BISECTING * cost or not where.any():
+        if abs(before - cost) < goal.setup.options.worth_bisecting * cost or not where.any():
             break
         finer, start = bisected(goal.setup, start, where)
         goal = attrs.evolve(goal, setup=finer)
@@ -242,14 +244,15 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     return attrs.evolve(result, solutions=solutions)
 
 
-def sequence(start: Iterate, goal: Goal, tolerance: float = STEP_TOLERANCE) -> ProgramSequence:
+def sequence(start: Iterate, goal: Goal, tolerance: float | None = None) -> ProgramSequence:
     """Solve programs linearised about one another's motion until what counts changes by little enough."""
-    transcription, iterate = goal.setup.transcription, start
+    transcription, iterate, options = goal.setup.transcription, start, goal.setup.options
+    tolerance = tolerance or options.step_tolerance
     solutions: list[ConicSolution] = []
     points: list[Array] = []
     images: list[Array] = []
     step, verdict = float("inf"), ConicStatus.FAILED
-    while verdict is ConicStatus.FAILED and len(solutions) < MAX_ITERATIONS:
+    while verdict is ConicStatus.FAILED and len(solutions) < options.max_iterations:
         maps = transcription.maps(iterate)
         program = transcription.program(maps, goal.extra)
         cost = goal.pose(program, iterate, maps)

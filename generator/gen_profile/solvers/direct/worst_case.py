@@ -30,7 +30,6 @@ from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
     COARSE,
     ROUGH,
-    STEP_TOLERANCE,
     Goal,
     ProgramSequence,
     conclude,
@@ -45,20 +44,22 @@ from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import AxisLimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
-TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
+TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case; a hundred times as much costs 0.1 % less
 # where programs for the least worst case fail; a better one takes ever more effort
 BISECTION = Search(precision=0.35, close=0.0, stride=math.log(1.5), growth=1.0, downward=True)
 BISECTING = 0.6  # fraction of the work that is left for it
 HOPELESS = 1e3  # times a load's limit, above which the least worst case is not looked for
-MARGIN = 0.002  # fraction of a load's limit, with which the least cost need not balance on a knife edge
-SLACK = 1.003  # what the least cost may give away of the least worst case
+# fraction of a load's limit that the least cost may use beyond the least worst case, and times that case; the
+# paper's crane over its range costs 8 % more with a tenth of the one, 2 % more with a tenth of the other
+MARGIN = 0.002
+SLACK = 1.003
 GOOD_ENOUGH = 0.01  # fraction of a load's limit below which less is not worth an effort
 HELD_BACK = 1.5  # times the exact motion's acceleration: the cost of most motions over a range needs no more
-ROUNDS = 8
+ROUNDS = 8  # of adding worse machines, at most
 EXCHANGING = 0.8  # fraction of the work that is left, after which the last motion is taken
 CORNERS = 6  # parameters up to which all corners are tried
 ADDED = 3  # machines at most in one round
-WORSE = 1.01  # how much worse a machine must be than those tried to be added
+WORSE = 1.01  # how much worse a machine must be than those tried to be added; 1.001 changes a cost by 0.1 %
 ACCURACY = 1e-6  # of a machine's integration, relative
 
 Parameters = Mapping[str, float]
@@ -180,7 +181,7 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
         if not worse and asked == swaying:
             if precision < COARSE:
                 return
-            precision = STEP_TOLERANCE
+            precision = setup.options.step_tolerance
         tried = [*tried, *worse]
 
 

@@ -28,9 +28,44 @@ DEPENDENT = 1e-8
 INSENSITIVE = 1e-3
 PROMINENT = 1e-4  # sway left by a mode, as a fraction of the sway that another may leave
 NEGLIGIBLE = 1e-7  # sway left by a mode, as a fraction of the move
-SWAY_SAMPLES = 1001
-QUINTIC = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+SWAY_SAMPLES = 1001  # of the sway that γ is scaled by: n periods of a harmonic are met to (π n / 1000)² / 2
+QUINTIC = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])  # from rest to rest, acceleration 0 at both ends
 QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube of its duration
+
+
+@attrs.frozen(kw_only=True)
+class IndirectOptions:
+    """How exactly the indirect method solves, and how far it goes; see docs/solvers.md for the evidence.
+
+    Attributes
+    ----------
+    intervals : int
+        Of the simplified Newton's method to begin with, at least; nine Gauss points on each.
+    radians_per_interval : float
+        rad of the fastest mode that matters, likewise.
+    max_intervals : int
+        After refinement.
+    tolerance : float
+        Distance of either Newton's method to the solution, relative to the motion.
+    max_iterations : int
+        Of either Newton's method; more only circle.
+    drift_tolerance : float
+        Of the Hamiltonian over an interval, relative to its size.
+    defect_tolerance : float
+        Of the state equations between collocation points, as a fraction of a state's size (see
+        `refinement.defect`); the sway is off by its square.
+    """
+
+    intervals: int = 8
+    radians_per_interval: float = 6.0
+    max_intervals: int = 480
+    tolerance: float = 1e-7
+    max_iterations: int = 20
+    drift_tolerance: float = 1e-7
+    defect_tolerance: float = 3e-3
+
+
+USUAL = IndirectOptions()
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -53,6 +88,7 @@ class BoundaryValueProblem:
         the mode is too fast to be excited, and for the axes.
     phase : float
         Of the fastest mode that is excited as much as others, over the whole move in rad.
+    options : IndirectOptions
     """
 
     system: OptimalitySystem
@@ -62,6 +98,7 @@ class BoundaryValueProblem:
     final: Array
     shown: Array
     phase: float
+    options: IndirectOptions = USUAL
 
     @cached_property
     def transform(self) -> Array:

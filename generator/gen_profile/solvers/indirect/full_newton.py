@@ -18,13 +18,11 @@ from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValuePro
 from gen_profile.solvers.indirect.extremal import failure, judged, too_steep
 from gen_profile.solvers.indirect.newton import solve_newton
 from gen_profile.solvers.indirect.refinement import refine
-from gen_profile.solvers.solution import LONGER, Solution, Status
+from gen_profile.solvers.solution import HORIZONTAL, LONGER, Solution, Status
 
-INTERVALS = 30
-MAX_INTERVALS = 480
+INTERVALS = 30  # at least
 RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
 COARSER = 2.5  # times as long are intervals to begin with
-HORIZONTAL = np.pi / 2.0
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
 
 
@@ -36,7 +34,9 @@ def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
     numpy.linalg.LinAlgError
         When the end conditions contradict one another.
     """
-    fine = float(np.clip(unweighted.phase / RADIANS_PER_INTERVAL, INTERVALS, MAX_INTERVALS))
+    options, phase = unweighted.options, unweighted.phase
+    least = max(INTERVALS, options.intervals)
+    fine = float(np.clip(phase / RADIANS_PER_INTERVAL, least, options.max_intervals))
     scheme = GAUSS if unweighted.resolved else RADAU  # lets modes fade that are too fast for any mesh
     guess = quintic(unweighted, np.linspace(0.0, 1.0, math.ceil(fine / COARSER) + 1), scheme)
     unweighted, linear = unweighted.rescaled(unweighted.solve_linear(unweighted.flow(guess.points), guess))

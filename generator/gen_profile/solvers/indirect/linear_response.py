@@ -13,7 +13,7 @@ import numpy as np
 from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import IntArray, Scheme
 
-ROUNDING = 1e-12
+ROUNDING = 1e-12  # of interval lengths, relative to the whole, within which they are equal
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -15,11 +15,9 @@ from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 
-TOLERANCE = 1e-7  # step after which the next iterate's error is of the order of its square
 STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
 SLOW = 0.5  # fraction of the step before that is no longer Newton's convergence
-SMALLEST_DAMPING = 1.0 / 16.0
-MAX_ITERATIONS = 20
+SMALLEST_DAMPING = 1.0 / 16.0  # below which the motion is not near enough for Newton's method
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -52,8 +50,8 @@ def solve_newton(problem: BoundaryValueProblem, guess: Trajectory) -> NewtonOutc
     current, damping = _iterate(problem, guess), 1.0
     if current is None:
         return NewtonOutcome(solution=None, iterations=1, residual=float("inf"))
-    for iteration in range(1, MAX_ITERATIONS + 1):
-        if current.step < TOLERANCE:
+    for iteration in range(1, problem.options.max_iterations + 1):
+        if current.step < problem.options.tolerance:  # the next error is of the order of its square
             return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         trial = _iterate(problem, current.trajectory.blend(current.following, damping))
         if trial is not None and _shortens(problem, current, trial, damping):

@@ -14,11 +14,8 @@ from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 
-MAX_INTERVALS = 480
 MOST_PARTS = (4, 2)  # of an interval at once; the fewer, the nearer to the solution before
 MAX_ROUNDS = 6  # where a fast mode is not resolved, what is split in one place shows in another
-DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its size
-DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 
 
 def refine(
@@ -29,7 +26,7 @@ def refine(
 ) -> NewtonOutcome:
     """Split intervals until the equations are met and the Hamiltonian is constant.
 
-    Where the mesh would grow beyond `MAX_INTERVALS`, the intervals that need it least are left alone. No
+    Where the mesh would grow beyond `max_intervals`, the intervals that need it least are left alone. No
     solution comes of it where Newton's method fails on finer meshes.
 
     Parameters
@@ -76,12 +73,12 @@ def _first_solved(
 
 def _parts(canonical: BoundaryValueProblem, solution: Trajectory) -> NDArray[np.intp]:
     """Tell into how many parts to divide every interval."""
-    stages = solution.scheme.stages
-    wanted = (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / stages)
+    options, stages = canonical.options, solution.scheme.stages
+    wanted = (defect(canonical, solution) / options.defect_tolerance) ** (1.0 / stages)
     if canonical.resolved:
-        drift = _drift(canonical, solution) / DRIFT_TOLERANCE
+        drift = _drift(canonical, solution) / options.drift_tolerance
         wanted = np.maximum(wanted, drift ** (1.0 / (2 * stages)))
-    most = max(MAX_INTERVALS, len(wanted))
+    most = max(options.max_intervals, len(wanted))
     while (parts := np.clip(np.ceil(wanted), 1, MOST_PARTS[0]).astype(np.intp)).sum() > most:
         wanted *= 0.9
     return parts

@@ -31,10 +31,8 @@ from gen_profile.solvers.indirect.linear_response import LinearResponse, linear_
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 from gen_profile.work import spend
 
-TOLERANCE = 1e-7  # distance to the solution, as the last steps let it be foreseen
 BELIEVED = 0.01  # least quotient of steps that is taken for the rate of convergence
 SLOW = 0.5  # fraction of the step before beyond which another method is the better one
-MAX_ITERATIONS = 20
 WORK = 1e-7  # s of work for the square of the number of controls
 MOST_CONTROLS = 800  # up to which to solve for all of them at once
 
@@ -100,12 +98,13 @@ def solve_simplified(problem: BoundaryValueProblem, start: Trajectory) -> Newton
     if len(start.points) * problem.system.layout.m > MOST_CONTROLS:
         return NewtonOutcome(solution=None, iterations=iteration, residual=step)
     model, current = _model(problem, start, _hanging(problem, start)), _consistent(problem, start)
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    for iteration in range(1, problem.options.max_iterations + 1):
         spend(WORK * (len(start.points) * problem.system.layout.m) ** 2)
         following = _corrected(problem, model, current)
         before, step = step, problem.distance(current.trajectory, following.trajectory)
         current, shrinkage = following, step / before
-        if shrinkage < SLOW and step * max(shrinkage, BELIEVED) < TOLERANCE:
+        distance = step * max(shrinkage, BELIEVED)  # to the solution, as the last steps let it be foreseen
+        if shrinkage < SLOW and distance < problem.options.tolerance:
             return NewtonOutcome(solution=current.trajectory, iterations=iteration, residual=step)
         if not shrinkage < 1.0:
             break

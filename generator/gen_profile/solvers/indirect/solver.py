@@ -19,7 +19,9 @@ from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.collocation import LONG_GAUSS, Trajectory
 from gen_profile.solvers.indirect.boundary_value_problem import (
+    USUAL,
     BoundaryValueProblem,
+    IndirectOptions,
     canonical_problem,
     independence,
     quintic,
@@ -35,12 +37,12 @@ from gen_profile.solvers.solution import WIDER, Solution, Status
 
 __all__ = ["METHOD", "solve"]
 
-LONG_INTERVALS = 8  # at least
-RADIANS_PER_LONG_INTERVAL = 6.0  # of the fastest mode that matters
 MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 
 
-def solve(problem: Problem, far: Callable[[], bool] = lambda: True) -> Solution:
+def solve(
+    problem: Problem, far: Callable[[], bool] = lambda: True, options: IndirectOptions | None = None
+) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
     Parameters
@@ -48,6 +50,7 @@ def solve(problem: Problem, far: Callable[[], bool] = lambda: True) -> Solution:
     problem : Problem
     far : () → bool
         Whether one that swings far is worth looking for, which takes long; asked where there is no other.
+    options : IndirectOptions, optional
 
     Returns
     -------
@@ -60,17 +63,18 @@ def solve(problem: Problem, far: Callable[[], bool] = lambda: True) -> Solution:
         The machine does not hang at rest, so that it has no natural frequencies.
     """
     with one_thread():
-        return _solve(problem, far)
+        return _solve(problem, far, options or USUAL)
 
 
-def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
+def _solve(problem: Problem, far: Callable[[], bool], options: IndirectOptions) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     unweighted = canonical_problem(problem, system)
     asked, redundant = independence(unweighted)
     if redundant:
-        solution = _solve(without(problem, redundant), far)
+        solution = _solve(without(problem, redundant), far, options)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    unweighted = attrs.evolve(unweighted, final=np.where(asked, unweighted.final, np.nan))
+    final = np.where(asked, unweighted.final, np.nan)
+    unweighted = attrs.evolve(unweighted, final=final, options=options)
     with suppress(np.linalg.LinAlgError):
         simple = _solve_simply(problem, unweighted)
         if simple is not None:
@@ -94,7 +98,8 @@ def _solve_simply(problem: Problem, unweighted: BoundaryValueProblem) -> Solutio
     """
     if not unweighted.resolved:
         return None
-    intervals = max(LONG_INTERVALS, math.ceil(unweighted.phase / RADIANS_PER_LONG_INTERVAL))
+    options = unweighted.options
+    intervals = max(options.intervals, math.ceil(unweighted.phase / options.radians_per_interval))
     start, iterations = quintic(unweighted, np.linspace(0.0, 1.0, intervals + 1), LONG_GAUSS), 0
     if problem.sway_weight > 0.0 and problem.sway_scale is None:  # the scale is measured on this motion
         measured = _refined(unweighted, start)
