@@ -17,9 +17,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.work import spend
 
 Matrix = Any  # scipy.sparse matrix or array
-TOLERANCE = (
-    1e-10  # of gap and feasibility, relative; 1e-8 moves eight costs by 6e-9, and one duration by 0.2 %
-)
+TOLERANCE = 1e-10  # of gap and feasibility, relative; 1e-8 changes costs by up to 9e-8
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
 PROGRAM, POSING = 4e-3, 8e-7  # s of work for a program, and for each entry of its constraints
 ITERATION = 6e-8  # s of work for each entry, in each iteration

@@ -26,8 +26,8 @@ from gen_profile.work import budget, left
 
 PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
 ENOUGH = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
-KEPT = 2e-4  # by how much it must fall short of it in the shortest motion; 1e-3 changes a duration by 0.2 %
-RESTS = 0.985  # fraction of a load's limit that the worst machine may take after the move
+KEPT = 2e-4  # by how much it must fall short of it in the shortest motion; ten times that costs 0.2 %
+RESTS = 0.985  # fraction of a load's limit, for the worst machine after the move; 0.95 to 0.999 give the same
 NEARBY = math.log(1.2)  # to a duration's logarithm, from where a motion is a start for the next one
 SEARCHING = 0.6  # fraction of the work that is left, to find the shortest duration
 TINY = 1e-6  # below which how little of the limits is taken does not matter

@@ -37,7 +37,7 @@ METHOD = "direct"
 COARSE = 1e-2  # step after which a motion on even intervals will do to be measured
 ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones end at need not be exact
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
-# solved exactly; they cost their square
+# solved exactly; they cost their square, and ten times or a tenth of them give the same motions
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
 SLOW = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
 BISECTING = 0.7  # fraction of the work that is left, after which a motion on the first mesh will do

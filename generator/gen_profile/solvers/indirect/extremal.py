@@ -11,7 +11,8 @@ from gen_profile.solvers.indirect.refinement import defect
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
-UNRESOLVED = 0.1  # defect, as a fraction of a state's size, of a mesh that does not follow the motion
+# defect, as a fraction of a state's size, of a mesh that does not follow the motion; so do 0.3 and 0.03 judge
+UNRESOLVED = 0.1
 TOLERATED_RESIDUAL = 1e-3  # of the greatest sway, by an end condition that the linear model implies
 
 

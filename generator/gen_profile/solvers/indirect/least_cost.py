@@ -10,7 +10,7 @@ from gen_profile.problem.sway_cost import SwayCost
 
 CLOSE = 0.1  # change of the logarithm of the sway's cost, which a parabola follows well
 STEEP = 3.0  # growth of the same, beyond which it misleads
-MAX_ITERATIONS = 30
+MAX_ITERATIONS = 30  # of Newton's method, each within `STEEP`
 
 
 @attrs.frozen(kw_only=True, eq=False)
