@@ -35,7 +35,8 @@ def test_an_hour_of_cycles():
         bench.clock.actors.remove(bench._listen)
         times = np.arange(CYCLES + 1) * PERIOD
         slow = quintic((0.1, 0.4), duration=CYCLES * PERIOD)(times).position
-        motion = Setpoints(period=PERIOD, position=np.rint(1e6 * slow).astype(np.int64))
+        counts = np.rint(1e6 * slow).astype(np.int64)
+        motion = Setpoints(period=PERIOD, position=counts, offsets=np.zeros((*counts.shape, 0), np.int64))
         plan = attrs.evolve(bench.plan, motion=motion, cycles=Encoded(motion.position))
         bench.streamer_end.sending = lambda sent: (
             sent.arbitration_id != 0x080 or not instants.append(bench.now)

@@ -128,6 +128,30 @@ def test_every_module_loads_where_the_system_lacks_what_only_some_have():
     assert printed(f"import os\n{imports}\nprint(hasattr(os, 'fork'))", PYTHONPATH=hidden) == "False\n"
 
 
+@cache
+def words_of(module):
+    """All words of a module, and names of the modules in it; none where there is no such module."""
+    home = PACKAGES[module.partition(".")[0]].joinpath(*module.split("."))
+    file = home / "__init__.py" if home.is_dir() else home.with_suffix(".py")
+    return {
+        *re.findall(r"\w+", file.read_text("utf-8") if file.exists() else ""),
+        *(p.stem for p in home.glob("*")),
+    }
+
+
+def test_every_name_that_tests_and_benchmarks_import_exists():
+    """Benchmarks and the programs of other kernels run seldom, and would not show it."""
+    missing = [
+        (str(file.relative_to(ROOT)), one.name)
+        for file in (ROOT / "tests").rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in PACKAGES
+        for one in node.names
+        if one.name not in words_of(node.module)
+    ]
+    assert missing == []
+
+
 def test_the_picture_in_the_documentation_is_drawn_from_the_layers():
     drawn = printed(
         f"import runpy; runpy.run_path({str(ROOT / 'docs' / 'draw_layers.py')!r}, run_name='__main__')"

@@ -18,7 +18,7 @@ import numpy as np
 
 from gen_profile_exporters.can.export.candump import Frame, write
 from gen_profile_exporters.can.host.clock import SystemClock
-from gen_profile_exporters.can.host.launch import launching_bus
+from gen_profile_exporters.can.host.launch import LaunchingBus
 from gen_profile_exporters.can.host.realtime import real_time
 
 PERIOD = 0.004
@@ -39,7 +39,7 @@ def ours_launched(bus, count):
     tc = shutil.which("tc", path=f"{os.environ['PATH']}:/usr/sbin:/sbin")
     subprocess.run([tc, "qdisc", "replace", "dev", "vcan0", "root", "fq"], check=True)
     clock, period = SystemClock(), round(PERIOD * 1e9)
-    with real_time(), launching_bus("vcan0") as bus:
+    with real_time(), LaunchingBus("vcan0") as bus:
         start = clock.now() + period
         for cycle in range(count):
             clock.sleep_until(start + cycle * period - period // 4)
