@@ -49,8 +49,8 @@ class BlockVariable:
     @property
     def array(self) -> tuple[str, str, str] | None:
         """First and last index and type of the elements, or None."""
-        found = _ARRAY.fullmatch(self.type)
-        return (found[1], found[2], found[3]) if found else None
+        match = _ARRAY.fullmatch(self.type)
+        return (match[1], match[2], match[3]) if match else None
 
     @property
     def elements(self) -> list[str]:

@@ -64,13 +64,13 @@ def machine_variants(spec: Spec) -> tuple[AxisVariants, ...]:
     """Decide for every axis of a spec's machine."""
     plant = spec.machine()
     law, states = _law(plant, spec), _states(plant, spec)
-    found = []
+    variants = []
     for axis in range(len(plant.actuated)):
         shift = _shifts(law, states, axis)
         mirror = shift and not spec.move.initial and _mirrors(law, states, axis)
         scaled = mirror and _is_linear(law, states, axis)
-        found.append(AxisVariants(least_scale=0.0 if scaled else 1.0, mirror=mirror, shift=shift))
-    return tuple(found)
+        variants.append(AxisVariants(least_scale=0.0 if scaled else 1.0, mirror=mirror, shift=shift))
+    return tuple(variants)
 
 
 def _law(plant: Plant, spec: Spec) -> Law:
@@ -89,11 +89,11 @@ def _law(plant: Plant, spec: Spec) -> Law:
 
 def _matrices(rows: Sequence[Sequence[Any]], count: int) -> Array:
     """Stack matrices of so many states, whose entries are an array over the states or the same in all."""
-    found = np.empty((count, len(rows), len(rows[0])))
+    matrices = np.empty((count, len(rows), len(rows[0])))
     for i, row in enumerate(rows):
         for j, entry in enumerate(row):
-            found[:, i, j] = entry
-    return found
+            matrices[:, i, j] = entry
+    return matrices
 
 
 def _states(plant: Plant, spec: Spec) -> States:
@@ -115,11 +115,11 @@ def _states(plant: Plant, spec: Spec) -> States:
     return [np.array(values) for values in zip(*states, strict=True)]
 
 
-def _same(found: Sequence[Array], due: Sequence[Array]) -> bool:
+def _same(values: Sequence[Array], due: Sequence[Array]) -> bool:
     """Whether quantities are the same in every state, each in units of its greatest entry there."""
     return all(
         bool((_greatest(one - other) <= TOLERANCE * (_greatest(other) + TOLERANCE)).all())
-        for one, other in zip(found, due, strict=True)
+        for one, other in zip(values, due, strict=True)
     )
 
 

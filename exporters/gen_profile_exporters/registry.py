@@ -181,11 +181,11 @@ def container_of(path: PurePath | str) -> str:
     SpecError
         None has that suffix.
     """
-    found = _longest_suffix(path, formats())
-    if found is None or not formats()[found].holds_block:
-        fault = f"{found} carries no playback block" if found else "no format has that suffix"
+    name = _longest_suffix(path, formats())
+    if name is None or not formats()[name].holds_block:
+        fault = f"{name} carries no playback block" if name else "no format has that suffix"
         raise SpecError(f"{path}: {fault}; {_containers()}.")
-    return found
+    return name
 
 
 def _containers() -> str:
@@ -224,14 +224,14 @@ def format_of(path: PurePath | str) -> str:
     if own is not None:
         return own
     known = formats()
-    found = _longest_suffix(path, known)
-    if found is None:
+    name = _longest_suffix(path, known)
+    if name is None:
         raise SpecError(
             f"{path}: no format has the suffix {PurePath(path).suffix!r} "
             f"(known: {', '.join(sorted(form.suffix for form in known.values()))}); "
             "give the file the suffix that it was exported with."
         )
-    return found
+    return name
 
 
 def _longest_suffix(path: PurePath | str, known: Mapping[str, Format]) -> str | None:

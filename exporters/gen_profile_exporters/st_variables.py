@@ -52,12 +52,12 @@ def declared(tree: Any) -> dict[str, StVariable]:
     ExportError
         A name is declared twice or means something in C, or initial values are not of its type.
     """
-    found: dict[str, StVariable] = {}
+    variables: dict[str, StVariable] = {}
     for section in tree.find_data("section"):
         for name, variable in _section(section):
-            if found.setdefault(name.lower(), variable) is not variable:
+            if variables.setdefault(name.lower(), variable) is not variable:
                 raise refused(name, f"{name} is declared twice")
-    return found
+    return variables
 
 
 def _section(tree: Any) -> Iterator[tuple[Token, StVariable]]:

@@ -29,16 +29,16 @@ def load_plugin(entry: EntryPoint, kind: type[Kind], where: str) -> Kind:
         It cannot be loaded, or is something else.
     """
     try:
-        found = entry.load()
+        plugin = entry.load()
     except Exception as error:
         raise SpecError(
             f"{where} {entry.name!r} cannot be loaded from {entry.value} ({error}); {CURE}"
         ) from error
-    if not isinstance(found, kind):
+    if not isinstance(plugin, kind):
         raise SpecError(
             f"{where} {entry.name!r}: {entry.value} is no {kind.__module__}.{kind.__qualname__}; {CURE}"
         )
-    return found
+    return plugin
 
 
 def require_installed(what: str, extra: str, *modules: str) -> None:

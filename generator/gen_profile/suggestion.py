@@ -82,8 +82,8 @@ def meant(word: str, known: Iterable[str]) -> list[str]:
         if word in (*re.split(r"[-_. ]", name.lower()), name.lower().rstrip("0123456789"))
         or (len(word) > 2 and name.lower().startswith(word))
     ]
-    found = same or by_meaning or by_part if word else []
-    return found[:MOST] or _misspelt(word, names)
+    candidates = same or by_meaning or by_part if word else []
+    return candidates[:MOST] or _misspelt(word, names)
 
 
 def _misspelt(word: str, names: Iterable[str]) -> list[str]:

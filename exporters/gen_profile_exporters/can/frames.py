@@ -92,10 +92,8 @@ class SetpointFrame:
 
     def keeps_constants(self, data: bytes) -> bool:
         """Tell whether a frame holds what is the same in every cycle."""
-        found = zip(self.places, self.packing.unpack(data), strict=True)
-        return all(
-            place < self.width or value == self.constants[place - self.width] for place, value in found
-        )
+        held = zip(self.places, self.packing.unpack(data), strict=True)
+        return all(place < self.width or value == self.constants[place - self.width] for place, value in held)
 
 
 def channels(target: Target) -> tuple[str, ...]:
@@ -144,7 +142,7 @@ def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
     """
     plan = layout(target.can)
     used = sorted({*plan.received, *plan.transmitted})
-    found, taken = [], dict[int, str]()
+    identifiers, taken = [], dict[int, str]()
     for axis, node in zip(target.axes, nodes(target), strict=True):
         stated = target.can.cob_ids.get(axis.name, CobIdsSpec())
         if plan.shared and stated.command:
@@ -152,12 +150,12 @@ def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
                 f"can.cob_ids.{axis.name}.command: by can.fixed_pdos the controlword goes with the setpoint; "
                 "state that one's COB-ID only."
             )
-        found.append({pdo: getattr(stated, plan.role(pdo)) or pdo + node for pdo in used})
-        for pdo, cob_id in found[-1].items():
+        identifiers.append({pdo: getattr(stated, plan.role(pdo)) or pdo + node for pdo in used})
+        for pdo, cob_id in identifiers[-1].items():
             place = f"can.cob_ids.{axis.name}.{plan.role(pdo)}"
             if taken.setdefault(cob_id, place) != place:
                 raise ExportError(f"{place}: {cob_id:03X}h is {taken[cob_id]} already; choose another one.")
-    return tuple(found)
+    return tuple(identifiers)
 
 
 def setpoint_frames(target: Target) -> tuple[SetpointFrame, ...]:

@@ -192,20 +192,20 @@ def _setpoints(can: CanSpec) -> Pdos:
 def _fixed_received(can: CanSpec) -> Pdos:
     needed = (CONTROLWORD, *setpoint_fields(can))
     stated = zip(RPDOS, can.fixed_pdos.received, strict=True)
-    found = {
+    mapped = {
         pdo: _sized(tuple(_sent(entry, needed, place) for entry in entries), place)
         for number, (pdo, entries) in enumerate(stated, start=1)
         if entries and (place := f"can.fixed_pdos.rpdo{number}")
     }
-    found = {pdo: fields for pdo, fields in found.items() if set(fields) & set(needed)}
+    mapped = {pdo: fields for pdo, fields in mapped.items() if set(fields) & set(needed)}
     for field in needed:
-        count = sum(fields.count(field) for fields in found.values())
+        count = sum(fields.count(field) for fields in mapped.values())
         if count != 1:
             raise ExportError(
                 f'can.fixed_pdos: mode = "{can.mode}" needs one RPDO with {_words(field)}, found {count}; '
                 "choose another mode or feed_forward, or a drive whose PDOs can be mapped."
             )
-    return found
+    return mapped
 
 
 def _sent(entry: int, needed: Sequence[Field], place: str) -> Field:
@@ -236,11 +236,11 @@ def _fixed_transmitted(can: CanSpec) -> Pdos:
                 "use a drive whose PDOs can be mapped."
             )
         chosen |= dict.fromkeys(holding[:1])
-    found = {}
+    mapped = {}
     for pdo in chosen:
         place = f"can.fixed_pdos.tpdo{TPDOS.index(pdo) + 1}"
-        found[pdo] = _sized(tuple(_told(entry, place) for entry in stated[pdo]), place)
-    return found
+        mapped[pdo] = _sized(tuple(_told(entry, place) for entry in stated[pdo]), place)
+    return mapped
 
 
 def _told(entry: int, place: str) -> Field:

@@ -66,16 +66,16 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
         The text differs from the template elsewhere, or one value from place to place.
     """
     program, due = _without_comments(text), _due(layout, axes)
-    found, values = _TOKEN.findall(program), dict[str, Token]()
-    for number, (piece, (expected, hole)) in enumerate(zip(found, due, strict=False)):
+    tokens, values = _TOKEN.findall(program), dict[str, Token]()
+    for number, (piece, (expected, hole)) in enumerate(zip(tokens, due, strict=False)):
         known = values.setdefault(hole, Token(piece, number, program)).text if hole else expected
         if piece != known and _bare(piece) != _bare(known):
             raise ExportError(
                 f"line {Token(piece, number, program).line}: {piece[:40]!r} stands where the exported block "
                 f"has {known[:40]!r}; only numbers and comments may be edited in it, export it again."
             )
-    if len(found) != len(due):
-        beyond = Token("", len(due), program).line if len(found) > len(due) else len(text.splitlines())
+    if len(tokens) != len(due):
+        beyond = Token("", len(due), program).line if len(tokens) > len(due) else len(text.splitlines())
         raise ExportError(
             f"line {max(1, beyond)}: the block breaks off or goes on after its end; export it again."
         )

@@ -254,7 +254,7 @@ def _header(entries: Sequence[LibraryEntry], target: Target) -> str:
     """Describe the library; how to use it is what the header of a single motion says."""
     headers = [entry.source.header for entry in entries]
     _, start, use = headers[0].partition("    Call the block once")
-    waits = [int(found) for header in headers for found in _WAIT.findall(header)]
+    waits = [int(wait) for header in headers for wait in _WAIT.findall(header)]
     use = _WAIT.sub(f"{max(waits, default=0)} cycles after power-up or another nProfile", use)
     use = use.replace("the peaks above and to the stop jerk", "the motion's own peaks and stop jerk")
     use = use.removesuffix("\n").removesuffix("*)")

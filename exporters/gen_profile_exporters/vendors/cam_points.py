@@ -87,13 +87,13 @@ def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *
     stride = 1 << max(0, last.bit_length() - 2)
     while True:
         cycles: Indices = np.unique(np.append(np.arange(0, last, stride), last))
-        found = spline_error(motion, cycles, single=single)
+        deviation = spline_error(motion, cycles, single=single)
         if len(cycles) > most:
             raise ExportError(
                 f"{place}: {len(cycles)} points would be needed, it holds {most}; shorten the motion or "
                 "take another format."
             )
-        if found <= error:
+        if deviation <= error:
             return cycles
         stride //= 2
 

@@ -93,10 +93,10 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
         There is none.
     """
     text = content.decode("latin-1")
-    found = _BLOCK.search(text)
-    if found is None:
+    match = _BLOCK.search(text)
+    if match is None:
         raise ExportError("There is no SCL block of this export; export it again.")
-    header, name, declarations, body = found.groups()
+    header, name, declarations, body = match.groups()
     portable = _unmarked(body)
     declarations = re.sub(r'"(FB_\w+)";', r"\1;", declarations.lstrip())
     source = parse_function_block(

@@ -37,10 +37,10 @@ def child(parent: etree._Element, path: str) -> etree._Element:
     ExportError
         It is not.
     """
-    found = parent.find(path)
-    if found is None:
+    element = parent.find(path)
+    if element is None:
         raise ExportError(f"line {parent.sourceline}: {path.replace('{*}', '')} is missing; export it again.")
-    return found
+    return element
 
 
 def attribute(element: etree._Element, name: str) -> str:

@@ -142,10 +142,10 @@ def is_intact(entry: Path) -> bool:
 
 def _stamps(entry: Path, names: Iterable[str]) -> dict[str, tuple[int, ...]]:
     """Tell files from what they may be replaced by or changed to; whom they let write shows in them, too."""
-    found = {name: (entry / name).stat() for name in names}
+    stats = {name: (entry / name).stat() for name in names}
     return {
         name: (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
-        for name, status in found.items()
+        for name, status in stats.items()
     }
 
 

@@ -66,7 +66,7 @@ def _bare(text: str) -> str:
     bare = re.sub(_EXPORTED, "", text, flags=re.M | re.S)
     bare = re.sub(_LEFT_OVER, "", bare, flags=re.M)
     bare = re.sub(r"^(casadi_real|casadi_int|void|int) (?=casadi_\w+\()", r"static \1 ", bare, flags=re.M)
-    bare = re.sub(r"casadi_f\d+", lambda found: names[found[0]], bare)
+    bare = re.sub(r"casadi_f\d+", lambda match: names[match[0]], bare)
     return re.sub(r"(, int mem\) \{\n)", r"\1  (void)arg, (void)res, (void)iw, (void)w, (void)mem;\n", bare)
 
 

@@ -110,10 +110,10 @@ def _rows(
     arguments = sym.column([e.q_u, e.dq_u, e.q_a, e.dq_a, e.p, e.ddq_a])
     plain = [{reference} for reference in table.references("Q_U", "DQ_U", "Q_A", "DQ_A", "P")]
     columns = [*plain, *(drives[axis] for axis in sorted(drives))]
-    found: dict[int, set[int]] = {unknown: set() for unknown in unknowns}
+    sources: dict[int, set[int]] = {unknown: set() for unknown in unknowns}
     for row, column in sym.entries(sym.jacobian(expressions, arguments)):
-        found[unknowns[row]] |= columns[column]
-    return found
+        sources[unknowns[row]] |= columns[column]
+    return sources
 
 
 def _substituted(known: Mapping[int, set[int]], start: Mapping[int, set[int]]) -> dict[int, set[int]]:

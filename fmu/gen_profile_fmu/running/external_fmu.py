@@ -94,7 +94,7 @@ def _result(run: ForeignRun, folder: Path) -> Array:
         raise CosimulationError(refusal.read_text(encoding="utf-8"))
     if not result.exists():
         raise CosimulationError(f"{run.archive.name}: the FMU ended its process before the simulation's end.")
-    found: Array = np.load(result, allow_pickle=False)
-    if not np.isfinite(found).all():
+    outputs: Array = np.load(result, allow_pickle=False)
+    if not np.isfinite(outputs).all():
         raise CosimulationError(f"{run.archive.name}: the FMU's outputs are not finite numbers.")
-    return found
+    return outputs

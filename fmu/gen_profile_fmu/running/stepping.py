@@ -82,6 +82,6 @@ class SteppedPlant(PlantCosimulation):
             sizes=np.array([duration]),
             setpoints=np.array([position], dtype=np.float64),
         )
-        found = self._observe(step)
+        observed = self._observe(step)
         self._time = end
-        return Instant(position=found["position"][-1], sway=found["sway"][-1])
+        return Instant(position=observed["position"][-1], sway=observed["sway"][-1])

@@ -152,7 +152,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
     """
     try:
         document = parse_json(content.decode("utf-8"))
-        seal, found = document.pop(SEAL, None), _seal(document)
+        seal, computed = document.pop(SEAL, None), _seal(document)
         if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
         manifest = _from_dict(document)
@@ -160,7 +160,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
         raise OutputError(
             f"{source}: not a manifest of this version of gen-profile; export again."
         ) from error
-    if seal != found:
+    if seal != computed:
         raise OutputError(
             f"{source} was altered after it was written, or comes from an earlier version ({SEAL} does not "
             "fit), so it vouches for nothing; export again."

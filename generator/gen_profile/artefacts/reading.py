@@ -42,12 +42,12 @@ def manifest_beside(path: Path, content: bytes, *, planner: bool = False) -> Man
         raise OutputError(
             f"There is no {FILENAME} beside {path}; put the one there that was written with it."
         )
-    found = parse_manifest(read_artefact(beside, DOCUMENT), str(beside))
-    covering = found.covering(path.name, sha256(content), planner=planner)
+    manifest = parse_manifest(read_artefact(beside, DOCUMENT), str(beside))
+    covering = manifest.covering(path.name, sha256(content), planner=planner)
     if covering is None:
         kind = "planner block" if planner else "motion"
         raise OutputError(
-            f"{beside} is of {found.words()}, not of the {kind} {path.name}; put the one there that was "
+            f"{beside} is of {manifest.words()}, not of the {kind} {path.name}; put the one there that was "
             "written with it."
         )
     return covering

@@ -50,7 +50,7 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
     nodes = None
     if interface is not None and channel is not None:
         nodes = _nodes(Port(interface=interface, channel=channel), bitrate)
-    found = {name: detection.channels(name) for name in names}
+    by_interface = {name: detection.channels(name) for name in names}
     document = {
         "interfaces": [
             {
@@ -60,11 +60,11 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
                 ],
                 "needs": detection.needs(name),
             }
-            for name, channels in found.items()
+            for name, channels in by_interface.items()
         ],
         "nodes": None if nodes is None else [_told(node) for node in nodes],
     }
-    lines = list(_interface_words(found))
+    lines = list(_interface_words(by_interface))
     if nodes is not None:
         lines += _node_words(nodes, f"{interface} {channel}")
     print_outcome(document, "\n".join(lines), as_json)
@@ -95,14 +95,14 @@ def _told(node: IdentifiedNode) -> dict[str, Any]:
     }
 
 
-def _interface_words(found: dict[str, tuple[Channel, ...]]) -> Iterator[str]:
+def _interface_words(by_interface: dict[str, tuple[Channel, ...]]) -> Iterator[str]:
     from gen_profile_exporters.can.host import detection
 
-    for name, channels in found.items():
+    for name, channels in by_interface.items():
         for channel in channels:
             rate = "" if channel.bitrate is None else f"{channel.bitrate / 1000:g} kbit/s"
             yield ", ".join(filter(None, [f"{name} {channel.name}", rate, channel.state]))
-    without = [name for name, channels in found.items() if not channels]
+    without = [name for name, channels in by_interface.items() if not channels]
     if without:
         yield "Without a channel:"
     for name in without:

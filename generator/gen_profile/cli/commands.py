@@ -107,7 +107,7 @@ def design(
     if outcome.passed:
         sign(folder, key)
     certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])
-    worst = max(certificates.values(), key=lambda found: found.demand, default=None)
+    worst = max(certificates.values(), key=lambda certificate: certificate.demand, default=None)
     document = outcome.to_dict() | {"certificate": None if worst is None else worst.to_dict()}
     print_outcome(document, words.design(outcome, certificates), as_json)
     warn(outcome.check)
@@ -122,17 +122,17 @@ def design(
 def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
     """Prove the first file of each format, which is the one that holds the motion; say what is not proved."""
     firsts = {artefact.format: artefact.path for artefact in reversed(outcome.artefacts)}
-    found: dict[Path, Certificate] = {}
+    certificates: dict[Path, Certificate] = {}
     reasons: dict[str, None] = {}  # each once, in order
     for name in reversed(firsts.values()):
         path = outcome.folder / name
         try:
-            found[path] = _certified(path, outcome.spec)
+            certificates[path] = _certified(path, outcome.spec)
         except CertificateError as error:
             reasons[str(error)] = None
         else:
-            reasons |= dict.fromkeys(found[path].reasons())
-    return found, list(reasons)
+            reasons |= dict.fromkeys(certificates[path].reasons())
+    return certificates, list(reasons)
 
 
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
@@ -304,13 +304,13 @@ def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_js
     from gen_profile.cli.progress import progress
 
     with progress() as tell:
-        found = check_certificate(
+        proved = check_certificate(
             artefact,
             certificate,
             spec,
             progress=lambda done, total: tell("proving it again for boxes of machines", done, total),
         )
-    print_outcome({"certificate": found.to_dict()}, words.certificate(artefact, found), as_json)
+    print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved), as_json)
 
 
 def _check_block(

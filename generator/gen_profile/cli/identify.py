@@ -136,12 +136,12 @@ def identify(
                 after=after,
             )
             measurements.append(read)
-        found = run(spec, measurements, free, None if at is None else _positions(at), tell)
+        identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
         if picture is not None:
             tell("drawing")
-            plot(found, picture)
-        write_spec(found.spec, out, changed_text(text, chosen.overrides, spec, found.spec, folder))
-    print_outcome({**found.to_dict(), "path": str(out)}, words.identification(found, out), as_json)
+            plot(identified, picture)
+        write_spec(identified.spec, out, changed_text(text, chosen.overrides, spec, identified.spec, folder))
+    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out), as_json)
 
 
 def _positions(text: str) -> list[float]:

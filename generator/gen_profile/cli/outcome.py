@@ -101,8 +101,8 @@ def _as_typed(message: str) -> str:
     """Name an argument that a sentence begins with as it was typed: ``vary: …`` becomes ``--vary: …``."""
     typed = {word.partition("=")[0] for word in sys.argv if word.startswith("--")}
 
-    def flag(found: re.Match[str]) -> str:
-        options = (f"--{found[0]}", f"--{found[0].replace('_', '-')}")
-        return next((option for option in options if option in typed), found[0])
+    def flag(match: re.Match[str]) -> str:
+        options = (f"--{match[0]}", f"--{match[0].replace('_', '-')}")
+        return next((option for option in options if option in typed), match[0])
 
     return re.sub(r"^[\w.]+(?=[: ,])", flag, message, flags=re.MULTILINE)

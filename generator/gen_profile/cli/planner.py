@@ -199,13 +199,14 @@ def explain(events: Path, as_json: bool) -> None:
     """Say in words what a planner block's events mean: a CSV with time_s, code, value."""
     from gen_profile.planner.events import read_events
 
-    found = read_events(_read(events, "events"))
+    events_read = read_events(_read(events, "events"))
     document = {
         "events": [
-            {"time_s": one.time, "code": one.code, "value": one.value, "words": one.words} for one in found
+            {"time_s": one.time, "code": one.code, "value": one.value, "words": one.words}
+            for one in events_read
         ]
     }
-    print_outcome(document, "\n".join(one.words for one in found) or "No events.", as_json)
+    print_outcome(document, "\n".join(one.words for one in events_read) or "No events.", as_json)
 
 
 def _read(path: Path, what: str = "commands") -> str:
@@ -326,11 +327,11 @@ def status_line() -> Iterator[Progress]:
 
 
 def _numbers(live_parameters: tuple[str, ...]) -> dict[str, float]:
-    found = {}
+    numbers = {}
     for text in live_parameters:
         name, _, number = text.partition("=")
         try:
-            found[name] = float(number)
+            numbers[name] = float(number)
         except ValueError:
             raise SpecError(f"--live-parameter {text}: state a number, as {name}=5.5.") from None
-    return found
+    return numbers

@@ -64,12 +64,12 @@ def robustness(
     from gen_profile.comparison.robustness import robustness as run
 
     with progress() as tell:
-        found = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
+        curves = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
         if picture is not None:
             from gen_profile.charts.plot import plot
 
             tell("drawing")
-            plot(found, picture)
+            plot(curves, picture)
         if path is not None:
-            deliver(path, found.table().encode("utf-8"))
-    print_outcome(found.to_dict(), words.robustness(found), as_json)
+            deliver(path, curves.table().encode("utf-8"))
+    print_outcome(curves.to_dict(), words.robustness(curves), as_json)

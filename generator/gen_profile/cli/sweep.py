@@ -119,8 +119,8 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
 
     folder, asked = _folder_and_values(words)
     with progress() as tell:
-        found = run(folder, asked, tell, out=out)
-    print_outcome(found.to_dict(), tables.found_profile(found), as_json)
+        nearest = run(folder, asked, tell, out=out)
+    print_outcome(nearest.to_dict(), tables.found_profile(nearest), as_json)
 
 
 @cli.command(epilog="Example: gen-profile library swept --out crane.st")

@@ -155,18 +155,18 @@ def compare(
                 too_slow[candidate.method] = error.least_duration
             elif isinstance(error, InfeasibleProblem) and candidate.requirements:
                 impossible[candidate.requirements] = left_out[candidate.method]
-    found = {row.method: row.figures for row in rows}
+    figures = {row.method: row.figures for row in rows}
     return Comparison(
         spec=spec,
         rows=tuple(rows),
         left_out=left_out,
         too_slow=too_slow,
-        efficient=efficient(found),
+        efficient=efficient(figures),
         recommended=recommend(
             {row.method: row.figures for row in rows if row.safe},
             limit=_limit_in_words(spec),
             unit=spec.machine().actuated[0].unit,
-            optimal=[method for method in found if method.startswith("optimal")],
+            optimal=[method for method in figures if method.startswith("optimal")],
         ),
     )
 

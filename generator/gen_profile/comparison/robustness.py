@@ -113,14 +113,14 @@ class Robustness(Summarised):
                 {
                     "method": method,
                     "residual_peaks_m": {
-                        load: found[..., index].tolist()
+                        load: residual[..., index].tolist()
                         for index, load in enumerate(self.spec.machine().loads)
                     },
                     "residual_worst_m": float(self.end_load(method).max()),
                     "keeps_limits_share": float((self.fraction(method) <= 1.0).mean()),
                     "insensitivity": self.insensitivity(method),
                 }
-                for method, found in self.residual.items()
+                for method, residual in self.residual.items()
             ],
             "left_out": [{"method": method, "reason": why} for method, why in self.left_out.items()],
         }
@@ -271,7 +271,7 @@ def robustness_of(spec: Spec, motions: Mapping[str, Profile], errors: Mapping[st
     watch = max(SHORTEST_WATCH, 4.0 * np.pi / float(frequencies[:, 0].min()))
     step = STEP_PHASE / float(frequencies[:, 1].max())
     tau = spec.actuator.tau or 0.0
-    found = {}
+    residuals = {}
     with many_machines(plant) as runs:
         for method, motion in motions.items():
             cycle = min(step, motion.duration / STEPS_PER_MOVE)
@@ -286,5 +286,5 @@ def robustness_of(spec: Spec, motions: Mapping[str, Profile], errors: Mapping[st
                 max_step=np.full(len(machines), cycle),
                 since=since + cycle,
             )
-            found[method] = peaks.reshape(*grid[0].shape, -1)
-    return Robustness(spec=spec, errors=errors, residual=found)
+            residuals[method] = peaks.reshape(*grid[0].shape, -1)
+    return Robustness(spec=spec, errors=errors, residual=residuals)

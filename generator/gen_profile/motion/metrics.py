@@ -21,8 +21,8 @@ def extremes(profile: Profile, order: int, axis: int = 0) -> tuple[float, float]
     turns = before * after < 0.0
     fraction = before[turns] / (before - after)[turns]
     turning = profile.derivative(time[:, :-1][turns] + fraction * np.diff(time)[turns], order)
-    found = np.concatenate([values[:, axis], turning[:, axis]])
-    return float(found.min()), float(found.max())
+    candidates = np.concatenate([values[:, axis], turning[:, axis]])
+    return float(candidates.min()), float(candidates.max())
 
 
 def greatest(profile: Profile, order: int, axis: int = 0) -> float:

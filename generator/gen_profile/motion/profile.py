@@ -158,14 +158,14 @@ class Profile(Summarised):
         moving = (times >= 0.0) & (beyond[:, 0] < 0.0)
         segment = np.searchsorted(self.knots, times[moving], side="right") - 1
         local = (times[moving] - self.knots[segment])[:, None]
-        found = []
+        by_order = []
         for order in orders:
             values = np.zeros((len(times), self.axes))
             values[:] = ahead[order] if order < len(ahead) else 0.0
             values[times < 0.0] = self.start if order == 0 else 0.0
             values[moving] = polynomial.polyval(local, self._derived(order)[:, segment], tensor=False)
-            found.append(values)
-        return found
+            by_order.append(values)
+        return by_order
 
     def __call__(self, times: Array | float) -> Motion:
         """Evaluate position, velocity, acceleration and jerk at times in s; a single one is one sample."""
@@ -189,10 +189,10 @@ class Profile(Summarised):
 
     def _derived(self, order: int) -> Array:
         """Coefficients of a derivative, at least one, shape (powers, segments, axes)."""
-        found = self.coefficients
-        for _ in range(min(order, found.shape[1])):
-            found = found[:, 1:] * np.arange(1.0, found.shape[1])[:, None]
-        powers = np.moveaxis(found, 1, 0)
+        derived = self.coefficients
+        for _ in range(min(order, derived.shape[1])):
+            derived = derived[:, 1:] * np.arange(1.0, derived.shape[1])[:, None]
+        powers = np.moveaxis(derived, 1, 0)
         return powers if len(powers) else np.zeros((1, *powers.shape[1:]))
 
     def payload_hash(self) -> str:

@@ -126,8 +126,8 @@ def _number(text: str | None, name: str, line: int) -> float:
     try:
         return float(text or "")
     except ValueError:
-        found = f"found {text or ''!r}{number_meant(text or '')}"
-        raise SpecError(f"commands, line {line}: {name} must be a number, {found}.") from None
+        seen_text = f"found {text or ''!r}{number_meant(text or '')}"
+        raise SpecError(f"commands, line {line}: {name} must be a number, {seen_text}.") from None
 
 
 @attrs.frozen(kw_only=True)

@@ -61,7 +61,7 @@ def _values(plant: Plant) -> Iterator[str]:
             terms = plant.equations([0.0] * n_u, [0.0] * n_u, probe, [0.0] * m, p)
             outputs = plant.outputs([0.0] * n_u, probe, p)
             mechanics = plant.mechanics([0.0] * n_u, probe, p)
-        found = {
+        values = {
             "M_uu": (terms.M_uu, (n_u, n_u)),
             "M_au": (terms.M_au, (m, n_u)),
             "K_u": (terms.K_u, (n_u,)),
@@ -74,7 +74,7 @@ def _values(plant: Plant) -> Iterator[str]:
             "gravity": (mechanics.gravity, ()),
             "springs": (mechanics.springs, ()),
         }
-        arrays = {name: (np.array(value, dtype=np.float64), shape) for name, (value, shape) in found.items()}
+        arrays = {name: (np.array(value, dtype=np.float64), shape) for name, (value, shape) in values.items()}
     except Exception as error:
         yield f"its equations fail with its nominal parameters: {type(error).__name__}: {error}"
         return

@@ -78,8 +78,8 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
         for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
             allowed = getattr(allowed_here, name)
             if allowed is not None:
-                found = (1.0 - ROUNDING) * greatest(command, order, column)
-                yield Breach(place=limits.place(column, name), found=found, allowed=allowed)
+                demand = (1.0 - ROUNDING) * greatest(command, order, column)
+                yield Breach(place=limits.place(column, name), found=demand, allowed=allowed)
         if allowed_here.travel is not None:
             (low, high), travel = allowed_here.travel, limits.place(column, "travel")
             rounding = ROUNDING * (high - low)

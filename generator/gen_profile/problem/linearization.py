@@ -112,8 +112,8 @@ def eigenvalues_at(
 ) -> list[NDArray[np.complex128]]:
     """Find the eigenvalues of many machines at rest at some places of the axes, each as `eigenvalues`."""
     resting = [resting_place(plant, q_a) for q_a in places]
-    found = {place: _eigenvalues(*linear_terms(plant, machines, place)) for place in set(resting)}
-    return [found[place] for place in resting]
+    by_place = {place: _eigenvalues(*linear_terms(plant, machines, place)) for place in set(resting)}
+    return [by_place[place] for place in resting]
 
 
 def resting_place(plant: Plant, q_a: Sequence[float] | Array) -> tuple[float, ...]:

@@ -105,8 +105,8 @@ class Box:
 def _frequencies(plant: Plant, machines: bytes, ends: tuple[tuple[float, ...], ...]) -> Array:
     """Find the frequencies of many machines in rad/s, the mean of those at some places of the axes."""
     rows, modes = np.frombuffer(machines).reshape(-1, len(plant.parameters)), len(plant.unactuated)
-    found = [np.sort(rates.imag, axis=1)[:, modes:] for rates in eigenvalues_at(plant, rows, ends)]
-    return np.asarray(np.mean(found, axis=0))
+    frequencies = [np.sort(rates.imag, axis=1)[:, modes:] for rates in eigenvalues_at(plant, rows, ends)]
+    return np.asarray(np.mean(frequencies, axis=0))
 
 
 def box_of(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> Box | None:
@@ -221,9 +221,9 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
     for basis in np.linalg.qr(random.standard_normal((rounds, ranges, ranges)))[0]:
         ways = np.concatenate([basis, -basis]) * begun.steps
         polls = np.clip(places[:, None] + reach[:, None, None] * ways, 0.0, 1.0)
-        found = shares(polls.reshape(-1, ranges)).reshape(*polls.shape[:2], -1)
+        polled = shares(polls.reshape(-1, ranges)).reshape(*polls.shape[:2], -1)
         tried += polls.shape[0] * polls.shape[1]
-        own = np.take_along_axis(found, figure[:, None, None], axis=2)[:, :, 0]
+        own = np.take_along_axis(polled, figure[:, None, None], axis=2)[:, :, 0]
         top, rows = own.argmax(axis=1), np.arange(len(places))
         better = own[rows, top] > best
         places = np.where(better[:, None], polls[rows, top], places)

@@ -86,9 +86,9 @@ def _derived(
         forcing = parameter * sym.jacobian(f, parameter)
     rows = _moving_rows(jacobian, forcing)
     states = sym.symbols("S_" + "_".join(names), len(rows))
-    found = Sensitivities(parameters=names, states=states, rates=states, rows=rows)
-    rates = jacobian @ _full(found, states, n) + forcing
-    return attrs.evolve(found, rates=sym.column([rates[row] for row in rows]))
+    sensitivities = Sensitivities(parameters=names, states=states, rates=states, rows=rows)
+    rates = jacobian @ _full(sensitivities, states, n) + forcing
+    return attrs.evolve(sensitivities, rates=sym.column([rates[row] for row in rows]))
 
 
 def _full(sensitivities: Sensitivities, column: Symbol, n: int) -> Symbol:

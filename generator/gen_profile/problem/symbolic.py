@@ -289,14 +289,16 @@ _Operation = tuple[str, "Callable[..., Array] | None", tuple[Any, ...], int]
 
 def _operations(instructions: Sequence[Instruction]) -> list[_Operation]:
     """List operations of the first output, with the places read and written; none where NumPy lacks one."""
-    found: list[_Operation] = []
+    operations: list[_Operation] = []
     for step in instructions:
         name, reads, operation = step.operation, step.arguments, _OPERATIONS.get(step.operation)
         if operation is None and name not in ("CONST", "INPUT", "OUTPUT"):
             return []
         if name != "OUTPUT" or step.results[0] == 0:
-            found.append((name, operation, (step.constant,) if name == "CONST" else reads, step.results[-1]))
-    return found
+            operations.append(
+                (name, operation, (step.constant,) if name == "CONST" else reads, step.results[-1])
+            )
+    return operations
 
 
 def c_source(*functions: Function) -> str:

@@ -64,11 +64,11 @@ def jerk_limited(limits: LimitsSpec, distance: Sequence[float]) -> BaseMove:
     demand.target_position = [1.0]
     demand.max_velocity, demand.max_acceleration, demand.max_jerk = [velocity], [acceleration], [jerk]
     Ruckig(1).calculate(demand, trajectory)
-    found = trajectory.profiles[0][0]
-    kept = np.array(found.t) > 0.0
-    taylor = np.stack([found.p[:-1], found.v[:-1], np.array(found.a[:-1]) / 2.0, np.array(found.j) / 6.0])
+    pieces = trajectory.profiles[0][0]
+    kept = np.array(pieces.t) > 0.0
+    taylor = np.stack([pieces.p[:-1], pieces.v[:-1], np.array(pieces.a[:-1]) / 2.0, np.array(pieces.j) / 6.0])
     duration = trajectory.duration
-    ends = np.cumsum(np.array(found.t)[kept]) / duration
+    ends = np.cumsum(np.array(pieces.t)[kept]) / duration
     return BaseMove(knots=[0.0, *ends[:-1], 1.0], coefficients=taylor[:, kept].T * duration ** np.arange(4.0))
 
 

@@ -130,8 +130,8 @@ def _move(spec: Spec) -> Iterator[Doubt]:
         if not move.shortest:
             mean = distance / move.duration
             template = "{said} in {duration:g} s, at {mean:.3g} {unit}/s on average"
-            found = Phrase(template, said=said, duration=move.duration, mean=mean, unit=unit)
-            hurried = list(_fast(mean, unit, "move.duration", found, cure))
+            statement = Phrase(template, said=said, duration=move.duration, mean=mean, unit=unit)
+            hurried = list(_fast(mean, unit, "move.duration", statement, cure))
             yield from hurried
             if hurried:
                 continue
@@ -142,9 +142,9 @@ def _move(spec: Spec) -> Iterator[Doubt]:
             turns = distance / (2.0 * math.pi)
             problem = Phrase("{said}, which are {turns:.3g} turns; {cure}", said=said, turns=turns, cure=cure)
             yield Doubt(place="move.distance", problem=problem)
-        found = Phrase("{name} ends at {speed:g} {unit}/s", name=axis.name, speed=speed, unit=unit)
+        statement = Phrase("{name} ends at {speed:g} {unit}/s", name=axis.name, speed=speed, unit=unit)
         cure = _thousandth(speed, Phrase("speeds are in {unit}/s", unit=unit))
-        yield from _fast(speed, unit, "move.final_velocity", found, cure)
+        yield from _fast(speed, unit, "move.final_velocity", statement, cure)
     longest = max(map(abs, move.distance))
     if not move.shortest and move.duration >= LONG_TIME and 0.0 < longest < SLOW * move.duration:
         cure = _thousandth(move.duration, "durations are in s")
@@ -168,8 +168,10 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
             problem = Phrase("reaches {far:g} m, farther than any crane's runway; {cure}", far=far, cure=cure)
             yield Doubt(place=place, problem=problem)
     for name, rate in spec.planner.live_rate.items():
-        found = Phrase("hoists at {rate:g} m/s", rate=rate)
-        yield from _fast(rate, "m", f"planner.live_rate.{name}", found, _thousandth(rate, "rates are in m/s"))
+        statement = Phrase("hoists at {rate:g} m/s", rate=rate)
+        yield from _fast(
+            rate, "m", f"planner.live_rate.{name}", statement, _thousandth(rate, "rates are in m/s")
+        )
     sway, depth = spec.limits.sway, scale.depth[-1]
     if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
         template = "the ropes' {depth:.4g} m" if depth else "{times:g} times the move"

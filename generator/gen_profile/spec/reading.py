@@ -242,7 +242,7 @@ def parse_toml(text: str) -> Table:
 
 def _slip(text: str, problem: str) -> str:
     """Continue a sentence about text that is no TOML by what its writer took for TOML, if that shows."""
-    line = text.split("\n")[int(found[1]) - 1] if (found := re.search(r"line (\d+)", problem)) else ""
+    line = text.split("\n")[int(match[1]) - 1] if (match := re.search(r"line (\d+)", problem)) else ""
     values = re.findall(r"=\s*([^\s#,}\]=]+(?:,[0-9]+)?(?:\s*[A-Za-zµ°%][^\s#}]*)?)", line.partition("#")[0])
     hints = filter(None, (number_meant(value) for value in values if not value[0].isalpha()))
     if hint := next((hint for hint in hints if "quotes" not in hint), ""):

@@ -87,7 +87,7 @@ class StreamOutcome:
             "following_error_max_m": float(apart.max()) if answered.any() else None,
             "sway_residual_peak_m": self.sway,
             "cycles_unanswered": self.record.sent - int(answered.sum()),
-            "cycles_standing": sum(len(found.cycles) for found in self.standstills),
+            "cycles_standing": sum(len(standstill.cycles) for standstill in self.standstills),
         }
         return {
             "state": self.record.phase.value,
@@ -126,13 +126,13 @@ class StreamOutcome:
             "error_ids": [error for error in dict.fromkeys(errors) if error],
         }
 
-    def _standstill_words(self, found: Standstill) -> str:
-        axis, many = self.source.plan.target.axes[found.column], len(found.cycles)
-        unit = self.source.axes[found.column].unit
+    def _standstill_words(self, standstill: Standstill) -> str:
+        axis, many = self.source.plan.target.axes[standstill.column], len(standstill.cycles)
+        apart, unit = standstill.apart / abs(axis.counts_per_si), self.source.axes[standstill.column].unit
         return (
             f"axis {axis.name}: it stood still in {many} {'cycles' if many > 1 else 'cycle'} of the motion, "
-            f"from cycle {found.cycles[0]} on, and came {1e3 * found.apart / abs(axis.counts_per_si):.3g} "
-            f"m{unit} off it: its drive left setpoints out."
+            f"from cycle {standstill.cycles[0]} on, and came {1e3 * apart:.3g} m{unit} off it: "
+            "its drive left setpoints out."
         )
 
     @property

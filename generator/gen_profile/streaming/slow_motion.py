@@ -117,13 +117,13 @@ def _lower(stated: float | None, peak: float) -> float:
 
 
 def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float]:
-    found = {}
+    distances = {}
     for text in stated:
         name, _, number = text.partition("=")
         if name not in axes:
             raise SpecError(f"jog {text}: unknown axis{suggestion(name, axes)}")
-        found[name] = _metres(text, number)
-    return found
+        distances[name] = _metres(text, number)
+    return distances
 
 
 def _metres(text: str, number: str) -> float:

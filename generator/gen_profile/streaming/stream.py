@@ -198,14 +198,14 @@ def self_test(source: Source) -> Lateness:
     """
     period = frames.period_microseconds(source.spec.can) * 1000
     with real_time() as refused:
-        found = rehearse(_clock(refused), period, rehearsed_cycles(source))
-    if found.percentile(100) * 1e3 >= period / 2:
+        lateness = rehearse(_clock(refused), period, rehearsed_cycles(source))
+    if lateness.percentile(100) * 1e3 >= period / 2:
         raise StreamAborted(
             f"This machine cannot hold a cycle of {period / 1e6:g} ms: it was late by up to "
-            f"{found.percentile(100) / 1e3:.3g} ms (half a cycle is allowed). {' '.join(refused)} "
+            f"{lateness.percentile(100) / 1e3:.3g} ms (half a cycle is allowed). {' '.join(refused)} "
             "Choose a longer can.sync_period, or relieve the machine."
         )
-    return found
+    return lateness
 
 
 def stream(
@@ -363,9 +363,9 @@ def _simulated(source: Source, port: Port, tell: Progress) -> Iterator[_Simulati
         names = [axis.name for axis in target.axes]
         windows = dict(zip(names, useful(source.plan.demand, target), strict=True))
         clock.work = drive_bank(source.spec, bus, load, DriveVariant(), clock, windows=windows).poll
-        found = _Simulation(clock)
-        yield found
-        found.sway = load.residual_sway()
+        simulation = _Simulation(clock)
+        yield simulation
+        simulation.sway = load.residual_sway()
 
 
 def _clock(refused: tuple[str, ...]) -> SystemClock:

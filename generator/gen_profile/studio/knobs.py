@@ -130,9 +130,9 @@ def knobs(spec: Spec, document: Mapping[str, Any], start: Spec) -> list[Knob]:
     start : Spec
         Around whose values sliders go.
     """
-    found = [*_listed(spec, document)]
+    listed = [*_listed(spec, document)]
     before = {(knob.path, knob.index): knob.value for knob in _listed(start, document)}
-    return [_with_slider(knob, before.get((knob.path, knob.index))) for knob in found]
+    return [_with_slider(knob, before.get((knob.path, knob.index))) for knob in listed]
 
 
 def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
@@ -187,14 +187,14 @@ def _field(kind: Any) -> dict[str, Any] | None:
     """Say what a field's annotation makes of its knob; None for what is no plain value."""
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, UnionType):
-        found = _field(inner[0])
-        return found and {**found, "optional": True}
+        inside = _field(inner[0])
+        return inside and {**inside, "optional": True}
     if origin is Literal:
         return {"kind": "choice", "choices": inner}
     if origin is Annotated:
-        found = _field(inner[0])
+        inside = _field(inner[0])
         bounds = next((one for one in inner[1:] if isinstance(one, Bounds)), Bounds())
-        return found and {**found, **_bounds(bounds)}
+        return inside and {**inside, **_bounds(bounds)}
     if kind is bool:
         return {"kind": "switch"}
     if kind is int:

@@ -128,9 +128,9 @@ class Studio:
         programs = question.start.programs
         if not all(path in self.agreed for path in programs.values()):
             return None
-        found = {key: _digest(path) for key, path in programs.items()}
-        known = all(self.agreed[path] == found[key] for key, path in programs.items())
-        return attrs.evolve(question, agreed=found) if known else None
+        digests = {key: _digest(path) for key, path in programs.items()}
+        known = all(self.agreed[path] == digests[key] for key, path in programs.items())
+        return attrs.evolve(question, agreed=digests) if known else None
 
     def agree(self, programs: Iterable[Path]) -> None:
         """Let programs run as they are now.

@@ -53,8 +53,8 @@ class Archive:
 
     def description(self) -> str | None:
         """Tell what was asked for, as JSON, if that is known yet."""
-        found = self._connection.execute("SELECT description FROM sweep").fetchone()
-        return None if found is None else str(found[0])
+        row = self._connection.execute("SELECT description FROM sweep").fetchone()
+        return None if row is None else str(row[0])
 
     def describe(self, description: str) -> None:
         """Note what is asked for."""
@@ -98,13 +98,13 @@ class Archive:
 
     def files(self, folder: str) -> dict[str, bytes]:
         """Read all files of a folder by name."""
-        found = self._connection.execute(
+        rows = self._connection.execute(
             "SELECT name, sz, CAST(data AS BLOB) FROM sqlar WHERE name BETWEEN ? AND ? AND data IS NOT NULL",
             (f"{folder}/", f"{folder}0"),
         )
         return {
             name.rpartition("/")[2]: data if len(data) == size else zlib.decompress(data)
-            for name, size, data in found
+            for name, size, data in rows
         }
 
 

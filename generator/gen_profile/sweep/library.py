@@ -160,10 +160,10 @@ def _target(folder: Path, row: Mapping[str, Any], name: str) -> Target:
 def _block_of(row: dict[str, Any]) -> dict[str, Any]:
     """Find the first file that holds a playback block; what else belongs to it follows it."""
     known, artefacts = formats(), row["artefacts"]
-    found: list[dict[str, Any]] = [item for item in artefacts if known[item["format"]].holds_block]
-    if not found:
+    blocks: list[dict[str, Any]] = [item for item in artefacts if known[item["format"]].holds_block]
+    if not blocks:
         raise SpecError("A library needs the cases' PLC blocks: sweep again with the format plc.")
-    return found[0]
+    return blocks[0]
 
 
 def _require_same(library: BlockSource, target: Target, profiles: list[dict[str, Any]]) -> None:

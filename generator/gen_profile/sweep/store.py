@@ -225,9 +225,9 @@ def opened(store: Store) -> Iterator[Keeper]:
 
 
 def _require_same(path: Path, asked: dict[str, Any], description: bytes | str) -> None:
-    found = _parsed(path, description)
-    if found != asked:
-        other = " and ".join(WORDS.get(key, key) for key in asked if found.get(key) != asked[key])
+    stored = _parsed(path, description)
+    if stored != asked:
+        other = " and ".join(WORDS.get(key, key) for key in asked if stored.get(key) != asked[key])
         what = "file" if is_archive(path) else "folder"
         raise OutputError(f"{path} holds a sweep with other {other}; choose another {what}.")
 

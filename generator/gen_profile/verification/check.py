@@ -167,9 +167,9 @@ def _verdict(
     machines = [row for row in rows if row.followed] or scenarios(spec)[:1]
     spacing = sample_spacing(spec, setpoints)
     followed = _of_even_cycles(setpoints, spec)
-    found = cosimulate(spec, followed, machines, output_step=spacing, progress=progress)
+    responses = cosimulate(spec, followed, machines, output_step=spacing, progress=progress)
     expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing, by_fmpy=False)
-    check = judge(spec, setpoints, machines, found, expected, followed=followed)
+    check = judge(spec, setpoints, machines, responses, expected, followed=followed)
     check = attrs.evolve(check, error_bound=check.error_bound + resolution)
     if len(rows) == len(further):
         check = attrs.evolve(check, findings=())

@@ -56,11 +56,11 @@ def _missed_ends(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
         allowed += setpoints.cycle_time * np.abs(speed)
     else:
         beyond += setpoints.times[-1] - spec.move.duration
-    for word, found, asked in (
+    for word, actual, asked in (
         ("starts", setpoints.position[0], spec.move.start),
         ("ends", setpoints.position[-1], np.array(spec.move.target) + beyond * speed),
     ):
-        for axis, at, due, tolerance in zip(spec.machine().actuated, found, asked, allowed, strict=True):
+        for axis, at, due, tolerance in zip(spec.machine().actuated, actual, asked, allowed, strict=True):
             if abs(at - due) > tolerance:
                 template = (
                     "Axis {axis.name} {word} at {at:.9g} {axis.unit}, and the spec asks for {due:.9g} "
@@ -164,8 +164,8 @@ def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
         for column, axis in enumerate(spec.machine().actuated):
             allowed = getattr(spec.limits.of(column), name)
             worst = int(played[:, column].argmax())
-            found = float(played[worst, column])
-            if allowed is not None and found > (1.0 + overshoot) * allowed + rounding[column]:
+            demand = float(played[worst, column])
+            if allowed is not None and demand > (1.0 + overshoot) * allowed + rounding[column]:
                 unit = f"{axis.unit}/s" if order == 1 else f"{axis.unit}/s²"
                 template = (
                     "The setpoints ask {name} for {found:.4g} {unit} at {time:.6g} s, and {place} "
@@ -175,7 +175,7 @@ def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
                     Phrase(
                         template,
                         name=axis.name,
-                        found=found,
+                        found=demand,
                         unit=unit,
                         time=times[worst],
                         place=spec.limits.place(column, name),

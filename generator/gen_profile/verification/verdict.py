@@ -195,9 +195,9 @@ class Check(Summarised, Examination):
             )
             yield self._exceeded(template, swaying, load, swaying.on_the_way or 0.0, self.sway_limit)
 
-    def _exceeded(self, template: str, finding: Finding, load: str, found: float, limit: float) -> Phrase:
+    def _exceeded(self, template: str, finding: Finding, load: str, sway: float, limit: float) -> Phrase:
         name, error = finding.scenario.name, self._error()
-        return Phrase(template, load=load, found=1e3 * found, name=name, limit=1e3 * limit, error=error)
+        return Phrase(template, load=load, found=1e3 * sway, name=name, limit=1e3 * limit, error=error)
 
     def _error(self) -> str:
         micrometres = float(f"{1e6 * self.error_bound:.2g}")

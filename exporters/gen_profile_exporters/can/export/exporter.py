@@ -124,11 +124,11 @@ def read_setpoints(content: bytes, target: Target) -> tuple[frames.Integers, lis
 
 
 def _on_their_channels(
-    found: Iterable[Frame], expected: Mapping[int, SetpointFrame], target: Target
+    frames: Iterable[Frame], expected: Mapping[int, SetpointFrame], target: Target
 ) -> Iterator[Frame]:
     """Require each frame on its drive's channel; drives that are all on one bus may be on any."""
     only: str | None = None
-    for frame in found:
+    for frame in frames:
         own = frame.channel
         if not target.can.channels:
             own = only = only or frame.channel

@@ -65,7 +65,10 @@ def channels(interface: str) -> tuple[Channel, ...]:
     if interface == "socketcan":
         return _of_linux()
     with suppress(Exception):  # drivers fail in ways of their own
-        return tuple(Channel(name=str(found["channel"])) for found in can.detect_available_configs(interface))
+        return tuple(
+            Channel(name=str(configuration["channel"]))
+            for configuration in can.detect_available_configs(interface)
+        )
     return ()
 
 

@@ -56,11 +56,11 @@ def approach(rest_counts: Sequence[int], demand: Demand, target: Target) -> Setp
 
 def _durations(distance: Integers, demand: Demand, target: Target) -> list[float]:
     """Shortest time in s in which each axis goes a distance in counts within its limits."""
-    found = []
+    durations = []
     for column, axis in enumerate(target.axes):
         far, creep = abs(int(distance[column])), magnitude_counts(CREEP, axis)
         velocity = SHARE * demand.velocity[column] or creep
         acceleration = SHARE * demand.acceleration[column] or creep
         by_velocity = PEAK_VELOCITY * far / velocity
-        found.append(max(by_velocity, (PEAK_ACCELERATION * far / acceleration) ** 0.5))
-    return found
+        durations.append(max(by_velocity, (PEAK_ACCELERATION * far / acceleration) ** 0.5))
+    return durations

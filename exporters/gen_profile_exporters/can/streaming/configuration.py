@@ -70,7 +70,7 @@ def configure(
     link: Link,
     target: Target,
     demand: Demand,
-    found: Restoration,
+    restoration: Restoration,
     meanwhile: Callable[[], None],
     *,
     reset_fault: bool = False,
@@ -85,7 +85,7 @@ def configure(
     link : Link
     target : Target
     demand : Demand
-    found : Restoration
+    restoration : Restoration
         Remembers what the drives were set to, as far as that is changed.
     meanwhile : callable
         What must go on while an answer is awaited, once no drive watches our heartbeat any more.
@@ -111,11 +111,11 @@ def configure(
         watched = _upload(link, node, *HEARTBEAT_WATCHED, optional=True)
         _await_own_stop(link, node, watched)
         _require_rest(link, node)
-        found.remember_watch(node.number, watched)
+        restoration.remember_watch(node.number, watched)
         _download(link, node, *HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
     link.meanwhile = meanwhile
     for node in nodes:
-        _set(link, node, lists[node.number], found)
+        _set(link, node, lists[node.number], restoration)
     return tuple(_require_fit(link, node, target, demand) for node in nodes)
 
 
@@ -146,7 +146,7 @@ def start(link: Link, target: Target) -> None:
         link.send(nmt(START, number))
 
 
-def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
+def release(link: Link, target: Target, restoration: Restoration) -> tuple[str, ...]:
     """Let the drives be alone again: no PDOs taken, no heartbeat of ours watched, set as they were found.
 
     One that does not listen reports a lost heartbeat; that does no harm to the others.
@@ -163,7 +163,7 @@ def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
         with suppress(StreamAborted, SdoError, struct.error):
             link.sdo(number).download(*HEARTBEAT_WATCHED, bytes(4))
     allowed = [trembling(axis) for axis in target.axes]
-    return found.put_back(link, dict(zip(frames.nodes(target), allowed, strict=True)))
+    return restoration.put_back(link, dict(zip(frames.nodes(target), allowed, strict=True)))
 
 
 def nmt(command: int, node: int) -> can.Message:
@@ -199,9 +199,9 @@ def _require_identity(link: Link, node: Node, target: Target) -> None:
     serial = target.can.serial.get(node.name)
     identity = ((1, target.can.vendor, "vendor"), (2, target.can.product, "product"), (4, serial, "serial"))
     for sub, wanted, what in identity:
-        if wanted is not None and (found := _read(link, node, 0x1018, sub)) != wanted:
+        if wanted is not None and (actual := _read(link, node, 0x1018, sub)) != wanted:
             raise StreamAborted(
-                f"axis {node.name}: node {node.number} is another drive: its {what} is {found:08X}h, and "
+                f"axis {node.name}: node {node.number} is another drive: its {what} is {actual:08X}h, and "
                 f"can.{what} asks for {wanted:08X}h; check node ids and cabling."
             )
     if not _read(link, node, 0x6502) >> (MODES[target.can.mode] - 1) & 1:
@@ -255,7 +255,7 @@ def _require_rest(link: Link, node: Node) -> None:
         )
 
 
-def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -> None:
+def _set(link: Link, node: Node, entries: Sequence[Entry], restoration: Restoration) -> None:
     """Write the list in its order where something differs, and require what the drive then holds."""
     final = {(entry.index, entry.sub): entry for entry in entries}
     held = _held(link, node, final)
@@ -266,7 +266,7 @@ def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -
     def read(index: int, sub: int) -> bytes | None:
         return _upload(link, node, index, sub, optional=True)
 
-    found.remember(node.number, settings_of(held, changed, read))
+    restoration.remember(node.number, settings_of(held, changed, read))
     touched = {pdo_of(index) for index, _ in changed}  # and so put back, whole where they are PDOs
     for entry in entries:
         if pdo_of(entry.index) in touched and not entry.fixed:

@@ -58,7 +58,7 @@ def standstills(
     steps = np.diff(led, axis=0)
     if len(steps) < window:
         return ()
-    found = []
+    still = []
     for column in range(led.shape[1]):
         latest = sliding_window_view(steps[:, column], window)  # by row: the steps up to cycle row + window
         ahead = np.where((latest > 0).all(axis=1), latest.min(axis=1), 0)
@@ -70,8 +70,8 @@ def standstills(
         cycles = np.flatnonzero(moving & known & (moved < 0.5 * np.abs(least))) + window
         if cycles.size:
             apart = np.abs(actual[cycles, column] - led[cycles, column]).max()
-            found.append(Standstill(column=column, cycles=tuple(map(int, cycles)), apart=int(apart)))
-    return tuple(found)
+            still.append(Standstill(column=column, cycles=tuple(map(int, cycles)), apart=int(apart)))
+    return tuple(still)
 
 
 class Following:

@@ -135,12 +135,12 @@ class _Commands:
     """Controlwords: in frames of their own, or in the setpoints' where the drives' mapping has them there."""
 
     def __init__(self, target: Target) -> None:
-        layout, found = pdos.layout(target.can), frames.command_frames(target)
+        layout, carriers = pdos.layout(target.can), frames.command_frames(target)
         self._shared = layout.shared
         offset = layout.offset(pdos.CONTROLWORD, layout.received[layout.command])
-        self._places = {frame.cob_id: offset for frame in found}
-        still = [[0] * found[0].width] * len(found)
-        self._own = () if layout.shared else tuple(frames.message(f.cob_id, f.pack(still)) for f in found)
+        self._places = {frame.cob_id: offset for frame in carriers}
+        still = [[0] * carriers[0].width] * len(carriers)
+        self._own = () if layout.shared else tuple(frames.message(f.cob_id, f.pack(still)) for f in carriers)
 
     def alone(self, word: int) -> Cycle:
         """Make frames with nothing else to follow; none where there are no such frames."""

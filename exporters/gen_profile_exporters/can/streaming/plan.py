@@ -180,8 +180,8 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
             f"{target.can.sync_period:g} s; export the log again."
         )
     taken, _ = read_setpoints(content, target)
-    found = _setpoints(taken, motion, target)
-    return StreamPlan(target=target, motion=found, cycles=cycles_of(found, target))
+    setpoints = _setpoints(taken, motion, target)
+    return StreamPlan(target=target, motion=setpoints, cycles=cycles_of(setpoints, target))
 
 
 def cycles_of(motion: Setpoints, target: Target) -> tuple[Cycle, ...]:

@@ -146,9 +146,9 @@ class StreamRequest:
             return ()
         seconds = rehearsed_cycles(source) * source.spec.can.sync_period
         tell(f"measuring this machine for {seconds:.3g} s")
-        found = f"Self-test: {lateness_words(self_test(source))}."
-        tell(found)
-        return (found,)
+        sentence = f"Self-test: {lateness_words(self_test(source))}."
+        tell(sentence)
+        return (sentence,)
 
     @contextmanager
     def shown(self, source: Source) -> Iterator[tuple[Progress, Book | None]]:

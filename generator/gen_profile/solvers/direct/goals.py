@@ -21,7 +21,9 @@ from gen_profile.solvers.direct.transcription import Iterate, Transcription
 
 WITHIN = 1.0 - 1e-6  # fraction of a limit that a program may use: its own tolerance must not break the limit
 
-STEEPER = 2.0  # by which the exponent of the sway's cost may grow from one expansion to the next
+STEEPER = (
+    2.0  # by which the exponent of the sway's cost may grow from one expansion to the next; 1 costs 6e-4
+)
 HELD = 3e-7  # cost of changing the highest derivative by as much as it is usually
 USUAL_ACCELERATION, USUAL_JERK = 25.0, 1e3  # halves of squares, dimensionless; a quintic's are 9 and 360
 DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
