@@ -428,10 +428,10 @@ def _nothing(value: Any) -> bool:
     return isinstance(value, int) and value == 0
 
 
-def keeps(one: Expansion, allowed: arb, most: int = MOST_PARTS) -> bool:
+def keeps(one: Expansion, allowed: arb) -> bool:
     """Tell whether a function's absolute value is proved to be at most so much, halving where it is not."""
     waiting = [one]
-    for _ in range(most):
+    for _ in range(MOST_PARTS):
         if not waiting:
             return True
         part = waiting.pop()

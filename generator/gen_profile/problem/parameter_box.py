@@ -129,9 +129,7 @@ def box_of(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> Box |
     )
 
 
-def machines_inside(
-    problem: Problem, ranges: Mapping[str, tuple[float, float]], most: int = FEW
-) -> list[dict[str, float]]:
+def machines_inside(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> list[dict[str, float]]:
     """List the parameters of machines all over some ranges, for a problem's move; none of no ranges.
 
     Parameters
@@ -139,11 +137,9 @@ def machines_inside(
     problem : Problem
     ranges : mapping of str to (float, float)
         Least and greatest values.
-    most : int
-        Of `start`.
     """
     box = box_of(problem, ranges)
-    return [] if box is None else box.parameters(start(box.phases, len(box.ranges), most).places)
+    return [] if box is None else box.parameters(start(box.phases, len(box.ranges), FEW).places)
 
 
 def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:

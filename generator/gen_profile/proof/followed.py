@@ -55,7 +55,7 @@ class Followed:
     axes : sequence of BlockAxis
     limits : sequence of Ends
         Of the same axes.
-    received : Told
+    received : ReceivedOrders
     issued : mapping of str to (cycles,) array
         By names of the block's outputs.
     reserve : float
@@ -207,10 +207,10 @@ class Allowance:
     allowed: float
 
 
-def never(what: str, flags: Flags, begin: int = 0) -> Iterator[Allowance]:
-    """Measure what must not be, from the first of these cycles on."""
+def never(what: str, flags: Flags) -> Iterator[Allowance]:
+    """Measure what must not be, in any cycle."""
     if flags.any():
-        yield Allowance(what, begin + int(np.argmax(flags)), 1.0, 0.0)
+        yield Allowance(what, int(np.argmax(flags)), 1.0, 0.0)
 
 
 def greatest(what: str, needed: Array, allowed: float, begin: int = 0) -> Iterator[Allowance]:

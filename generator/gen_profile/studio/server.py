@@ -79,7 +79,7 @@ class Studio:
         Programs that the user lets run, with their SHA-256 when he said so.
     opened : dict of str to WrittenSpec
         Specs that were dropped on a page, by the name that its state holds.
-    first : Desk or None
+    first : Session or None
         Where the first page's question is answered before that page is there.
     """
 
