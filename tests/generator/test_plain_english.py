@@ -29,7 +29,19 @@ NAMES = {
         "MEANINGS",
         "ALIKE",
     ),
-    *("CALM", "LOOK", "Desk", "QuestionLine", "leave_off", "begins", "missed", "enough", "turned", "bends"),
+    *(
+        "doubts",
+        "CALM",
+        "LOOK",
+        "Desk",
+        "QuestionLine",
+        "leave_off",
+        "begins",
+        "missed",
+        "enough",
+        "turned",
+        "bends",
+    ),
 }
 
 

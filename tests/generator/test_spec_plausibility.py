@@ -95,4 +95,4 @@ def test_a_limit_that_nobody_typed_is_no_slip():
     """The payload's default is 1 % of the move, which is far for so short a rope."""
     spec = preset_spec("paper", ["check.residual_sway={ hook = 0.06 }", "move.distance=33"])
     assert dict(spec.check.residual_sway) == {"hook": 0.06, "payload": 0.33}
-    assert not any("payload" in doubt for doubt in plausibility_warnings(spec))
+    assert not any("payload" in warning for warning in plausibility_warnings(spec))

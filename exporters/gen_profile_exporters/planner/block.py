@@ -138,7 +138,7 @@ class PlannerConstants:
     sway_share : float
         m, of the sway that errors may leave: what plans may spend; 0 for motions that leave none to first
         order.
-    doubt : float
+    stated_error : float
         Relative error that the frequencies may have.
     second_order : (modes,) array
         Weights in 1/m of what errors of the frequencies leave in each mode: of the integral of velocity and
@@ -175,7 +175,7 @@ class PlannerConstants:
     operations: int
     periods: Sequence[float]
     sway_share: float
-    doubt: float
+    stated_error: float
     second_order: Array
     degrees: int
     curvatures: Sequence[float]
@@ -191,7 +191,7 @@ def block_text(constants: PlannerConstants) -> str:
         "zones": constants.zones,
         "events": constants.events,
         "ramped": not constants.rates,
-        "varied": constants.doubt > 0.0 and not constants.rates,
+        "varied": constants.stated_error > 0.0 and not constants.rates,
     }
     text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
     values = _values(constants)
@@ -435,7 +435,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cCalm": c.tolerated_sway,
         "cAtOnce": AT_ONCE,
         "cAfterCut": AFTER_CUT,
-        "cDoubt": c.doubt,
+        "cDoubt": c.stated_error,
         **(
             {}
             if c.rates

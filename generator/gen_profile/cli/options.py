@@ -119,7 +119,7 @@ class SpecChoice(NamedTuple):  # attrs would take as long to load as half of cli
         return self._replace(overrides=(*self.overrides, *more))
 
     def spec(self) -> Spec:
-        """Read it; doubt its values aloud."""
+        """Read it, and warn of implausible values."""
         from gen_profile.spec.plausibility import plausibility_warnings
         from gen_profile.spec.reading import parse_spec
 

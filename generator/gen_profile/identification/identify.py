@@ -72,7 +72,7 @@ class Identification(Summarised):
 
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong with the measurements, though parameters were found; a sentence each."""
-        logs = (sentence for row in self.to_dict()["logs"] for sentence in _doubts(row))
+        logs = (sentence for row in self.to_dict()["logs"] for sentence in _log_warnings(row))
         if (factor := self.estimate.contradiction) == 1.0:
             return tuple(logs)
         return (
@@ -294,7 +294,7 @@ def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
         staging.deliver()
 
 
-def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
+def _log_warnings(row: Mapping[str, Any]) -> Iterator[str]:
     """Say what is wrong with a logged swing."""
     name, unit = Phrase("the log of {load}", load=row["load"]), row["unit"]
     if row["unrest"] > INITIAL_RESIDUAL_RATIO:

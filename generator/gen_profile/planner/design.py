@@ -116,7 +116,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         ),
         sway_limit=min(spec.check.residual_sway.values()),
         tolerated_sway=TOLERATED_FRACTION * min(spec.check.residual_sway.values()),
-        doubt=float(frequency_errors(spec).max(initial=0.0)),
+        stated_error=float(frequency_errors(spec).max(initial=0.0)),
         second_order=_second_order(spec, modes_of_live),
         sway_share=_sway_share(spec),
         degrees=int(exponents.max(initial=0)) + 1,

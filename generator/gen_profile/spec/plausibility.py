@@ -39,7 +39,7 @@ LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
 
 
 @attrs.frozen(kw_only=True)
-class Doubt:
+class Implausibility:
     """A value that is implausible, or impossible: its place, what is wrong and the cure."""
 
     place: str
@@ -82,16 +82,16 @@ def refuse_implausible(spec: Spec) -> None:
     SpecError
         With a sentence for each.
     """
-    if refused := [doubt.sentence for doubt in _doubts(spec) if doubt.refused]:
+    if refused := [one.sentence for one in _implausibilities(spec) if one.refused]:
         raise SpecError(*refused)
 
 
 def plausibility_warnings(spec: Spec) -> tuple[str, ...]:
     """Say which values are implausible, a sentence each."""
-    return tuple(doubt.sentence for doubt in _doubts(spec) if not doubt.refused)
+    return tuple(one.sentence for one in _implausibilities(spec) if not one.refused)
 
 
-def _doubts(spec: Spec) -> Iterator[Doubt]:
+def _implausibilities(spec: Spec) -> Iterator[Implausibility]:
     scale = _scale(spec)
     yield from _move(spec)
     yield from _limits(spec, scale)
@@ -106,18 +106,18 @@ def _thousandth(value: float, what: str) -> Phrase:
     return Phrase(template, what=what, meant=value / 1e3)
 
 
-def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Iterator[Doubt]:
-    """Doubt a speed or acceleration."""
+def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Iterator[Implausibility]:
+    """Question a speed or acceleration."""
     kind = "acceleration" if place.endswith("acceleration") else "velocity"
     hardly, never = FAST[unit, kind]
     if value > hardly:
         verdict = "which no such machine reaches" if value > never else "which few machines reach"
         problem = Phrase("{problem}, {verdict}; {cure}", problem=problem, verdict=verdict, cure=cure)
-        yield Doubt(place=place, problem=problem, refused=value > never)
+        yield Implausibility(place=place, problem=problem, refused=value > never)
 
 
-def _move(spec: Spec) -> Iterator[Doubt]:
-    """Doubt distances, the duration, and speeds that follow from them."""
+def _move(spec: Spec) -> Iterator[Implausibility]:
+    """Question distances, the duration, and speeds that follow from them."""
     move, axes = spec.move, spec.machine().actuated
     for axis, distance, speed in zip(
         axes, map(abs, move.distance), map(abs, move.final_velocity), strict=True
@@ -137,11 +137,11 @@ def _move(spec: Spec) -> Iterator[Doubt]:
                 continue
         if unit == "m" and distance > LONG_WAY:
             problem = Phrase("{said}, farther than any crane's runway; {cure}", said=said, cure=cure)
-            yield Doubt(place="move.distance", problem=problem)
+            yield Implausibility(place="move.distance", problem=problem)
         elif unit == "rad" and distance > MANY_TURNS:
             turns = distance / (2.0 * math.pi)
             problem = Phrase("{said}, which are {turns:.3g} turns; {cure}", said=said, turns=turns, cure=cure)
-            yield Doubt(place="move.distance", problem=problem)
+            yield Implausibility(place="move.distance", problem=problem)
         statement = Phrase("{name} ends at {speed:g} {unit}/s", name=axis.name, speed=speed, unit=unit)
         cure = _thousandth(speed, Phrase("speeds are in {unit}/s", unit=unit))
         yield from _fast(speed, unit, "move.final_velocity", statement, cure)
@@ -150,11 +150,11 @@ def _move(spec: Spec) -> Iterator[Doubt]:
         cure = _thousandth(move.duration, "durations are in s")
         template = "{duration:g} s for {longest:g} m (or rad) is slow; {cure}"
         problem = Phrase(template, duration=move.duration, longest=longest, cure=cure)
-        yield Doubt(place="move.duration", problem=problem)
+        yield Implausibility(place="move.duration", problem=problem)
 
 
-def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
-    """Doubt limits that hold nothing back."""
+def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
+    """Question limits that hold nothing back."""
     units = {axis.name: axis.unit for axis in spec.machine().actuated}
     for place, value in spec.limits.stated().items():
         *table, kind = place.split(".")
@@ -166,7 +166,7 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         if unit == "m" and kind == "travel" and (far := max(map(abs, value))) > LONG_WAY:
             cure = _thousandth(far, "lengths are in m")
             problem = Phrase("reaches {far:g} m, farther than any crane's runway; {cure}", far=far, cure=cure)
-            yield Doubt(place=place, problem=problem)
+            yield Implausibility(place=place, problem=problem)
     for name, rate in spec.planner.live_rate.items():
         statement = Phrase("hoists at {rate:g} m/s", rate=rate)
         yield from _fast(
@@ -178,11 +178,11 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         what = Phrase(template, depth=depth, times=FAR)
         cure = _thousandth(sway, "lengths are in m")
         problem = Phrase("{sway:g} m are more than {what}; {cure}", sway=sway, what=what, cure=cure)
-        yield Doubt(place="limits.sway", problem=problem, refused=True)
+        yield Implausibility(place="limits.sway", problem=problem, refused=True)
 
 
-def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
-    """Doubt limits of the residual sway that every motion keeps."""
+def _residual(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
+    """Question limits of the residual sway that every motion keeps."""
     limits = spec.check.residual_sway
     usual = RESIDUAL_SHARE * spec.move.longest(spec.machine())
     one_limit = len(set(limits.values())) == 1
@@ -200,29 +200,29 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         if depth and limit > RESIDUAL_OF_ROPE * depth:
             template = "{limit:g} m are more than half of the {depth:.4g} m by which the {load} hangs; {cure}"
             problem = Phrase(template, limit=limit, depth=depth, load=load, cure=cure)
-            yield Doubt(place=place, problem=problem, refused=True)
+            yield Implausibility(place=place, problem=problem, refused=True)
         elif from_rest and not depth and limit > FAR * way > 0.0:
             template = (
                 "{limit:g} m are more than {times:g} times the {way:.4g} m that the move takes the "
                 "{load}; {cure}"
             )
             problem = Phrase(template, limit=limit, times=FAR, way=way, load=load, cure=cure)
-            yield Doubt(place=place, problem=problem, refused=True)
+            yield Implausibility(place=place, problem=problem, refused=True)
         elif load in ends and from_rest and limit > max(sway, RESIDUAL_OF_MOVE * way) > 0.0:
             template = (
                 "{limit:g} m are more than the {sway:.2g} m that almost any motion of this length "
                 "and time leaves, so the check tells nothing; state less."
             )
             problem = Phrase(template, limit=limit, sway=sway)
-            yield Doubt(place=place, problem=problem)
+            yield Implausibility(place=place, problem=problem)
         else:
             continue
         if one_limit:
             return
 
 
-def _swing(spec: Spec, scale: Scale) -> Iterator[Doubt]:
-    """Doubt moves that swing a load out of the range in which it behaves like a spring."""
+def _swing(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
+    """Question moves that swing a load out of the range in which it behaves like a spring."""
     angle = float(np.max(scale.angle, initial=0.0))
     if not spec.move.shortest and angle > LARGE_SWING:
         template = (
@@ -230,23 +230,23 @@ def _swing(spec: Spec, scale: Scale) -> Iterator[Doubt]:
             "are in m and durations in s, so allow more than {duration:g} s."
         )
         problem = Phrase(template, angle=math.degrees(angle), duration=spec.move.duration)
-        yield Doubt(place="move.duration", problem=problem)
+        yield Implausibility(place="move.duration", problem=problem)
 
 
-def _drive(spec: Spec) -> Iterator[Doubt]:
-    """Doubt what is stated of the drives."""
+def _drive(spec: Spec) -> Iterator[Implausibility]:
+    """Question what is stated of the drives."""
     tau = spec.actuator.tau
     if tau is not None and not spec.move.shortest and tau > spec.move.duration:
         cure = _thousandth(tau, "time constants are in s")
         problem = Phrase("{tau:g} s are longer than the whole move; {cure}", tau=tau, cure=cure)
-        yield Doubt(place="actuator.tau", problem=problem)
+        yield Implausibility(place="actuator.tau", problem=problem)
     longest = spec.move.longest(spec.machine()) or math.inf
     for name in ("start_tolerance", "following_error"):
         value, usual = getattr(spec.can, name), getattr(CanSpec(), name)
         if value is not None and value != usual and value > LOOSE * longest:
             cure = _thousandth(value, "tolerances are in m")
             problem = Phrase("{value:g} m are more than half of the move; {cure}", value=value, cure=cure)
-            yield Doubt(place=f"can.{name}", problem=problem)
+            yield Implausibility(place=f"can.{name}", problem=problem)
 
 
 def _scale(spec: Spec) -> Scale:

@@ -93,8 +93,8 @@ class WatchedAxis:
             return "no answer"
         if self.state is State.UNKNOWN:
             return f"statusword {self.statusword:04X}h, which is no state of CiA 402"
-        doubt = "" if self.state in MOVING else ", but not seen to stand"
-        return f"{self.state.words!r}{doubt}"
+        unproved = "" if self.state in MOVING else ", but not seen to stand"
+        return f"{self.state.words!r}{unproved}"
 
 
 class Watch:
