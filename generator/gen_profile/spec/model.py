@@ -18,6 +18,7 @@ from gen_profile.plants.machine_file import MachineFile, plant_of_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.can import CanSpec
+from gen_profile.spec.disturbances import PathSpec, WindSpec
 from gen_profile.spec.structure import Checked, kinds_of
 from gen_profile.spec.values import (
     NONE,
@@ -255,44 +256,6 @@ class ExternalFmu(Checked, table="check"):
 
 
 @attrs.frozen(kw_only=True)
-class PathSpec(Checked, table="check.path"):
-    """The way of a setpoint from the artefact to the axis.
-
-    Attributes
-    ----------
-    quantum : float
-        Spacing in m (or rad) of the positions that the drive can be asked for; 0 where it takes any.
-    between : str
-        What the drive does until the next setpoint: interpolate linearly (60C2h), or hold the last one.
-    lag : (float, float) or None
-        Range of the drives' time constant in s, which need not be the one that the setpoints lead.
-    latency : float
-        s by which all setpoints come late.
-    jitter : float
-        s by which each of them comes earlier or later at most.
-    lost : float
-        Share of them that never comes; the axis stays where it is until the next one.
-    """
-
-    quantum: NotNegative = 0.0
-    between: Literal["linear", "hold"] = "linear"
-    lag: Annotated[tuple[NotNegative, NotNegative], Rising("times in s")] | None = None
-    latency: Annotated[float, Bounds(least=0.0, most=10.0)] = 0.0
-    jitter: Annotated[float, Bounds(least=0.0, most=1.0)] = 0.0
-    lost: Annotated[float, Bounds(least=0.0, most=0.5)] = 0.0
-
-    @property
-    def faulty(self) -> bool:
-        """Whether setpoints come at other times than they should, or not at all."""
-        return self.latency > 0.0 or self.jitter > 0.0 or self.lost > 0.0
-
-    @property
-    def bends(self) -> bool:
-        """Whether the drive makes something else of setpoints that come in time than straight lines."""
-        return self.quantum > 0.0 or self.between != "linear" or self.lag is not None
-
-
-@attrs.frozen(kw_only=True)
 class CheckSpec(Checked, table="check"):
     """What may remain of the sway, on which machines, and who is to judge.
 
@@ -309,6 +272,8 @@ class CheckSpec(Checked, table="check"):
     seed : int
         Of what is random.
     path : PathSpec
+    wind : WindSpec
+        Whose deflection is reported and not judged.
     foreign : ExternalFmu or None
         Somebody else's FMU that judges in place of ours.
     """
@@ -318,7 +283,8 @@ class CheckSpec(Checked, table="check"):
     spans: Annotated[Mapping[ParameterSpan, Span], example("c2 = [0.0, 0.02]")] = NONE
     samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
     seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
-    path: PathSpec = PathSpec()
+    path: PathSpec = attrs.field(factory=PathSpec)
+    wind: WindSpec = attrs.field(factory=WindSpec)
     foreign: ExternalFmu | None = None
     default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
 
@@ -454,7 +420,9 @@ class Spec(Summarised, Checked):
         if self.cost.sway_scale is None:
             document["cost"]["sway_scale"] = "auto"
         del document["check"]["default"]
-        if self.planner == PlannerSpec():  # a spec without hashes as it did
+        if self.check.wind == WindSpec():  # a spec without hashes as it did
+            del document["check"]["wind"]
+        if self.planner == PlannerSpec():
             del document["planner"]
         elif not self.planner.live_rate:
             del document["planner"]["live_rate"]

@@ -173,6 +173,14 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
                     yield where, Phrase(template, end=end, bounds=bounds)
 
 
+def _wind(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse a wind where no energy is known that it works against."""
+    if spec.check.wind.force > 0.0 and not plant.bodies:
+        yield "check.wind.force", "the machine states no bodies (mechanics), so its deflection is not known"
+    if spec.check.wind.force > 0.0 and spec.check.foreign is not None:
+        yield "check.wind.force", "a foreign FMU (check.fmu) has no input for wind; remove one of them"
+
+
 def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Hold the ranges of the check to what can be tried, and to whoever tries it."""
     del plant
@@ -239,4 +247,4 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
-OF_MACHINE = (_at_start, _at_end, _shares, _checked_machines, _axis_limits, _units, _all_axes, _live)
+OF_MACHINE = (_at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes, _live)
