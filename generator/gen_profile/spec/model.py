@@ -18,6 +18,7 @@ from gen_profile.plants.machine_file import MachineFile, plant_of_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.can import CanSpec
+from gen_profile.spec.planner import PlannerSpec
 from gen_profile.spec.structure import Checked, kinds_of
 from gen_profile.spec.values import (
     NONE,
@@ -48,8 +49,6 @@ DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
 
 ParameterSpan = Annotated[str, Named("parameter", of="span")]
-LiveParameter = Annotated[str, Named("parameter", of="live", reorder=False)]
-LiveRate = Annotated[str, Named("parameter", of="rate", reorder=False)]
 Span = Annotated[tuple[float, float], Rising()]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("NAME = 0.2")]
@@ -344,44 +343,6 @@ class ExportSpec(Checked, table="export"):
     ] = ("position", "velocity", "acceleration", "jerk")
 
 
-@attrs.frozen(kw_only=True)
-class PlannerSpec(Checked, table="planner"):
-    """What a planner block is told at run time, and how it brakes at once.
-
-    Attributes
-    ----------
-    live : mapping of str to (float, float)
-        Ranges of the machine's parameters, or places of its hoist, that the controller knows.
-    live_rate : mapping of str to float
-        How fast some of them may change on the way, each in its unit per second.
-    live_noise : mapping of str to float
-        By how much what the controller is told of some may be off from cycle to cycle, each in its unit.
-    events : bool
-        Whether the last events are outputs of the block, for an operator's screen.
-    zones : bool
-        Whether blocked and slow intervals of the travel are inputs of the block.
-    operations : int or None
-        Floating-point operations that the block may spend in a cycle; None takes 3000 for each millisecond.
-    sway_share : float
-        Share of `check.residual_sway` that a motion may leave on the machines of the stated errors, for being
-        quick; 0 plans motions that leave none to first order.
-    quick_stop : float or None
-        Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
-    quick_stop_jerk : float or None
-        m/s³; None takes four times the limit.
-    """
-
-    live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
-    live_rate: Annotated[Mapping[LiveRate, Positive], example("NAME = 0.1")] = NONE
-    live_noise: Annotated[Mapping[LiveRate, Positive], example("L1 = 0.003")] = NONE
-    events: bool = False
-    zones: bool = False
-    operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
-    sway_share: Annotated[float, Bounds(least=0.0, most=0.8)] = 0.5
-    quick_stop: Positive | None = None
-    quick_stop_jerk: Positive | None = None
-
-
 @attrs.frozen(kw_only=True, repr=False)
 class Spec(Summarised, Checked):
     """One motion task, complete: nothing downstream looks anything else up."""
@@ -398,7 +359,7 @@ class Spec(Summarised, Checked):
     axis: Mapping[AxisName, AxisSpec]
     export: ExportSpec = ExportSpec()
     can: CanSpec = attrs.field(factory=CanSpec)
-    planner: PlannerSpec = PlannerSpec()
+    planner: PlannerSpec = attrs.field(factory=PlannerSpec)
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""

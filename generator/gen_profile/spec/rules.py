@@ -238,5 +238,25 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 yield place(f"planner.{key}", name), problem, place("planner.live", name)
 
 
+def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold a sensor and what it is for to each other, and to the machine."""
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    if sensor is None or disturbance is None:
+        if sensor is not None or disturbance is not None:
+            missing, of = ("disturbance", "sensor") if disturbance is None else ("sensor", "disturbance")
+            yield f"planner.{missing}", Phrase("required by planner.{of}", of=of), f"planner.{of}"
+        return
+    known = [coordinate.name for coordinate in plant.unactuated]
+    if sensor.of not in known:
+        hint = suggestion(sensor.of, known)
+        yield "planner.sensor.of", Phrase("no coordinate that swings{hint}", hint=hint)
+    if not disturbance.swing:
+        yield "planner.disturbance.swing", "must name a load"
+    for name in ("live_rate", "zones"):
+        if getattr(spec.planner, name):
+            problem = Phrase("not together with planner.{name} so far; leave one out", name=name)
+            yield "planner.sensor", problem
+
+
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
-OF_MACHINE = (_at_start, _at_end, _shares, _checked_machines, _axis_limits, _units, _all_axes, _live)
+OF_MACHINE = (_at_start, _at_end, _shares, _checked_machines, _axis_limits, _units, _all_axes, _live, _sensor)
