@@ -48,8 +48,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants, axis_interface, axis_words
-from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
+from gen_profile_exporters.playback.structured_text import block_name, literal
 
 Array = NDArray[np.float64]
 

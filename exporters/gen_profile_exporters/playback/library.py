@@ -16,12 +16,11 @@ import attrs
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
-from gen_profile_exporters.block_source import BlockSource, BlockVariable
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
     block_name,
-    initialiser,
     plain,
     read_block,
     read_table,

@@ -338,6 +338,7 @@ class ExportSpec(Checked, table="export"):
 
     cycle_time: CycleTime = 0.001
     plc_layout: Literal["segments", "samples", "counts"] = "segments"
+    plc_tables: Literal["constants", "variables"] = "constants"
     csv_dialect: Literal["rfc4180", "excel-de", "sew", "kollmorgen", "lenze"] = "rfc4180"
     csv_columns: Annotated[
         tuple[Column, ...], Words('must be a list such as ["position", "velocity"], found {found}')
