@@ -29,7 +29,7 @@ from gen_profile_exporters.playback.layouts import LAYOUTS
 
 INTERFACE = 1  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
-LEAST_CAPACITY, MOST_CAPACITY = 1024, 1 << 17
+LEAST_CAPACITY, MOST_CAPACITY = 2048, 1 << 17
 PATIENCE = 30.0  # s that a client may be silent before another one may write
 REQUEST, REPLY, TABLE = "aRequest", "aReply", "aTable"
 
@@ -258,9 +258,7 @@ def _constants(source: BlockSource, texts: list[str], layout: str, axes: int) ->
     body = _SEGMENT.sub(r"cFirst[\1]", body)
     real = re.compile(rf"LREAL_TO_DINT\({_REAL}\)" if layout == "counts" else _REAL)
     body = real.sub(lambda found: f"{columns[int(found[1])]}[{found[2]}]", body)
-    return ordered(
-        attrs.evolve(source, variables=tuple(back), body=_TAKEN.sub(r"c\1", body)), names
-    )
+    return ordered(attrs.evolve(source, variables=tuple(back), body=_TAKEN.sub(r"c\1", body)), names)
 
 
 def _given_back(variable: BlockVariable, values: dict[str, list[str]]) -> BlockVariable:

@@ -1,0 +1,232 @@
+"""Putting a proved table into a controller: written to the idle buffer, read back, checked, switched to."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any, Literal
+
+import attrs
+
+from gen_profile.deployment.mailbox import (
+    IDLE,
+    IN_USE,
+    RIGHT,
+    UNCHECKED,
+    BlockStatus,
+    LinkLostError,
+    Mailbox,
+    differing,
+    require_same,
+)
+from gen_profile.deployment.table import BlockTable, table_hash
+from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.motion.profile import Array
+from gen_profile.progress import Progress, no_progress
+from gen_profile.verification.check import Judgement
+from gen_profile_exporters.playback.buffers import COLUMNS, INTERFACE, LAYOUT_NAMES
+
+CURE = "export the block with these settings and load it into the controller, or export the artefact for it"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Deployment:
+    """What was done.
+
+    Attributes
+    ----------
+    action : str
+        Whether the table was ``"deployed"``, ``"rolled back"`` to, or ``"in use already"``.
+    table : BlockTable
+    before, after : BlockStatus
+    held_sha256 : str
+        Of the values that were read from the buffer in use at the end.
+    judgement : Judgement
+        Of the values that were read back.
+    """
+
+    action: Literal["deployed", "rolled back", "in use already"]
+    table: BlockTable
+    before: BlockStatus
+    after: BlockStatus
+    held_sha256: str
+    judgement: Judgement
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "action": self.action,
+            "artefact": self.table.path.name,
+            **self.table.hashes,
+            "held_sha256": self.held_sha256,
+            "checksum": int(self.after.checksum),
+            "checksum_before": int(self.before.checksum),
+            "values": len(self.table.values),
+            "check": self.judgement.check.to_dict(),
+        }
+
+
+def deploy(
+    table: BlockTable, box: Mailbox, *, rollback: bool = False, progress: Progress = no_progress
+) -> Deployment:
+    """Have a controller use a table, once it is proved to hold it.
+
+    Parameters
+    ----------
+    table : BlockTable
+    box : Mailbox
+    rollback : bool
+        Whether to write nothing, since the idle buffer holds the table.
+    progress : callable
+
+    Raises
+    ------
+    ExportError
+        The controller's block cannot take it.
+    CheckFailed
+        What was read back leaves too much sway; nothing was switched.
+    DeploymentError
+    CosimulationError
+    """
+    try:
+        done = _deployed(table, box, rollback, progress)
+        _release(box)
+        return done
+    except (DeploymentError, CheckFailed):
+        _release(box)
+        raise
+    except LinkLostError as error:
+        raise DeploymentError(
+            f"The connection broke, and again when it was taken up ({error}); nothing was switched. Run this "
+            "again when the controller can be reached."
+        ) from error
+
+
+def _deployed(table: BlockTable, box: Mailbox, rollback: bool, progress: Progress) -> Deployment:
+    progress("comparing the block with the artefact")
+    before = box.status()
+    require_fit(table, before)
+    in_use = before.checksum == table.checksum and not _differs(table, box, IN_USE)
+    if not in_use and not rollback:
+        progress("writing the table")
+        box.write(table.values)
+    buffer = IN_USE if in_use else IDLE
+    progress("reading the table back")
+    if rollback and not in_use and _differs(table, box, IDLE):
+        raise DeploymentError(
+            f"The idle buffer does not hold {table.path}, so there is nothing to go back to; name the artefact "
+            "that was in use before, as deployments.json tells, or deploy it without --rollback."
+        )
+    held = box.read(buffer, len(table.values))
+    require_same(held, table.values)
+    judgement = table.check(held, progress)
+    if not judgement.check.passed:
+        raise CheckFailed(*judgement.check.reasons(), "Nothing was switched in the controller.")
+    if not in_use:
+        progress("switching")
+        require_same(box.read(IDLE, len(table.values)), table.values)
+        box.switch(table.checksum)
+    held, after = _confirmed(table, box, before, in_use=in_use)
+    action: Literal["deployed", "rolled back", "in use already"] = "rolled back" if rollback else "deployed"
+    return Deployment(
+        action="in use already" if in_use else action,
+        table=table,
+        before=before,
+        after=after,
+        held_sha256=table_hash(held),
+        judgement=judgement,
+    )
+
+
+def _confirmed(
+    table: BlockTable, box: Mailbox, before: BlockStatus, *, in_use: bool
+) -> tuple[Array, BlockStatus]:
+    """Read what is used now; go back to the former table where that is not what was proved."""
+    held, after = box.read(IN_USE, len(table.values)), box.status()
+    try:
+        _require_held(held, table, after)
+    except CheckFailed as error:
+        if in_use:
+            raise
+        box.switch(before.checksum)
+        raise DeploymentError(f"{error} The block uses the former table again.") from error
+    return held, after
+
+
+def _release(box: Mailbox) -> None:
+    with suppress(LinkLostError, DeploymentError):  # others may write in half a minute anyway
+        box.release()
+
+
+def verify(table: BlockTable, box: Mailbox) -> BlockStatus:
+    """Tell whether a controller uses a table, bit for bit, and finds its checksum right.
+
+    Raises
+    ------
+    CheckFailed
+        It does not.
+    ExportError
+        Its block cannot even take it.
+    DeploymentError
+    """
+    try:
+        status = box.status()
+        require_fit(table, status)
+        held = box.read(IN_USE, len(table.values))
+    except LinkLostError as error:
+        raise DeploymentError(f"The connection broke ({error}); run this again.") from error
+    _require_held(held, table, status)
+    return status
+
+
+def require_fit(table: BlockTable, status: BlockStatus) -> None:
+    """Refuse a block that is not of the table's kind.
+
+    Raises
+    ------
+    ExportError
+        With what is different.
+    """
+    layout = LAYOUT_NAMES[table.constant("cLayout")]
+    cycle = table.spec.export.cycle_time
+    found = LAYOUT_NAMES[status.layout] if 0 <= status.layout < len(LAYOUT_NAMES) else "unknown"
+    due = {
+        "version": (status.interface, INTERFACE),
+        "table's layout": (found, layout),
+        "number of axes": (status.axes, len(table.spec.axis_scales())),
+        "cycle time in s": (status.cycle_time, cycle),
+    }
+    for what, (there, here) in due.items():
+        if there != here:
+            raise ExportError(
+                f"The block in the controller has another {what}, {there} and not {here}; {CURE}."
+            )
+    if status.kind != table.constant("cKind"):
+        raise ExportError(
+            f"The block in the controller is for axes of other names, units or signs than {table.path.name}; "
+            f"{CURE}."
+        )
+    needed = len(table.values) + len(COLUMNS[layout])
+    if needed > status.capacity:
+        raise ExportError(
+            f"The buffers in the controller hold {status.capacity} values, and {table.path.name} has "
+            f"{len(table.values)}; load its own block into the controller, whose buffers are larger."
+        )
+
+
+def _differs(table: BlockTable, box: Mailbox, buffer: int) -> bool:
+    return bool(differing(box.read(buffer, len(table.values)), table.values))
+
+
+def _require_held(held: Array, table: BlockTable, status: BlockStatus) -> None:
+    places = differing(held, table.values)
+    if places:
+        raise CheckFailed(
+            f"The controller does not use {table.path}: {len(places)} of {len(held)} values differ, the first "
+            f"of them number {places[0]}. Deploy it, or find out what is in use (deployments.json)."
+        )
+    if status.checked != RIGHT:
+        words = "has not worked out" if status.checked == UNCHECKED else "finds another number for"
+        raise CheckFailed(
+            f"The controller holds {table.path}, but {words} its checksum, and so starts nothing; run --verify "
+            "again while the block stands still."
+        )
