@@ -1,9 +1,9 @@
-"""From Structured Text to C99: the subset of IEC 61131-3 that the planner block and playback blocks are written in.
+"""From Structured Text to C99: the subset of IEC 61131-3 that planner and playback blocks are written in.
 
-One function block per text: scalars of BOOL, INT (as wide as DINT here), DINT and LREAL and one-dimensional arrays of them, assignments,
-IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL. The C code needs no library
-but libm and allocates nothing; an instance is one structure. Compiled without contraction of products and
-sums, it computes bit for bit what the text says.
+One function block per text: scalars of BOOL, INT (as wide as DINT here), DINT and LREAL and one-dimensional
+arrays of them, assignments, IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL.
+The C code needs no library but libm and allocates nothing; an instance is one structure. Compiled without
+contraction of products and sums, it computes bit for bit what the text says.
 
 What the standard calls an error is either refused, as are types that do not fit and loops that write their
 own counter, or, where only the execution shows it, one of the `FAULTS` of checked C. There both sides of AND

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import re
 import zlib
+from itertools import chain
 from math import ceil
 from pathlib import Path
 
@@ -70,7 +71,7 @@ def is_buffered(source: BlockSource) -> bool:
 
 
 def kind(target: Target, layout: str) -> int:
-    """Number what two blocks must have in common for one to play the other's table: layout, axes, units."""
+    """Hash what two blocks must have in common for one to play the other's table: layout, axes, units."""
     axes = ", ".join(f"{axis.name} {axis.unit} {axis.factor!r}" for axis in target.axes)
     return zlib.crc32(f"playback {layout}: {axes}".encode()) >> 1
 
@@ -203,8 +204,7 @@ def _texts(found: dict[str, BlockVariable], columns: tuple[str, ...], axes: int)
     rows = [_split(found[name]) for name in columns]
     if "cFirst" in columns:  # of every axis alike
         rows[-1] = [text for text in rows[-1] for _ in range(axes)]
-    texts = [*scalars, *(text for axis in zip(*own, strict=True) for text in axis), *sum(rows, [])]
-    return [_as_real(text) for text in texts]
+    return [_as_real(text) for text in chain(scalars, *zip(*own, strict=True), *rows)]
 
 
 def _split(variable: BlockVariable) -> list[str]:

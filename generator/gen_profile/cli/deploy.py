@@ -114,8 +114,8 @@ def _words(artefact: Path, document: dict[str, Any]) -> str:
         told = f"deployed {entry['at']} by {entry['by']}" if entry else "no deployment there is recorded here"
         return f"{where} uses {artefact}, bit for bit; {told}."
     return (
-        f"{where}: {artefact} {document['action']}, {document['values']} values read back bit for bit, checked, "
-        f"checksum {document['checksum']} (before: {document['checksum_before']})."
+        f"{where}: {artefact} {document['action']}, {document['values']} values read back bit for bit and "
+        f"checked, checksum {document['checksum']} (before: {document['checksum_before']})."
     )
 
 

@@ -1,4 +1,4 @@
-"""Application certificates of OPC UA: one PEM file with a certificate and its key, made where there is none."""
+"""Application certificates of OPC UA: a PEM file of a certificate and its key, made where it is not there."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import hashlib
 import os
 import re
 import socket
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
 import attrs
+from asyncua.crypto import cert_gen
 from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import rsa
-from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from cryptography.hazmat.primitives import serialization
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.errors import DeploymentError, OutputError
 
-YEARS, BITS = 5, 2048
+YEARS = 5  # that a certificate is good for
 MOST = 1 << 16  # bytes of such a file
 _PARTS = re.compile(rb"-----BEGIN ([A-Z ]+)-----.*?-----END \1-----\n?", re.DOTALL)
 
@@ -52,7 +52,7 @@ def require_current(certificate: x509.Certificate, whose: str) -> None:
     begin, end = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     if not begin <= datetime.now(UTC) <= end:
         raise DeploymentError(
-            f"{whose} is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d} only; renew it, or set the clock right."
+            f"{whose} is good from {begin:%Y-%m-%d} to {end:%Y-%m-%d} only; renew it, or set the clock."
         )
 
 
@@ -77,8 +77,8 @@ def own_certificate(path: Path) -> ApplicationCertificate:
         uri = names.get_values_for_type(x509.UniformResourceIdentifier)[0]
     except (KeyError, ValueError, TypeError, IndexError, x509.ExtensionNotFound) as error:
         raise OutputError(
-            f"certificate {path}: is no PEM file with a certificate that names an application URI, and its key "
-            "without a password; name a file that is not there, and one is made."
+            f"certificate {path}: is no PEM file of a certificate that names an application URI, and of its "
+            "key without a password; name a file that is not there, and one is made."
         ) from error
     require_current(certificate, f"The certificate in {path}")
     return ApplicationCertificate(certificate=certificate, key=key, uri=uri)
@@ -86,37 +86,13 @@ def own_certificate(path: Path) -> ApplicationCertificate:
 
 def _made() -> bytes:
     """Make a certificate that an application signs itself (OPC 10000-6, 6.2.2)."""
-    host = socket.gethostname()
-    key = rsa.generate_private_key(public_exponent=65537, key_size=BITS)
-    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "gen-profile")])
-    now, identifier = datetime.now(UTC), x509.SubjectKeyIdentifier.from_public_key(key.public_key())
-    usage = dict.fromkeys(
-        ("digital_signature", "content_commitment", "key_encipherment", "data_encipherment", "key_cert_sign"),
-        True,
-    )
-    usage |= dict.fromkeys(("key_agreement", "crl_sign", "encipher_only", "decipher_only"), False)
+    host, key = socket.gethostname(), cert_gen.generate_private_key()
+    names = [x509.UniformResourceIdentifier(f"urn:{host}:gen-profile"), x509.DNSName(host)]
     uses = [ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH]
-    uri, dns = x509.UniformResourceIdentifier(f"urn:{host}:gen-profile"), x509.DNSName(host)
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - timedelta(hours=1))
-        .not_valid_after(now + timedelta(days=365 * YEARS))
-        .add_extension(x509.SubjectAlternativeName([uri, dns]), critical=False)
-        .add_extension(identifier, critical=False)
-        .add_extension(x509.AuthorityKeyIdentifier(identifier.digest, None, None), critical=False)
-        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
-        .add_extension(x509.KeyUsage(**usage), critical=True)
-        .add_extension(x509.ExtendedKeyUsage(uses), critical=False)
-        .sign(key, hashes.SHA256())
+    made: x509.Certificate = cert_gen.generate_self_signed_app_certificate(
+        key, "gen-profile", {}, names, uses, days=365 * YEARS
     )
-    secret = key.private_bytes(
-        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-    )
-    return certificate.public_bytes(serialization.Encoding.PEM) + secret
+    return made.public_bytes(serialization.Encoding.PEM) + bytes(cert_gen.dump_private_key_as_pem(key))
 
 
 def _write_private(path: Path, content: bytes) -> None:

@@ -113,7 +113,7 @@ def _deployed(table: BlockTable, box: Mailbox, rollback: bool, progress: Progres
     progress("reading the table back")
     if rollback and not in_use and _differs(table, box, IDLE):
         raise DeploymentError(
-            f"The idle buffer does not hold {table.path}, so there is nothing to go back to; name the artefact "
+            f"The idle buffer does not hold {table.path}, so there is nothing to go back to; name the file "
             "that was in use before, as deployments.json tells, or deploy it without --rollback."
         )
     held = box.read(buffer, len(table.values))
@@ -221,12 +221,12 @@ def _require_held(held: Array, table: BlockTable, status: BlockStatus) -> None:
     places = differing(held, table.values)
     if places:
         raise CheckFailed(
-            f"The controller does not use {table.path}: {len(places)} of {len(held)} values differ, the first "
-            f"of them number {places[0]}. Deploy it, or find out what is in use (deployments.json)."
+            f"The controller does not use {table.path}: {len(places)} of {len(held)} values differ, first "
+            f"number {places[0]}. Deploy it, or find out what is in use (deployments.json)."
         )
     if status.checked != RIGHT:
         words = "has not worked out" if status.checked == UNCHECKED else "finds another number for"
         raise CheckFailed(
-            f"The controller holds {table.path}, but {words} its checksum, and so starts nothing; run --verify "
-            "again while the block stands still."
+            f"The controller holds {table.path}, but {words} its checksum, and so starts nothing; run "
+            "--verify again while the block stands still."
         )

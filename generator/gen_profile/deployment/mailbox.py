@@ -20,8 +20,8 @@ ACCEPTED, HELD, MOVES, UNFIT = range(len(RESULTS))
 UNTRIED, TRIED, PASSED, REJECTED = range(len(TRIALS))
 UNCHECKED, RIGHT, WRONG = range(3)  # the checksum of the buffer in use
 REFUSALS = {
-    HELD: "Another deployment is under way, or broke off within the last 30 s; nothing was switched. Run this "
-    "one again when it is over.",
+    HELD: "Another deployment is under way, or broke off within the last 30 s; nothing was switched. Run "
+    "this again when it is over.",
     MOVES: "The block moves, waits to, or is trying another table; nothing was switched. Run this again when "
     "it stands still.",
     UNFIT: "The block finds another table in its idle buffer than was written there, as if something else "
@@ -39,7 +39,7 @@ class MailboxLink(Protocol):
     """A way to the two arrays of a block."""
 
     def write(self, request: Array) -> None:
-        """Write the whole of ``aRequest``; raises `LinkLostError`, or `DeploymentError` where it is refused."""
+        """Write the whole of ``aRequest``; raises `LinkLostError`, or `DeploymentError` if it is refused."""
 
     def read(self) -> Array:
         """Read the whole of ``aReply``; raises likewise."""
@@ -127,8 +127,8 @@ class Mailbox:
                 self._pause(PAUSE)
         except LinkLostError as error:
             raise DeploymentError(
-                f"The connection broke after the switch was asked for ({error}). The block uses either table, "
-                "each whole; --verify tells which one."
+                f"The connection broke after the switch was asked for ({error}). The block uses one of both "
+                "tables, whole; --verify tells which."
             ) from error
         if status.trial == TRIED:
             raise DeploymentError(
@@ -225,6 +225,6 @@ def require_same(found: Array, due: Array, place: int = 0) -> None:
     if (found == due.astype(np.float32)).all():
         words += ": something on the way rounds to REAL"
     raise DeploymentError(
-        f"{len(places)} of {len(due)} values were altered on the way ({words}); nothing was switched. Let the "
-        "controller show aRequest and aReply as arrays of LREAL, and run this again."
+        f"{len(places)} of {len(due)} values were altered on the way ({words}); nothing was switched. Let "
+        "the controller show aRequest and aReply as arrays of LREAL, and run this again."
     )
