@@ -46,10 +46,10 @@ COLUMNS = {
 RESULTS = ("cAccepted", "cHeld", "cMoves", "cUnfit")
 TRIALS = ("cUntried", "cTried", "cPassed", "cRejected")
 VARIABLES = {
-    "nBase": "DINT", "nIdle": "DINT", "nTable": "DINT", "nPlace": "DINT", "nCount": "DINT", "nResult": "DINT",
-    "nTrial": "DINT", "nQuiet": "DINT", "fHolder": "LREAL", "bAsked": "BOOL", "bSwitch": "BOOL",
-    "bTrial": "BOOL",
-}  # fmt: skip
+    "LREAL": ("fHolder",),
+    "DINT": ("nBase", "nIdle", "nTable", "nPlace", "nCount", "nResult", "nTrial", "nQuiet"),
+    "BOOL": ("bLoaded", "bAsked", "bSwitch", "bTrial"),
+}
 NOTE = """\
     Its numbers are variables, in two buffers, which gen-profile deploy writes through aRequest and reads
     through aReply; so the peaks above are those of the motion that it was exported with. A cold start brings
@@ -60,9 +60,10 @@ NOTE = """\
 _TEMPLATE = Path(__file__).with_name("buffers.st").read_text("ascii")
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _TAKEN = re.compile(rf"\bt({'|'.join((*SCALARS, *PER_AXIS))})\b")
-_COLUMN = re.compile(r"\b(cPower\d|cFirst|cPosition|cVelocity|cAcceleration)\[([^\[\]]*)\]")
-_REAL = rf"{TABLE}\[nTable \+ (\d) \* tRows \+ ([^\[\]]*)\]"
-_SEGMENT = re.compile(rf"LREAL_TO_DINT\({TABLE}\[nTable \+ 6 \* tRows \+ cAxes \* \(([^\[\]]*)\)\]\)")
+_COLUMN = re.compile(
+    r"(DINT_TO_LREAL\()?\b(cPower\d|cFirst|cPosition|cVelocity|cAcceleration)\[([^\[\]]*)\](?(1)\))"
+)
+_PLACE = re.compile(rf"(LREAL_TO_DINT\()?{TABLE}\[nTable \+ (\d) \* tRows \+ ([^\[\]]*)\](?(1)\))")
 
 
 def is_buffered(source: BlockSource) -> bool:
@@ -70,7 +71,7 @@ def is_buffered(source: BlockSource) -> bool:
     return any(variable.name == TABLE for variable in source.variables)
 
 
-def kind(target: Target, layout: str) -> int:
+def kind_of(target: Target, layout: str) -> int:
     """Hash what two blocks must have in common for one to play the other's table: layout, axes, units."""
     axes = ", ".join(f"{axis.name} {axis.unit} {axis.factor!r}" for axis in target.axes)
     return zlib.crc32(f"playback {layout}: {axes}".encode()) >> 1
@@ -107,7 +108,7 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
     constants = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)}
     constants |= {
         "cInterface": INTERFACE,
-        "cKind": kind(target, layout),
+        "cKind": kind_of(target, layout),
         "cLayout": LAYOUT_NAMES.index(layout),
         "cCapacity": capacity,
         "cOwn": len(SCALARS) + axes * len(PER_AXIS),
@@ -119,7 +120,11 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
         BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
         BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
         BlockVariable(section="VAR", name=TABLE, type=both, initial=initialiser([*texts, *empty])),
-        *(BlockVariable(section="VAR", name=name, type=type_) for name, type_ in VARIABLES.items()),
+        *(
+            BlockVariable(section="VAR", name=name, type=kind)
+            for kind, of in VARIABLES.items()
+            for name in of
+        ),
         *(
             BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(value))
             for name, value in constants.items()
@@ -227,18 +232,34 @@ def _from_buffer(body: str, layout: str) -> str:
     """Make the statements look their numbers up in the buffer in use."""
 
     def place(found: re.Match[str]) -> str:
-        column, index = COLUMNS[layout].index(found[1]), found[2]
-        if found[1] == "cFirst":
-            index = f"cAxes * ({index})"
-        text = f"{TABLE}[nTable + {column} * cRows + {index}]"
-        return f"LREAL_TO_DINT({text})" if found[1] == "cFirst" or layout == "counts" else text
+        name, index = found[2], found[3] if found[2] != "cFirst" else f"cAxes * ({found[3]})"
+        text = f"{TABLE}[nTable + {COLUMNS[layout].index(name)} * cRows + {index}]"
+        # one that is wanted as a real number need not fit DINT if it was altered
+        return f"LREAL_TO_DINT({text})" if _is_whole(name, layout) and not found[1] else text
 
     return _OWN.sub(r"t\1", _COLUMN.sub(place, body))
 
 
+def _to_constants(body: str, layout: str) -> str:
+    """Undo `_from_buffer`."""
+
+    def place(found: re.Match[str]) -> str:
+        name, index = COLUMNS[layout][int(found[2])], found[3]
+        if name == "cFirst":
+            index = index.removeprefix("cAxes * (").removesuffix(")")
+        text = f"{name}[{index}]"
+        return f"DINT_TO_LREAL({text})" if _is_whole(name, layout) and not found[1] else text
+
+    return _TAKEN.sub(r"c\1", _PLACE.sub(place, body))
+
+
+def _is_whole(column: str, layout: str) -> bool:
+    return column == "cFirst" or layout == "counts"
+
+
 def _constants(source: BlockSource, texts: list[str], layout: str, axes: int) -> BlockSource:
     """Undo all changes but the header's."""
-    columns, type_ = COLUMNS[layout], "DINT" if layout == "counts" else "LREAL"
+    columns = COLUMNS[layout]
     own = len(SCALARS) + axes * len(PER_AXIS)
     rows = (len(texts) - own) // len(columns)
     values = {name: [texts[number]] for number, name in enumerate(SCALARS)}
@@ -248,17 +269,14 @@ def _constants(source: BlockSource, texts: list[str], layout: str, axes: int) ->
         column = texts[own + number * rows : own + (number + 1) * rows]
         if name == "cFirst":
             column = column[::axes]
-        of = "DINT" if name == "cFirst" else type_
+        of = "DINT" if _is_whole(name, layout) else "LREAL"
         initial = initialiser([_as(of, text) for text in column])
         declared = f"ARRAY [0..{len(column) - 1}] OF {of}"
         back.append(BlockVariable(section="VAR CONSTANT", name=name, type=declared, initial=initial))
     names = variable_names(layout, axes)
     back = [one for one in back if one.name in names]
-    body = source.body.removeprefix(_prelude(layout, axes))
-    body = _SEGMENT.sub(r"cFirst[\1]", body)
-    real = re.compile(rf"LREAL_TO_DINT\({_REAL}\)" if layout == "counts" else _REAL)
-    body = real.sub(lambda found: f"{columns[int(found[1])]}[{found[2]}]", body)
-    return ordered(attrs.evolve(source, variables=tuple(back), body=_TAKEN.sub(r"c\1", body)), names)
+    body = _to_constants(source.body.removeprefix(_prelude(layout, axes)), layout)
+    return ordered(attrs.evolve(source, variables=tuple(back), body=body), names)
 
 
 def _given_back(variable: BlockVariable, values: dict[str, list[str]]) -> BlockVariable:
@@ -291,4 +309,5 @@ def _prelude(layout: str, axes: int) -> str:
         for number, name in enumerate(PER_AXIS)
     ]
     lines += ["FOR nAxis := 1 TO cAxes DO", *own, "END_FOR;"] if axes > 1 else own
-    return _TEMPLATE.replace("@columns", str(len(COLUMNS[layout]))).replace("@loads", "\n".join(lines))
+    loads = "\n".join(f"    {line}" for line in lines)
+    return _TEMPLATE.replace("@columns", str(len(COLUMNS[layout]))).replace("@loads", loads)

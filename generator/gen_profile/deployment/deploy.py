@@ -12,6 +12,7 @@ from gen_profile.deployment.mailbox import (
     IN_USE,
     RIGHT,
     UNCHECKED,
+    BlockRefusedError,
     BlockStatus,
     LinkLostError,
     Mailbox,
@@ -19,7 +20,7 @@ from gen_profile.deployment.mailbox import (
     require_same,
 )
 from gen_profile.deployment.table import BlockTable, table_hash
-from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.errors import CheckFailed, DeploymentError, ExportError, GenProfileError
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
 from gen_profile.verification.check import Judgement
@@ -88,45 +89,26 @@ def deploy(
     CosimulationError
     """
     try:
-        done = _deployed(table, box, rollback, progress)
+        before = box.status()
+        require_fit(table, before)
+        in_use = before.checksum == table.checksum and not _differs(table, box, IN_USE)
+        judgement = _proved(table, box, IN_USE if in_use else IDLE, rollback or in_use, progress)
+    except (DeploymentError, CheckFailed, LinkLostError) as error:
         _release(box)
-        return done
-    except (DeploymentError, CheckFailed):
-        _release(box)
+        raise _told(error, "Nothing was switched in the controller.") from error
+    try:
+        if not in_use:
+            progress("switching")
+            box.switch(table.checksum)
+        held, after = _confirmed(table, box, before, in_use=in_use)
+    except BlockRefusedError:
         raise
-    except LinkLostError as error:
-        raise DeploymentError(
-            f"The connection broke, and again when it was taken up ({error}); nothing was switched. Run this "
-            "again when the controller can be reached."
-        ) from error
-
-
-def _deployed(table: BlockTable, box: Mailbox, rollback: bool, progress: Progress) -> Deployment:
-    progress("comparing the block with the artefact")
-    before = box.status()
-    require_fit(table, before)
-    in_use = before.checksum == table.checksum and not _differs(table, box, IN_USE)
-    if not in_use and not rollback:
-        progress("writing the table")
-        box.write(table.values)
-    buffer = IN_USE if in_use else IDLE
-    progress("reading the table back")
-    if rollback and not in_use and _differs(table, box, IDLE):
-        raise DeploymentError(
-            f"The idle buffer does not hold {table.path}, so there is nothing to go back to; name the file "
-            "that was in use before, as deployments.json tells, or deploy it without --rollback."
-        )
-    held = box.read(buffer, len(table.values))
-    require_same(held, table.values)
-    judgement = table.check(held, progress)
-    if not judgement.check.passed:
-        raise CheckFailed(*judgement.check.reasons(), "Nothing was switched in the controller.")
-    if not in_use:
-        progress("switching")
-        require_same(box.read(IDLE, len(table.values)), table.values)
-        box.switch(table.checksum)
-    held, after = _confirmed(table, box, before, in_use=in_use)
-    action: Literal["deployed", "rolled back", "in use already"] = "rolled back" if rollback else "deployed"
+    except (DeploymentError, LinkLostError) as error:
+        words = "The switch was asked for already; --verify tells which of the two tables is used, whole."
+        raise _told(error, words) from error
+    finally:
+        _release(box)
+    action: Literal["deployed", "rolled back"] = "rolled back" if rollback else "deployed"
     return Deployment(
         action="in use already" if in_use else action,
         table=table,
@@ -135,6 +117,36 @@ def _deployed(table: BlockTable, box: Mailbox, rollback: bool, progress: Progres
         held_sha256=table_hash(held),
         judgement=judgement,
     )
+
+
+def _proved(table: BlockTable, box: Mailbox, buffer: int, held: bool, progress: Progress) -> Judgement:
+    """Write a table to a buffer if it is not held there, read it back twice, and check it in between."""
+    if not held:
+        progress("writing the table")
+        box.write(table.values)
+    elif _differs(table, box, buffer):
+        raise DeploymentError(
+            f"The idle buffer does not hold {table.path}, so there is nothing to go back to; name the file "
+            "that was in use before, as deployments.json tells, or deploy it without --rollback."
+        )
+    progress("reading the table back")
+    found = box.read(buffer, len(table.values))
+    require_same(found, table.values)
+    judgement = table.check(found, progress)
+    if not judgement.check.passed:
+        raise CheckFailed(*judgement.check.reasons())
+    require_same(box.read(buffer, len(table.values)), table.values)
+    return judgement
+
+
+def _told(error: Exception, words: str) -> GenProfileError:
+    """Say more of an error."""
+    match error:
+        case CheckFailed():
+            return CheckFailed(*error.sentences, words)
+        case DeploymentError():
+            return DeploymentError(*error.sentences, words)
+    return DeploymentError(f"The connection broke ({error}), and could not be taken up again.", words)
 
 
 def _confirmed(
@@ -148,7 +160,7 @@ def _confirmed(
         if in_use:
             raise
         box.switch(before.checksum)
-        raise DeploymentError(f"{error} The block uses the former table again.") from error
+        raise BlockRefusedError(*error.sentences, "The block uses the former table again.") from error
     return held, after
 
 

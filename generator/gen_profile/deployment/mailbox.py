@@ -20,12 +20,10 @@ ACCEPTED, HELD, MOVES, UNFIT = range(len(RESULTS))
 UNTRIED, TRIED, PASSED, REJECTED = range(len(TRIALS))
 UNCHECKED, RIGHT, WRONG = range(3)  # the checksum of the buffer in use
 REFUSALS = {
-    HELD: "Another deployment is under way, or broke off within the last 30 s; nothing was switched. Run "
-    "this again when it is over.",
-    MOVES: "The block moves, waits to, or is trying another table; nothing was switched. Run this again when "
-    "it stands still.",
+    HELD: "Another deployment is under way, or broke off within the last 30 s; run this again after it.",
+    MOVES: "The block moves, waits to, or is trying another table; run this again when it stands still.",
     UNFIT: "The block finds another table in its idle buffer than was written there, as if something else "
-    "wrote to it; nothing was switched. Find out what does, and run this again.",
+    "wrote to it; find out what does, and run this again.",
 }
 REOPENED, SENT, LOOKS = 3, 4, 200  # times that a connection, a request, and a reply to it are tried
 PAUSE = 0.005  # s between two looks for a reply
@@ -33,6 +31,10 @@ PAUSE = 0.005  # s between two looks for a reply
 
 class LinkLostError(Exception):
     """The connection to a controller broke."""
+
+
+class BlockRefusedError(DeploymentError):
+    """The block declined a request, and uses the table that it had."""
 
 
 class MailboxLink(Protocol):
@@ -115,28 +117,20 @@ class Mailbox:
 
         Raises
         ------
-        DeploymentError
+        BlockRefusedError
             The block moves or holds another table, or finds it wrong and uses the former one again.
+        DeploymentError
         """
-        try:
-            self._exchange(SWITCH, checksum=checksum)
-            for _ in range(100 * LOOKS):
-                status = self.status()
-                if status.trial != TRIED:
-                    break
-                self._pause(PAUSE)
-        except LinkLostError as error:
-            raise DeploymentError(
-                f"The connection broke after the switch was asked for ({error}). The block uses one of both "
-                "tables, whole; --verify tells which."
-            ) from error
+        self._exchange(SWITCH, checksum=checksum)
+        for _ in range(100 * LOOKS):
+            status = self.status()
+            if status.trial != TRIED:
+                break
+            self._pause(PAUSE)
         if status.trial == TRIED:
-            raise DeploymentError(
-                "The block has not worked out the checksum of the new table yet, as if its task did not run; "
-                "it starts nothing before. Look after the task, then --verify."
-            )
+            raise DeploymentError("The block does not work out the table's checksum; look after its task.")
         if status.checksum != checksum:
-            raise DeploymentError(
+            raise BlockRefusedError(
                 "The block found the new table's checksum wrong and uses the former table again: a value was "
                 "altered in the controller. Run this again; if that recurs, its memory is at fault."
             )
@@ -176,8 +170,8 @@ class Mailbox:
                     self._pause(PAUSE)
                     self._link.reopen()
         raise DeploymentError(
-            "The block does not answer, as if it were not called in any task, or another client wrote "
-            "to it all the time; nothing was switched. Look after the task, and run this again."
+            "The block does not answer, as if it were not called in any task, or another client wrote to it "
+            "all the time; look after the task, and run this again."
         )
 
     def _answered(self, request: Array) -> Array | None:
@@ -199,7 +193,7 @@ def _understood(reply: Array, count: int) -> tuple[BlockStatus, Array]:
     """Read a reply; raises DeploymentError where it refuses."""
     result, *rest = reply[1:13].tolist()
     if result in REFUSALS:
-        raise DeploymentError(REFUSALS[int(result)])
+        raise BlockRefusedError(REFUSALS[int(result)])
     names = [field.name for field in attrs.fields(BlockStatus)][1:]
     status = BlockStatus(result=int(result), **dict[str, Any](zip(names, rest, strict=True)))
     return status, reply[FIRST : FIRST + count].copy()
@@ -225,6 +219,6 @@ def require_same(found: Array, due: Array, place: int = 0) -> None:
     if (found == due.astype(np.float32)).all():
         words += ": something on the way rounds to REAL"
     raise DeploymentError(
-        f"{len(places)} of {len(due)} values were altered on the way ({words}); nothing was switched. Let "
-        "the controller show aRequest and aReply as arrays of LREAL, and run this again."
+        f"{len(places)} of {len(due)} values were altered on the way ({words}); let the controller show "
+        "aRequest and aReply as arrays of LREAL, and run this again."
     )
