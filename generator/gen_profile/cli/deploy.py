@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import Count, PathType, output_options
+from gen_profile.cli.options import Count, InputFile, PathType, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
-from gen_profile.cli.signing import require_signature, sign_option, signed_by_option, signing_key
+from gen_profile.cli.signing import require_signature, signed_by_option, signing_key
 from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
 
@@ -55,7 +55,12 @@ def _access_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--verify", is_flag=True, help="Only tell whether the controller uses this table.")
 @click.option("--rollback", is_flag=True, help="Go back to this table, which the idle buffer holds.")
 @click.option("--by", default="", metavar="NAME", help="Who deploys, for the record; the user by default.")
-@sign_option
+@click.option(
+    "--sign",
+    "key_path",
+    type=InputFile(),
+    help="Sign the record with this secret key, made by minisign -GW.",
+)
 @signed_by_option
 @output_options
 def deploy(

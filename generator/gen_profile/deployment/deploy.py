@@ -11,7 +11,6 @@ from gen_profile.deployment.mailbox import (
     IDLE,
     IN_USE,
     RIGHT,
-    UNCHECKED,
     BlockRefusedError,
     BlockStatus,
     LinkLostError,
@@ -153,7 +152,7 @@ def _confirmed(
     table: BlockTable, box: Mailbox, before: BlockStatus, *, in_use: bool
 ) -> tuple[Array, BlockStatus]:
     """Read what is used now; go back to the former table where that is not what was proved."""
-    held, after = box.read(IN_USE, len(table.values)), box.status()
+    held, after = box.read(IN_USE, len(table.values)), box.settled()
     try:
         _require_held(held, table, after)
     except CheckFailed as error:
@@ -181,7 +180,7 @@ def verify(table: BlockTable, box: Mailbox) -> BlockStatus:
     DeploymentError
     """
     try:
-        status = box.status()
+        status = box.settled()
         require_fit(table, status)
         held = box.read(IN_USE, len(table.values))
     except LinkLostError as error:
@@ -237,8 +236,7 @@ def _require_held(held: Array, table: BlockTable, status: BlockStatus) -> None:
             f"number {places[0]}. Deploy it, or find out what is in use (deployments.json)."
         )
     if status.checked != RIGHT:
-        words = "has not worked out" if status.checked == UNCHECKED else "finds another number for"
         raise CheckFailed(
-            f"The controller holds {table.path}, but {words} its checksum, and so starts nothing; run "
-            "--verify again while the block stands still."
+            f"The controller holds {table.path}, but works out another checksum, and so starts nothing: its "
+            "memory is at fault, or was a moment ago; restart it."
         )

@@ -92,6 +92,21 @@ class Mailbox:
         """Ask how the block stands."""
         return self._exchange(READ)[0]
 
+    def settled(self) -> BlockStatus:
+        """Ask until the checksum of the buffer in use was worked out, a second or two.
+
+        Raises
+        ------
+        DeploymentError
+            It is not.
+        """
+        for _ in range(20 * LOOKS):
+            status = self.status()
+            if status.trial != TRIED and status.checked != UNCHECKED:
+                return status
+            self._pause(PAUSE)
+        raise DeploymentError("The block does not work out its table's checksum; look after its task.")
+
     def read(self, buffer: int, length: int) -> Array:
         """Read a buffer's first values."""
         parts = [
@@ -122,13 +137,7 @@ class Mailbox:
         DeploymentError
         """
         self._exchange(SWITCH, checksum=checksum)
-        for _ in range(100 * LOOKS):
-            status = self.status()
-            if status.trial != TRIED:
-                break
-            self._pause(PAUSE)
-        if status.trial == TRIED:
-            raise DeploymentError("The block does not work out the table's checksum; look after its task.")
+        status = self.settled()
         if status.checksum != checksum:
             raise BlockRefusedError(
                 "The block found the new table's checksum wrong and uses the former table again: a value was "

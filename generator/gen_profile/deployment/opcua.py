@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Coroutine
 from contextlib import suppress
 from pathlib import Path
@@ -23,7 +24,7 @@ from gen_profile_exporters.playback.buffers import LENGTH, REPLY, REQUEST
 Security = Literal["sign-and-encrypt", "sign", "none"]
 MODES = {"sign-and-encrypt": "SignAndEncrypt", "sign": "Sign", "none": "None_"}
 POLICIES = ("Aes256Sha256RsaPss", "Basic256Sha256", "Aes128Sha256RsaOaep")  # the strongest first
-TIMEOUT = 4.0  # s of a single service
+TIMEOUT, SESSION = 4.0, 600  # s of a single service, and that a server keeps a silent session
 DEPTH, MOST_NODES = 10, 50_000  # that are browsed
 REFUSED = (  # what the server has decided, and would decide again
     ua.uaerrors.BadUserAccessDenied,
@@ -39,6 +40,7 @@ REFUSED = (  # what the server has decided, and would decide again
 )
 
 Given = TypeVar("Given")
+logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
 
 @attrs.frozen(kw_only=True)
@@ -143,6 +145,7 @@ class OpcUaLink:
     async def _connect(self) -> None:
         access = self._access
         self._client = client = Client(access.url, timeout=TIMEOUT)
+        client.session_timeout = 1000 * SESSION
         await self._secure(client)
         if access.user:
             client.set_user(access.user)
@@ -169,6 +172,7 @@ class OpcUaLink:
                  if one.SecurityMode == mode}  # fmt: skip
         name = next((name for name in POLICIES if name in found), None)
         if access.certificate is None and "None" in found:
+            self.server = {"policy": "None", "certificate_sha256": "", "user": ""}
             return
         if access.certificate is None or name is None:
             modes = sorted({one.SecurityMode.name.rstrip("_") for one in offered})

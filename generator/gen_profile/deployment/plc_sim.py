@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +23,7 @@ from gen_profile.errors import OutputError
 LOOPBACK = "127.0.0.1"
 LONGEST = 0.02  # s between two looks at what clients wrote
 NAMESPACE = "urn:gen-profile:plc-sim"
+logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
 
 @attrs.frozen(kw_only=True)
@@ -95,8 +97,8 @@ class SimulatedController:
         server.set_security_policy(
             [getattr(ua.SecurityPolicyType, f"{kind}_SignAndEncrypt") for kind in kinds]
         )
-        if self._options.user:
-            server.set_identity_tokens([ua.UserNameIdentityToken])
+        user = ua.UserNameIdentityToken if self._options.user else ua.AnonymousIdentityToken
+        server.set_identity_tokens([user])
 
     async def _show(self, server: Any) -> None:
         """Add the instance, with its inputs, which clients write, and its outputs."""
