@@ -203,7 +203,7 @@ def odd():
 @pytest.mark.parametrize(
     ("instance", "words"),
     [
-        ("", r"shows several \(in silent/silent, .*; name one by --instance"),
+        ("", r"shows several \(in silent/silent, .*; name one as the instance"),
         ("silent", "The block does not answer, as if it were not called"),
         ("in rounding/rounding", "aRequest is array of Float there, not an array of Double"),
         ("short", "aRequest has 10 values there in place of 256"),

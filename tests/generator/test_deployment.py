@@ -222,7 +222,7 @@ def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tab
             assert found == "new" or "happen" in fault, case
             assert any(np.array_equal(one, tables["new"].values) for one in unchecked), case
         else:
-            assert found == "old" or "happen" in fault or (unchecked and "--verify" in error), case
+            assert found == "old" or "happen" in fault or (unchecked and "verify which" in error), case
         ends.append((done is not None, found))
     assert {(True, "new"), (False, "old")} <= set(ends)
 

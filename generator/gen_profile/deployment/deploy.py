@@ -29,7 +29,7 @@ CURE = "export the block with these settings and load it into the controller, or
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Deployment:
+class DeployedTable:
     """What was done.
 
     Attributes
@@ -67,7 +67,7 @@ class Deployment:
 
 def deploy(
     table: BlockTable, box: Mailbox, *, rollback: bool = False, progress: Progress = no_progress
-) -> Deployment:
+) -> DeployedTable:
     """Have a controller use a table, once it is proved to hold it.
 
     Parameters
@@ -103,12 +103,12 @@ def deploy(
     except BlockRefusedError:
         raise
     except (DeploymentError, LinkLostError) as error:
-        words = "The switch was asked for already; --verify tells which of the two tables is used, whole."
+        words = "The switch was asked for already; verify which of the two tables is used, whole."
         raise _told(error, words) from error
     finally:
         _release(box)
     action: Literal["deployed", "rolled back"] = "rolled back" if rollback else "deployed"
-    return Deployment(
+    return DeployedTable(
         action="in use already" if in_use else action,
         table=table,
         before=before,
@@ -126,7 +126,7 @@ def _proved(table: BlockTable, box: Mailbox, buffer: int, held: bool, progress: 
     elif _differs(table, box, buffer):
         raise DeploymentError(
             f"The idle buffer does not hold {table.path}, so there is nothing to go back to; name the file "
-            "that was in use before, as deployments.json tells, or deploy it without --rollback."
+            "that was in use before, as deployments.json tells, or deploy it without rollback."
         )
     progress("reading the table back")
     found = box.read(buffer, len(table.values))

@@ -17,7 +17,7 @@ from asyncua.crypto.uacrypto import CertProperties, x509_from_der
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate, require_current
 from gen_profile.deployment.mailbox import LinkLostError
-from gen_profile.errors import DeploymentError, SpecError
+from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.playback.buffers import LENGTH, REPLY, REQUEST
 
@@ -80,14 +80,11 @@ class OpcUaLink:
 
     Raises
     ------
-    SpecError
-        What was asked for is contradictory.
     DeploymentError
         The server cannot be reached or trusted, refuses, or shows no block, or several.
     """
 
     def __init__(self, access: OpcUaAccess) -> None:
-        _require_sound(access)
         self._access, self._runner = access, asyncio.Runner()
         self._client: Any = None
         self._request: Any = None
@@ -178,7 +175,7 @@ class OpcUaLink:
             modes = sorted({one.SecurityMode.name.rstrip("_") for one in offered})
             raise DeploymentError(
                 f"{access.url} offers no {access.security} with a policy that is still held to be safe, only "
-                f"{', '.join(modes)}; enable it there, or ask for what there is by --security."
+                f"{', '.join(modes)}; enable it there, or ask for the security that there is."
             )
         der = found[name].ServerCertificate
         shown = fingerprint(der)
@@ -186,7 +183,7 @@ class OpcUaLink:
             asked = "another one than was named" if access.fingerprint else "not known here yet"
             raise DeploymentError(
                 f"The certificate of {access.url} is {asked}: its SHA-256 is {shown}. Compare that with what "
-                f"the controller itself shows, then add --fingerprint {shown}."
+                f"the controller itself shows, and name it as the fingerprint."
             )
         require_current(x509_from_der(der), f"The certificate of {access.url}")
         own = own_certificate(access.certificate)
@@ -204,18 +201,6 @@ class OpcUaLink:
         if self._client is not None:
             client, self._client = self._client, None
             await client.disconnect()
-
-
-def _require_sound(access: OpcUaAccess) -> None:
-    if access.security != "none" and access.certificate is None:
-        raise SpecError(
-            "--certificate: name the PEM file of this computer's certificate and key (it is made where it is "
-            "not there), or ask for --security none where anybody may write to the controller."
-        )
-    if access.security == "none" and (access.certificate is not None or access.fingerprint):
-        raise SpecError("--certificate, --fingerprint: mean nothing with --security none; leave them out.")
-    if access.security != "sign-and-encrypt" and access.user:
-        raise SpecError(f"--user: its password would not be encrypted with --security {access.security}.")
 
 
 def _plain(text: str) -> str:
@@ -265,4 +250,4 @@ def _chosen(found: list[tuple[str, Any, Any]], instance: str, url: str) -> tuple
             'export.plc_tables = "variables", and let the server show these two arrays of its instance.'
         )
     words = f"none that ends in {instance}" if instance and not fitting else "several"
-    raise DeploymentError(f"{url} shows {words} ({paths}); name one by --instance.")
+    raise DeploymentError(f"{url} shows {words} ({paths}); name one as the instance.")

@@ -76,7 +76,7 @@ class SimulatedController:
         try:
             await server.start()
         except OSError as error:
-            raise OutputError(f"port {self._options.port}: {error.strerror}; name another --port.") from error
+            raise OutputError(f"port {self._options.port}: {error.strerror}; name another one.") from error
         try:
             ready(address, self.fingerprint)
             await self._play()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -73,8 +73,7 @@ def deploy(
     as_json, public_path = options.pop("as_json"), options.pop("public_path")
     if verify and (rollback or key_path is not None or by):
         raise SpecError("--verify: changes and records nothing; leave --rollback, --by and --sign out.")
-    if not url.startswith("opc.tcp://"):
-        raise SpecError(f"--to {url}: is no address such as opc.tcp://10.0.0.5:4840.")
+    _require_consistent(url, options)
     require_installed("OPC UA needs the package asyncua", "opcua", "asyncua", "cryptography")
     key = signing_key(key_path)
     require_signature(artefact, public_path)
@@ -110,6 +109,21 @@ def deploy(
 
         comment = f"deployments of {table.spec.name}, the latest at {document['at']}"
         click.echo(f"Signed by {key.identity}: {sign_file(artefact.parent / RECORD, comment, key)}", err=True)
+
+
+def _require_consistent(url: str, options: Mapping[str, Any]) -> None:
+    security, own = options["security"], options["certificate"]
+    if not url.startswith("opc.tcp://"):
+        raise SpecError(f"--to {url}: is no address such as opc.tcp://10.0.0.5:4840.")
+    if security == "none" and (own is not None or options["fingerprint"]):
+        raise SpecError("--certificate, --fingerprint: mean nothing with --security none; leave them out.")
+    if security != "none" and own is None:
+        raise SpecError(
+            "--certificate: name the PEM file of this computer's certificate and key (it is made where it is "
+            "not there), or ask for --security none where anybody may write to the controller."
+        )
+    if security != "sign-and-encrypt" and options["user"]:
+        raise SpecError(f"--user: its password would not be encrypted with --security {security}.")
 
 
 def _words(artefact: Path, document: dict[str, Any]) -> str:
