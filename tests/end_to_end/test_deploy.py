@@ -154,6 +154,8 @@ def test_the_controller_plays_what_was_deployed(files, plc, access):
         ({"--user": "me"}, 6, "The server refuses: "),
         ({"--to": "opc.tcp://127.0.0.1:9"}, 6, "cannot be reached"),
         ({"--to": "ads://1"}, 2, "is no address such as"),
+        ({"--to": "opc.tcp://127.0.0.1"}, 2, "is no address such as"),
+        ({"--to": "opc.tcp://me:secret@127.0.0.1:9"}, 2, "is no address such as"),
         ({"--instance": "Main/FB_2"}, 6, r"none that ends in Main/FB_2 \(FB_paper\)"),
         ({"--certificate": "manifest.json"}, 2, "is no PEM file of a certificate"),
     ],
@@ -167,6 +169,11 @@ def test_what_is_not_as_it_should_be_is_told_in_a_sentence(changes, code, words,
     found = run_here("deploy", "paper.st", *given)
     assert found.code == code, found.err
     assert re.search(words, found.err), found.err
+
+
+def test_a_wrapper_has_no_table(files, access):
+    found = run_here("deploy", files / "old" / "FB_paper_Axis.TcPOU", *access)
+    assert found.code == 5 and "is a library or a wrapper" in found.err
 
 
 @pytest.fixture(scope="module")

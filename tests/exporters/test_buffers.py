@@ -248,3 +248,14 @@ def test_the_compiled_block_issues_the_same():
         expected = [row["fposition"][axis] for row in due]
         assert issued[f"fPosition[{axis}]"][1:].tolist() == expected
     assert issued["nErrorId"].tolist() == [0.0] * 75 and issued["bDone"][-1] == 1.0
+
+
+@pytest.mark.parametrize("name", ["cCapacity", "cAxes", "cOwn", "cLayout", "aTable"])
+def test_hostile_sizes_are_refused_at_once(name):
+    """What memory is taken for follows from the target and the file's own length."""
+    text, count = re.subn(rf"({name} : DINT := )\d+", r"\g<1>999999999", text_of(TWO))
+    if name == "aTable":
+        text, count = re.subn(r"(aTable : [^:]*:= \[\s*)[\d.]+", r"\g<1>1.0E+30", text)
+    assert count == 1
+    with pytest.raises(ExportError):
+        structured_text.read_block(text, goal_of(TWO))

@@ -95,7 +95,7 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
     """
     found = {variable.name: variable for variable in source.variables}
     layout = _layout(found)
-    columns, axes = COLUMNS[layout], int(found["cAxes"].initial)
+    columns, axes = COLUMNS[layout], len(_split(found["cStart"]))
     texts = _texts(found, columns, axes)
     if capacity is None:
         capacity = max(LEAST_CAPACITY, 1 << (len(texts) + len(columns) - 1).bit_length())
@@ -181,10 +181,9 @@ def constant_source(source: BlockSource, target: Target) -> BlockSource:
     texts = buffer_texts(source)
     try:
         found = {variable.name: variable for variable in source.variables}
-        layout, axes = LAYOUT_NAMES[int(found["cLayout"].initial)], int(found["cAxes"].initial)
-        capacity = int(found["cCapacity"].initial)
-        back = _constants(source, texts, layout, axes)
-        again = buffered(back, target, capacity)
+        layout = LAYOUT_NAMES[int(found["cLayout"].initial)]
+        back = _constants(source, texts, layout, len(target.axes))
+        again = buffered(back, target, len(found[TABLE].elements) // 2)
     except (KeyError, ValueError, IndexError, OverflowError, ZeroDivisionError) as error:
         raise ExportError("The block's buffers were altered; export it again.") from error
     if again.program() != source.program():

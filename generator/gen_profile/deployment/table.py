@@ -109,8 +109,10 @@ def read_table(path: Path) -> BlockTable:
         raise CheckFailed(fault)
     target = target_of(spec)
     source = container.unwrap(content, target)
-    if any(one.name in ("nProfile", "fTarget") for one in source.variables):
-        raise ExportError(f"{path}: only playback blocks of a single motion have a table to deploy.")
+    if any(one.name == "nProfile" or one.section == "VAR_IN_OUT" for one in source.variables):
+        raise ExportError(
+            f"{path}: is a library or a wrapper; name the file of the playback block of a single motion."
+        )
     motion = container.replay(content, target)
     if not is_buffered(source):
         source = buffered(source, target)

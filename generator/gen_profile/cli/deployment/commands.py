@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,8 @@ from gen_profile.plugins import require_installed
 if TYPE_CHECKING:
     from pathlib import Path
 
+_URL = re.compile(r"opc\.tcp://[^\s/@]+:(\d{1,5})(/\S*)?", re.ASCII)
+MOST_PORT = 65535
 PASSWORD = "GEN_PROFILE_PASSWORD"  # of the environment: command lines are seen by all
 
 
@@ -113,7 +116,8 @@ def deploy(
 
 def _require_consistent(url: str, options: Mapping[str, Any]) -> None:
     security, own = options["security"], options["certificate"]
-    if not url.startswith("opc.tcp://"):
+    found = _URL.fullmatch(url)
+    if found is None or int(found[1]) > MOST_PORT:
         raise SpecError(f"--to {url}: is no address such as opc.tcp://10.0.0.5:4840.")
     if security == "none" and (own is not None or options["fingerprint"]):
         raise SpecError("--certificate, --fingerprint: mean nothing with --security none; leave them out.")
@@ -158,7 +162,7 @@ def _user() -> str:
 @cli.command("plc-sim", epilog="Example: gen-profile plc-sim deploy/bay-3.st")
 @click.argument("artefact", type=PathType())
 @click.option(
-    "--port", type=Count(1, 65535), default=4840, help="Port on the loopback interface; 4840 by default."
+    "--port", type=Count(1, MOST_PORT), default=4840, help="Port on the loopback interface; 4840 by default."
 )
 @_access_options
 @click.option("--no-security", is_flag=True, help="Let any program of this computer in.")
