@@ -11,6 +11,7 @@ from gen_profile.deployment.mailbox import (
     IDLE,
     IN_USE,
     RIGHT,
+    WRONG,
     BlockRefusedError,
     BlockStatus,
     LinkLostError,
@@ -19,13 +20,16 @@ from gen_profile.deployment.mailbox import (
     require_same,
 )
 from gen_profile.deployment.table import BlockTable, table_hash
-from gen_profile.errors import CheckFailed, DeploymentError, ExportError, GenProfileError
+from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
 from gen_profile.verification.check import Judgement
 from gen_profile_exporters.playback.buffers import COLUMNS, INTERFACE, LAYOUT_NAMES
 
 CURE = "export the block with these settings and load it into the controller, or export the artefact for it"
+
+FORMER = "The controller uses the table that it had."
+EITHER = "The switch was asked for already; verify which of the two tables is used, whole."
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -87,26 +91,26 @@ def deploy(
     DeploymentError
     CosimulationError
     """
+    told = FORMER
     try:
         before = box.status()
         require_fit(table, before)
-        in_use = before.checksum == table.checksum and not _differs(table, box, IN_USE)
+        same = before.checksum == table.checksum and before.checked != WRONG
+        in_use = same and not _differs(table, box, IN_USE)
         judgement = _proved(table, box, IN_USE if in_use else IDLE, rollback or in_use, progress)
-    except (DeploymentError, CheckFailed, LinkLostError) as error:
-        _release(box)
-        raise _told(error, "Nothing was switched in the controller.") from error
-    try:
         if not in_use:
             progress("switching")
+            told = EITHER
             box.switch(table.checksum)
         held, after = _confirmed(table, box, before, in_use=in_use)
-    except BlockRefusedError:
-        raise
-    except (DeploymentError, LinkLostError) as error:
-        words = "The switch was asked for already; verify which of the two tables is used, whole."
-        raise _told(error, words) from error
-    finally:
         _release(box)
+    except LinkLostError as error:
+        words = f"The connection broke ({error}), and could not be taken up again."
+        raise DeploymentError(words, told) from error
+    except (DeploymentError, CheckFailed) as error:
+        _release(box)
+        kind = CheckFailed if isinstance(error, CheckFailed) else DeploymentError
+        raise kind(*error.sentences, FORMER if isinstance(error, BlockRefusedError) else told) from error
     action: Literal["deployed", "rolled back"] = "rolled back" if rollback else "deployed"
     return DeployedTable(
         action="in use already" if in_use else action,
@@ -138,16 +142,6 @@ def _proved(table: BlockTable, box: Mailbox, buffer: int, held: bool, progress: 
     return judgement
 
 
-def _told(error: Exception, words: str) -> GenProfileError:
-    """Say more of an error."""
-    match error:
-        case CheckFailed():
-            return CheckFailed(*error.sentences, words)
-        case DeploymentError():
-            return DeploymentError(*error.sentences, words)
-    return DeploymentError(f"The connection broke ({error}), and could not be taken up again.", words)
-
-
 def _confirmed(
     table: BlockTable, box: Mailbox, before: BlockStatus, *, in_use: bool
 ) -> tuple[Array, BlockStatus]:
@@ -159,7 +153,7 @@ def _confirmed(
         if in_use:
             raise
         box.switch(before.checksum)
-        raise BlockRefusedError(*error.sentences, "The block uses the former table again.") from error
+        raise BlockRefusedError(*error.sentences) from error
     return held, after
 
 

@@ -140,8 +140,8 @@ class Mailbox:
         status = self.settled()
         if status.checksum != checksum:
             raise BlockRefusedError(
-                "The block found the new table's checksum wrong and uses the former table again: a value was "
-                "altered in the controller. Run this again; if that recurs, its memory is at fault."
+                "The block found the new table's checksum wrong: a value was altered in the controller. Run "
+                "this again; if that recurs, its memory is at fault."
             )
 
     def release(self) -> None:
