@@ -15,6 +15,7 @@ from gen_profile_exporters.playback import buffers, structured_text
 from gen_profile_exporters.playback.library import LibraryEntry, library_source
 from gen_profile_exporters.playback.table import tabulate
 from gen_profile_exporters.registry import containers, find_container
+from gen_profile_exporters.vendors import twincat
 
 CYCLE = 0.05
 ONE, OTHER, TWO = bang_bang(), bang_bang(0.6), quintic((0.1, 0.4), (1.2, -0.7), duration=0.5)
@@ -86,6 +87,13 @@ def test_every_format_carries_it(form, profile):
     assert values_of(container.unwrap(content, goal).text()) == values_of(text_of(profile, "counts"))
     expected = structured_text.read_block(text_of(profile, "counts"), goal)
     assert container.replay(content, goal).payload_hash() == expected.payload_hash()
+
+
+def test_a_wrapper_leaves_requests_to_the_block():
+    """They are reached in its instance, so that there is one block only to be found."""
+    block, wrapper = twincat.encode(ONE, goal_of(ONE))[:2]
+    assert b"aRequest" in block.content and b"aRequest" not in wrapper.content
+    assert b"aReply" in block.content and b"aReply" not in wrapper.content
 
 
 def test_it_takes_another_table_and_goes_back():

@@ -16,7 +16,7 @@ from gen_profile.designs.design import design
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 from gen_profile.spec.reading import preset_spec
 
-FAULTS = 300
+FAULTS = 150
 VARIABLES = ("export.plc_tables=variables", "export.cycle_time=0.02", "move.duration=3.0")
 
 
