@@ -1,6 +1,8 @@
 """Deployment by OPC UA, as a user does it, to simulated controllers and to servers that are odd."""
 
 import asyncio
+import base64
+import hashlib
 import json
 import re
 import socket
@@ -14,6 +16,7 @@ from asyncua import Server, ua
 from command_line import run_here
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
 from gen_profile.deployment.mailbox import Mailbox
@@ -122,6 +125,18 @@ def test_a_table_gets_into_a_controller_and_back(files, access):
     assert "rolled back" in run_here("deploy", old, *access, "--rollback").out
     assert "in use already" in run_here("deploy", old, *access).out
     assert [one["action"] for one in recorded(old.parent)] == ["rolled back", "in use already"]
+
+
+def test_the_record_is_signed(files, access, tmp_path):
+    key = Ed25519PrivateKey.generate()
+    secret = b"Ed\0\0B2" + bytes(48) + b"12345678" + key.private_bytes_raw() + bytes(64)
+    (tmp_path / "bay.key").write_text(f"untrusted comment: a key\n{base64.b64encode(secret).decode()}\n")
+    done = run_here("deploy", files / "old" / "paper.st", *access, "--sign", tmp_path / "bay.key")
+    assert done.code == 0 and "deployments.json.minisig" in done.err
+    record = (files / "old" / "deployments.json").read_bytes()
+    lines = (files / "old" / "deployments.json.minisig").read_text("utf-8").splitlines()
+    assert "deployments of paper, the latest at " in lines[2]
+    key.public_key().verify(base64.b64decode(lines[1])[10:], hashlib.blake2b(record).digest())
 
 
 def test_the_controller_plays_what_was_deployed(files, plc, access):

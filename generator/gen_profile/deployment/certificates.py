@@ -96,7 +96,7 @@ def _made() -> bytes:
 
 
 def _write_private(path: Path, content: bytes) -> None:
-    """Write a file that nobody else may read."""
+    """Write a file that no other user may read."""
     try:
         with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
             file.write(content)

@@ -91,7 +91,7 @@ def deploy(
     DeploymentError
     CosimulationError
     """
-    told = FORMER
+    in_force = FORMER
     try:
         before = box.status()
         require_fit(table, before)
@@ -100,17 +100,17 @@ def deploy(
         judgement = _proved(table, box, IN_USE if in_use else IDLE, rollback or in_use, progress)
         if not in_use:
             progress("switching")
-            told = EITHER
+            in_force = EITHER
             box.switch(table.checksum)
         held, after = _confirmed(table, box, before, in_use=in_use)
         _release(box)
     except LinkLostError as error:
         words = f"The connection broke ({error}), and could not be taken up again."
-        raise DeploymentError(words, told) from error
+        raise DeploymentError(words, in_force) from error
     except (DeploymentError, CheckFailed) as error:
         _release(box)
         kind = CheckFailed if isinstance(error, CheckFailed) else DeploymentError
-        raise kind(*error.sentences, FORMER if isinstance(error, BlockRefusedError) else told) from error
+        raise kind(*error.sentences, FORMER if isinstance(error, BlockRefusedError) else in_force) from error
     action: Literal["deployed", "rolled back"] = "rolled back" if rollback else "deployed"
     return DeployedTable(
         action="in use already" if in_use else action,

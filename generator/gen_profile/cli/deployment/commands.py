@@ -134,8 +134,10 @@ def _words(artefact: Path, document: dict[str, Any]) -> str:
     where = f"{document['controller']['url']} {document['controller']['instance']}"
     if document["action"] == "verified":
         entry = document["record"]
-        told = f"deployed {entry['at']} by {entry['by']}" if entry else "no deployment there is recorded here"
-        return f"{where} uses {artefact}, bit for bit; {told}."
+        since = (
+            f"deployed {entry['at']} by {entry['by']}" if entry else "no deployment there is recorded here"
+        )
+        return f"{where} uses {artefact}, bit for bit; {since}."
     return (
         f"{where}: {artefact} {document['action']}, {document['values']} values read back bit for bit and "
         f"checked, checksum {document['checksum']} (before: {document['checksum_before']})."
