@@ -226,10 +226,20 @@ def test_replay_refuses_altered_numbers_and_statements():
             structured_text.read_block(text[: number.start()] + new + text[number.end() :], goal)
 
 
-def test_it_is_for_its_own_axes_only():
-    renamed = target("slewing", cycle_time=CYCLE, export={"plc_tables": "variables"})
+@pytest.mark.parametrize(
+    ("layout", "names", "other"),
+    [
+        ("segments", ["slewing"], {}),
+        ("segments", ["bridge"], {"sign": -1}),
+        ("segments", ["bridge"], {"unit": "mm"}),
+        ("counts", ["bridge"], {"counts_per_si": 2e6}),
+    ],
+)
+def test_it_is_for_its_own_axes_only(layout, names, other):
+    export = {"plc_layout": layout, "plc_tables": "variables"}
+    elsewhere = target(*names, cycle_time=CYCLE, export=export, **other)
     with pytest.raises(ExportError, match="for other axes"):
-        structured_text.read_block(text_of(ONE), renamed)
+        structured_text.read_block(text_of(ONE, layout), elsewhere)
 
 
 def test_a_table_beyond_a_buffer_and_a_library_of_such_blocks_are_refused():

@@ -27,6 +27,7 @@ from gen_profile_exporters.block_source import BlockSource, BlockVariable, initi
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.block import variable_names
 from gen_profile_exporters.playback.layouts import LAYOUTS
+from gen_profile_exporters.playback.table import counted_axes
 
 INTERFACE = 1  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
@@ -73,7 +74,8 @@ def is_buffered(source: BlockSource) -> bool:
 
 def kind_of(target: Target, layout: str) -> int:
     """Hash what two blocks must have in common for one to play the other's table: layout, axes, units."""
-    axes = ", ".join(f"{axis.name} {axis.unit} {axis.factor!r}" for axis in target.axes)
+    counted = counted_axes(target, layout)
+    axes = ", ".join(f"{axis.name} {axis.unit} {axis.factor!r}" for axis in counted)
     return zlib.crc32(f"playback {layout}: {axes}".encode()) >> 1
 
 
