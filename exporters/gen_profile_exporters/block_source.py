@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import attrs
 
 from gen_profile.errors import ExportError
 
 SECTIONS = ("VAR_IN_OUT", "VAR_INPUT", "VAR_OUTPUT", "VAR", "VAR CONSTANT")
+VALUES_PER_LINE = 4  # of an array's initial values
 
 _HEADER = re.compile(r"\s*(\(\*.*?\*\)\s*)*", re.DOTALL)
 _NAME = re.compile(r"\s*FUNCTION_BLOCK\s+(\S+)\s", re.IGNORECASE)
@@ -122,6 +123,12 @@ def parse_function_block(text: str) -> BlockSource:
     return BlockSource(
         header=header[0] if header else "", name=name[1], variables=tuple(variables), body=_END.sub("", body)
     )
+
+
+def initialiser(texts: Sequence[str]) -> str:
+    """Write an array's initial values, a few in a line."""
+    rows = [", ".join(texts[k : k + VALUES_PER_LINE]) for k in range(0, len(texts), VALUES_PER_LINE)]
+    return "[\n        " + ",\n        ".join(rows) + "\n    ]"
 
 
 def ordered(source: BlockSource, names: Iterable[str]) -> BlockSource:

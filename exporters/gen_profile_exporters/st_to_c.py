@@ -1,9 +1,9 @@
-"""From Structured Text to C99: the subset of IEC 61131-3 that the planner block is written in.
+"""From Structured Text to C99: the subset of IEC 61131-3 that planner and playback blocks are written in.
 
-One function block per text: scalars of BOOL, DINT and LREAL and one-dimensional arrays of them, assignments,
-IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL. The C code needs no library
-but libm and allocates nothing; an instance is one structure. Compiled without contraction of products and
-sums, it computes bit for bit what the text says.
+One function block per text: scalars of BOOL, INT (as wide as DINT here), DINT and LREAL and one-dimensional
+arrays of them, assignments, IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL.
+The C code needs no library but libm and allocates nothing; an instance is one structure. Compiled without
+contraction of products and sums, it computes bit for bit what the text says.
 
 What the standard calls an error is either refused, as are types that do not fit and loops that write their
 own counter, or, where only the execution shows it, one of the `FAULTS` of checked C. There both sides of AND
@@ -62,7 +62,7 @@ _GRAMMAR = r"""
     variable: NAME ["[" expression "]"]
     SECTION.3: /VAR_INPUT\b|VAR_OUTPUT\b|VAR\b/i
     CONSTANT.3: /CONSTANT\b/i
-    TYPE.3: /BOOL\b|DINT\b|LREAL\b/i
+    TYPE.3: /BOOL\b|INT\b|DINT\b|LREAL\b/i
     TRUTH.3: /TRUE\b|FALSE\b/i
     FUNCTION.3: /ABS\b|SQRT\b|LREAL_TO_DINT\b|DINT_TO_LREAL\b/i
     OR.3: /OR\b/i
@@ -265,7 +265,8 @@ class _Translator(Transformer[Token, object]):
         if index is None:
             return _Code(owned, variable.type, line)
         self._require(index, "DINT", f"an index of {name}")
-        place = f"AT({index.text}, {variable.length})" if self._checked else index.text
+        text = f"{index.text} - {variable.lower}" if variable.lower else index.text
+        place = f"AT({text}, {variable.length})" if self._checked else text
         return _Code(f"{owned}[{place}]", variable.type, line, index.work)
 
     @staticmethod

@@ -14,6 +14,7 @@ from gen_profile.errors import ExportError
 NO_BLOCK = "The text is no function block that can be executed here"
 MOST_DINT = 2**31 - 1
 _TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
+_AS = {"INT": "DINT"}  # as wide here as what it is mixed with
 _LITERALS = {"REAL": "LREAL", "INTEGER": "DINT", "TRUTH": "BOOL"}
 _WORDS_OF_C = re.compile(
     "auto|bool|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|"
@@ -23,13 +24,17 @@ _WORDS_OF_C = re.compile(
 
 
 class StVariable(NamedTuple):
-    """A declaration: its section, name, type, length (0: a scalar) and initial values as C writes them."""
+    """A declaration: its section, name, type, length (0: a scalar) and initial values as C writes them.
+
+    `lower` is the index of an array's first element in the text; C counts from 0.
+    """
 
     section: str
     name: str
     type: str
     length: int
     initial: tuple[str, ...]
+    lower: int = 0
 
     @property
     def start(self) -> float:
@@ -67,17 +72,19 @@ def _section(tree: Any) -> Iterator[tuple[Token, StVariable]]:
     for declaration in rest[constant:]:
         name, type_, initial = declaration.children
         *bounds, scalar = map(str, type_.children)
-        if bounds and int(bounds[0]) != 0:
-            raise refused(name, f"{name} must begin with index 0")
-        length = int(bounds[1]) + 1 if bounds else 0
+        lower, upper = map(int, bounds or (0, -1))
+        if bounds and upper < lower:
+            raise refused(name, f"{name} has no elements")
+        length = upper - lower + 1
         literals = [] if initial is None else initial.children if initial.data == "listed" else [initial]
         whole = initial is None or (initial.data == "listed") == bool(bounds)
         if not whole or len(literals) not in {max(1, length), max(1, length) * constant}:
             raise refused(name, f"{name} has not as many initial values as it takes")
         if _WORDS_OF_C.fullmatch(name):
             raise refused(name, f"{name} is a word of C; name it differently")
-        values = tuple(_initial(name, scalar.upper(), *literal.children) for literal in literals)
-        yield name, StVariable(section, str(name), scalar.upper(), length, values)
+        kind = _AS.get(scalar.upper(), scalar.upper())
+        values = tuple(_initial(name, kind, *literal.children) for literal in literals)
+        yield name, StVariable(section, str(name), kind, length, values, lower)
 
 
 def _initial(name: Token, type_: str, sign: Token | None, value: Token) -> str:

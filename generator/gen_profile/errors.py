@@ -13,7 +13,8 @@
     ├── CosimulationError    4   the check itself could not be carried out
     ├── CertificateError     4   a certificate cannot be made, or does not hold
     ├── ExportError          5   the target cannot take the motion
-    └── StreamAborted        6   streaming was stopped
+    ├── StreamAborted        6   streaming was stopped
+    └── DeploymentError      6   a table did not get into a controller, which uses the one that it had
 
 A message is one or more whole sentences: what is wrong, where (a spec path such as ``limits.jerk``, or a
 file and line), and what to do about it. Why there is no motion stands in values, too: by reasons, each with
@@ -240,5 +241,11 @@ class ExportError(GenProfileError):
 
 class StreamAborted(GenProfileError):
     """A stream of setpoints was stopped before its end."""
+
+    exit_code = 6
+
+
+class DeploymentError(GenProfileError):
+    """A table did not get into a controller."""
 
     exit_code = 6

@@ -132,13 +132,18 @@ def _setpoints(
 def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
     """Play a block at full rate: positions of every cycle, or powers of the time since a segment began."""
     bare, several = re.sub(r"\(\*.*?\*\)", "", text, flags=re.S), len(axes)
+    variables: dict[str, list[float]] = {}
 
     def constant(name: str) -> list[float]:
+        if name in variables:
+            return variables[name]
         array_of = r"(?:ARRAY\s*\[[0-9.]+\]\s*OF\s*)?"
         (values,) = re.findall(rf"\b{name}\s*:\s*{array_of}[A-Z]+\s*:=\s*\[?([^\];]*)", bare)
         return [float(one) for one in values.split(",")]
 
     layout, factors = spec["export"]["plc_layout"], scales_of(spec, axes)
+    if "aTable" in bare:
+        variables = _buffer(constant("aTable"), several, layout)
     counted = [layout == "counts" or spec["axis"][name]["unit"] == "counts" for name in axes]
     if layout == "counts":
         factors = [spec["axis"][name]["sign"] * spec["axis"][name]["counts_per_metre"] for name in axes]
@@ -160,6 +165,18 @@ def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
         if len(rows) != int(last) + 1:
             raise ValueError("a table of another length")
     return _setpoints(cycle, list(zip(*rows, strict=True)), factors, counted)
+
+
+def _buffer(values: Sequence[float], axes: int, layout: str) -> dict[str, list[float]]:
+    """Name what stands in the first buffer of a block whose numbers are variables."""
+    names = [f"cPower{power}" for power in range(6)] if layout == "segments" else ["cPosition"]
+    rows, own = int(values[0]), 8 + 8 * axes
+    found = {
+        name: list(values[own + number * rows : own + (number + 1) * rows])
+        for number, name in enumerate([*names, "cFirst"])
+    }
+    found["cFirst"] = found["cFirst"][::axes]
+    return found | {"cLast": [values[3]], "cTarget": list(values[12:own:8])}
 
 
 def _horner(powers: Sequence[float], time: float) -> float:

@@ -186,11 +186,13 @@ def scenes(table, choices):
     return rows
 
 
+@pytest.mark.parametrize("tables", ["constants", "variables"])
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("unit", ["mm", "counts"])
-def test_every_variant_compiles(unit, layout, tmp_path):
+def test_every_variant_compiles(unit, layout, tables, tmp_path):
     for name, axes in (("bay", ("bridge", "trolley")), ("7 IF", ("y.1", "Y 1"))):
-        goal = target(*axes, unit=unit, sign=-1, name=name, export={"plc_layout": layout})
+        export = {"plc_layout": layout, "plc_tables": tables}
+        goal = target(*axes, unit=unit, sign=-1, name=name, export=export)
         compile_text(structured_text.block_text(MOVES["two"], goal), tmp_path)
 
 

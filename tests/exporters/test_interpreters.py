@@ -162,7 +162,7 @@ def test_both_refuse_declarations_that_do_not_fit(declaration):
     ("declaration", "words"),
     [
         ("VAR CONSTANT a : LREAL; END_VAR", "a has not as many initial values as it takes"),
-        ("VAR_OUTPUT a : ARRAY [1..2] OF LREAL; END_VAR", "a must begin with index 0"),
+        ("VAR_OUTPUT a : ARRAY [2..1] OF LREAL; END_VAR", "a has no elements"),
         ("VAR double : LREAL; END_VAR", "double is a word of C; name it differently"),
     ],
 )

@@ -15,6 +15,12 @@ VARIANTS = {
     "as it comes": [],
     "zones and events": ["planner.zones=true", "planner.events=true"],
     "a rope that changes": ["planner.live_rate={L1=0.1}", "planner.events=true"],
+    "a load that is measured": [
+        "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}",
+        'planner.sensor={quantity="angle", of="theta1", noise=0.002, delay=[0.0, 0.1]}',
+        "planner.disturbance={swing={payload=0.5}, settle=12.0}",
+        "planner.events=true",
+    ],
 }
 CODED = (
     "nState",
@@ -96,8 +102,13 @@ def test_each_part_has_a_heading_and_numbers_of_equations_that_the_documentation
 
 
 def test_every_code_of_an_event_is_one_that_is_said_in_words():
-    text = planner_block(preset_spec("bay-crane", VARIANTS["zones and events"])).text
-    numbers = {name: int(number) for name, number in re.findall(r"\b(c\w+) : DINT := (\d+);", text)}
+    texts = [
+        planner_block(preset_spec("bay-crane", VARIANTS[name])).text
+        for name in ("zones and events", "a load that is measured")
+    ]
+    numbers = {
+        name: int(number) for text in texts for name, number in re.findall(r"\b(c\w+) : DINT := (\d+);", text)
+    }
     kinds = {
         "cEventState": ("cDisabled", "cStanding", "cMoving", "cBraking"),
         "cEventCommand": ("cCommandNone", "cCommandPosition", "cCommandVelocity"),

@@ -49,13 +49,13 @@ def test_the_reason_names_load_machine_figure_limit_key_and_error():
     judged = check(finding("nominal", 0.0, 0.0), finding("L1 +20 %", 0.0, 0.00345), error_bound=2.5e-7)
     assert judged.reasons() == (
         "The payload sways by 3.45 mm after the move (L1 +20 %), and 2 mm are allowed "
-        "(check.residual_sway; numerical error up to 0.25 µm).",
+        "(check.residual_sway; integration error up to 0.25 µm).",
     )
 
 
 def test_a_large_error_is_told_without_powers_of_ten():
     (reason,) = check(finding("nominal", 1.0, 0.0), error_bound=0.0228).reasons()
-    assert "numerical error up to 23 mm" in reason
+    assert "integration error up to 23 mm" in reason
 
 
 def test_faults_fail_it_whatever_the_sway():

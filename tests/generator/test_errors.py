@@ -22,6 +22,7 @@ EXIT_CODES = {
     "CosimulationError": 4,
     "ExportError": 5,
     "StreamAborted": 6,
+    "DeploymentError": 6,
 }
 
 

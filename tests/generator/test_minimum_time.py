@@ -47,12 +47,12 @@ def shortest(frequencies, distances, guess, desensitized, **limits):
     ],
 )
 def test_of_the_papers_crane(limits, desensitized):
-    shortest_found = choice.minimum_time(
-        crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits))
-    ).duration
+    problem = crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits))
+    shortest_found = relaxation.refined(problem, choice.minimum_time(problem)).duration
     frequencies, _ = modes(CRANE.nominal())
     best = shortest(frequencies, [0.3], shortest_found, frequencies if desensitized else [], **limits)
-    assert 0.998 * best < shortest_found < 1.02 * best
+    # the linear programs' acceleration leaps less quickly than the motion's
+    assert 0.99 * best < shortest_found < 1.001 * best
 
 
 def test_a_travel_that_ends_where_the_move_does_takes_no_longer():

@@ -18,13 +18,12 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command, play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
 from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH, Numbering
 from gen_profile.proof.on_cluster import ProofRecipe, judge_part
 from gen_profile.proof.prove import prove, replay
-from gen_profile.proof.trace import trace
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 

@@ -11,10 +11,9 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.planner import Planner
-from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.prove import prove
-from gen_profile.proof.trace import trace
 from gen_profile.spec.reading import parse_spec
 
 HOISTED = ((0.0, 6.0), (2.0, 6.0), (27.0, 8.5), (32.0, 8.0))  # s and m: at 0.1 m/s

@@ -10,7 +10,7 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import least_worst_sway
 
 from gen_profile.motion.metrics import greatest
-from gen_profile.problem.parameter_box import Start, worst_places
+from gen_profile.problem.parameter_box import Start, start, worst_places
 from gen_profile.problem.problem import WorstCase, problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import solver as direct
@@ -191,3 +191,15 @@ def test_a_search_for_the_worst_places_looks_at_none_twice():
     places, tried = worst_places(shares, begun)
     assert places.tolist() == [[0.0]]
     assert len(looked_at) == len(set(looked_at)) < tried
+
+
+def test_a_maximum_along_a_ridge_on_an_edge_of_the_box_is_found_exactly():
+    """Of several ranges at their ends, and a few between: found 1.3 % too little."""
+
+    def ridge(places):
+        a, b, c, d = places.T
+        off = d - 0.05 - 0.2 * a - 0.3 * b
+        return (0.9 + 0.1 * a - 0.3 * b - 0.2 * c - 40.0 * off**2)[:, None]
+
+    places, _ = worst_places(ridge, start(lambda places: 8.0 * places, 4))
+    assert ridge(places)[0] > 0.9999

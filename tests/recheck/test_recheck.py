@@ -5,6 +5,7 @@ import json
 import shutil
 import subprocess
 import sys
+from functools import cache
 
 import forgeries
 import numpy as np
@@ -107,11 +108,18 @@ def test_equations_are_those_of_the_program(kind):
         assert [float(one) for one in ours] == pytest.approx([float(one.mid) for one in found], 1e-9, 1e-9)
 
 
+@cache
+def motion(preset):
+    return gp.plan(gp.preset_spec(preset, ["export.cycle_time=0.02"])).command
+
+
+@pytest.mark.parametrize("tables", ["constants", "variables"])
 @pytest.mark.parametrize("layout", ["segments", "samples", "counts"])
 @pytest.mark.parametrize("preset", ["single-pendulum-crane", "tower-crane", "paper"])
-def test_a_block_is_read_as_the_program_plays_it(preset, layout):
-    spec = gp.preset_spec(preset, ["export.cycle_time=0.02", f"export.plc_layout={layout}"])
-    profile, target = gp.plan(spec).command, target_of(spec)
+def test_a_block_is_read_as_the_program_plays_it(preset, layout, tables):
+    forms = [f"export.plc_layout={layout}", f"export.plc_tables={tables}"]
+    spec = gp.preset_spec(preset, ["export.cycle_time=0.02", *forms])
+    profile, target = motion(preset), target_of(spec)
     (file, *_) = find_exporter("plc").encode(profile, target)
     theirs = find_exporter("plc").replay(file.content, target)
     ours = read_setpoints(file.content, spec.to_dict(), list(spec.axis))

@@ -14,8 +14,7 @@ on the way, and likewise what is for zones and events where there are none.
   ``costs.st`` tells. ``modes.st`` finds modes and kernel; others plan a motion to a target, or a stop. A plan
   is a linear programme: the coefficients of the velocity's spline that go farthest within the limits on
   value, difference and second difference, so that the modes and their derivatives by frequency are at rest.
-  ``request.st`` begins one: which way is left, from which slot on, over how many. (One that takes longer than
-  the motion lasts comes too late; one over too few slots does not get there.) ``conditions.st`` writes its
+  ``request.st`` begins one: which way, from which slot on, over how many. ``conditions.st`` writes
   unknowns and conditions, ``plan.st`` takes the share that is needed and holds it against the limits.
 - ``programme.st`` solves it by a primal-dual interior-point method (Mehrotra 1992, with a fixed centring);
   the normal matrix has five diagonals, and the conditions enter by its Schur complement. Second derivatives
@@ -25,12 +24,11 @@ on the way, and likewise what is for zones and events where there are none.
   and its slope by the logarithm of the frequencies, ``slope'' = -matrix * (slope + 2 sway)``: what is unknown
   of them changes sway and slope alike along all that was driven, so it adds up where the slope is not known.
 - ``calming.st`` calms what sways since live parameters changed. With the left eigenvectors l of the matrix a
-  mode is l * sway; what it will be left with by the committed future is a sum over its coefficients, as of a
-  plan, and so is its slope. A pulse that ends where it begins and leaves the opposite of both takes them
-  away: of the kernel's shape, by the factors of the kernel's conditions.
-- ``variations.st``: machines whose frequencies differ from the nominal ones by shares of the stated
-  errors. What the committed future leaves on each is a state. ``slope_bounds.st`` bounds the slopes of a
-  plan such that past and plan together leave no more than plans may spend.
+  mode is l * sway; what the committed future leaves in it is a sum over its coefficients, as of a plan, and
+  so is its slope. A pulse of the kernel's shape that ends where it begins takes both away.
+- ``variations.st``: what the committed future leaves on machines of other frequencies is a state.
+  ``slope_bounds.st`` bounds what past and plan together leave.
+- ``sensor.st`` estimates what sways, and ``damping.st`` damps the slowest mode by pulses of another kernel.
 - ``events.st`` tells what is other than in the cycle before.
 - ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
   which slow zones are near.
@@ -48,8 +46,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile_exporters.block_source import initialiser
+from gen_profile_exporters.planner import sensor_constants as of_sensor
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants, axis_interface, axis_words
-from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
+from gen_profile_exporters.playback.structured_text import block_name, literal
 
 Array = NDArray[np.float64]
 
@@ -155,7 +155,8 @@ class PlannerConstants:
     model : (rows, terms) array
         Coefficients for the squared frequencies (of two, for their sum and product), for the decays, then
         with rates for the matrix of the linear machine in the loads' sway, row by row, or else for the
-        errors of the frequencies and the loads' sway by what is left in a mode, axis by axis.
+        errors of the frequencies and the loads' sway by what is left in a mode, axis by axis; for a sensor.
+    sensor : SensorConstants or None
     """
 
     name: str
@@ -182,6 +183,7 @@ class PlannerConstants:
     exponents: NDArray[np.int64]
     modes: int
     model: Array
+    sensor: of_sensor.SensorConstants | None = None
 
 
 def block_text(constants: PlannerConstants) -> str:
@@ -192,6 +194,8 @@ def block_text(constants: PlannerConstants) -> str:
         "events": constants.events,
         "ramped": not constants.rates,
         "varied": constants.stated_error > 0.0 and not constants.rates,
+        "measured": constants.sensor is not None,
+        "measured_varied": constants.sensor is not None and constants.stated_error > 0.0,
     }
     text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
     values = _values(constants)
@@ -273,6 +277,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "constants": _constants(c),
         **axis_words(c.axes),
         **axis_interface(c.axes),
+        **of_sensor.values(c.sensor),
         **{f"last_{name}": str(length - 1) for name, length in _lengths(c).items()},
     }
 
@@ -303,6 +308,7 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "back": modes * (len(VARIATIONS) + 1),
         "gain": axes * modes,
         "reach": axes * len(_reach_slots(c)),
+        **of_sensor.lengths(c.sensor, modes, c.cycle),
     }
 
 
@@ -314,6 +320,7 @@ def _constants(c: PlannerConstants) -> str:
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in _arrays(c).items()]
     exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
+    lines += of_sensor.other(c.sensor)
     before = np.cumsum(np.sign(c.second_order)) - 1.0
     lines.append(_array("cSecond", "DINT", [str(int(number)) for number in before]))
     lines.append(_array("cReachSlots", "DINT", [str(v) for v in _reach_slots(c)]))
@@ -358,6 +365,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cWayIterations": WAY_ITERATIONS,
         "cColumnWork": _column_work(c),
         "cReaches": len(_reach_slots(c)),
+        **of_sensor.whole(c.sensor, modes, c.cycle),
     }
 
 
@@ -403,7 +411,8 @@ def _longest_slot(c: PlannerConstants) -> int:
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 110 + 4 * c.modes * (4 * c.modes + 17)
-    return (120 + (following if c.rates else 0)) * len(c.axes) - 35
+    axes = (120 + (following if c.rates else 0)) * len(c.axes)
+    return axes - 35 + of_sensor.cycle_work(c.sensor, c.modes)
 
 
 def _longest_kernel(c: PlannerConstants) -> int:
@@ -458,6 +467,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cNearer": NEARER,
         "cAgainst": AGAINST,
         "cStep": STEP,
+        **of_sensor.real(c.sensor, c.cycle),
     }
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
+from gen_profile_exporters.playback.buffers import REPLY, REQUEST
 
 HEADER = """\
 (*
@@ -100,6 +101,7 @@ STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
 TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
 SETPOINTS = {"fPosition", "fVelocity", "fAcceleration", "nPosition"}  # what goes to them
+MAILBOX = {REQUEST, REPLY}  # reached from outside in the playback block itself
 STATES = {"bBusy", "bDone", "bAborted", "bError", "nErrorId"}  # outputs that depend on the axes, too
 
 
@@ -111,8 +113,8 @@ def axis_wrappers(block: BlockSource, axes: int, library: MotionLibrary) -> tupl
 
 def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> BlockSource:
     """Write the block around a playback block, with the same inputs and outputs but the axes' own."""
-    inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name != ACTUAL]
-    outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS]
+    inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name not in {ACTUAL, *MAILBOX}]
+    outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS | MAILBOX]
     several = axes > 1
     places = [{"n": f"{n}" * several, "i": f"[{n}]" * several} for n in range(1, axes + 1)]
     name = f"{block.name}_Axis"

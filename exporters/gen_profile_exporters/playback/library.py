@@ -16,12 +16,12 @@ import attrs
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
-from gen_profile_exporters.block_source import BlockSource, BlockVariable
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.playback.buffers import is_buffered
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
     block_name,
-    initialiser,
     plain,
     read_block,
     read_table,
@@ -96,6 +96,10 @@ def library_source(entries: Sequence[LibraryEntry], target: Target) -> BlockSour
         They differ in more than their motions, were altered, or are too much to compile.
     """
     sources = [entry.source for entry in entries]
+    if any(map(is_buffered, sources)):
+        raise ExportError(
+            'export.plc_tables: a library holds constants; sweep with export.plc_tables = "constants".'
+        )
     for number, source in enumerate(sources):
         if _common(source) != _common(sources[0]):
             raise ExportError(

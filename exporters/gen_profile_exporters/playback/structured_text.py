@@ -24,18 +24,18 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
-from gen_profile_exporters.block_source import BlockSource, parse_function_block
+from gen_profile_exporters.block_source import BlockSource, initialiser, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.playback import block as playback_block
 from gen_profile_exporters.playback.block import Token
+from gen_profile_exporters.playback.buffers import TABLE, buffered, constant_source, is_buffered
 from gen_profile_exporters.playback.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR
 from gen_profile_exporters.playback.table import PlaybackTable, counted_axes, tabulate
 from gen_profile_exporters.playback.table_checksum import checksum
 from gen_profile_exporters.setpoints import plausible_cycle_time
 
 START_TOLERANCE = 1e-3  # m (or rad), the default
-VALUES_PER_LINE = 4
 SEGMENT_COLUMNS = tuple(f"power{power}" for power in range(6))
 SAMPLE_COLUMNS = ("position", "velocity", "acceleration")
 ROUNDING = 1e-12  # relative, of an evaluated quintic
@@ -89,7 +89,10 @@ def block_text(profile: Profile, target: Target) -> str:
     """Write the block, see `encode`."""
     table = tabulate(profile, target)
     values = _table_values(table) | _values(table) | _header_values(table, target)
-    return playback_block.fill(values, table.layout, len(table.axes))
+    text = playback_block.fill(values, table.layout, len(table.axes))
+    if target.export.plc_tables == "constants":
+        return text
+    return buffered(parse_function_block(text), target).text()
 
 
 def read_block(text: str, target: Target) -> SampledProfile:
@@ -99,6 +102,8 @@ def read_block(text: str, target: Target) -> SampledProfile:
 
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
+    if TABLE in text and is_buffered(source := parse_function_block(text)):
+        text = constant_source(source, target).text()
     layout = playback_block.layout_of(text)
     tokens = playback_block.match(text, layout, len(target.axes))
     if not _NAME.fullmatch(tokens["block"].text):
@@ -339,12 +344,6 @@ def _literals(values: Array) -> str:
 
 def _whole_numbers(values: Array) -> str:
     return initialiser([str(int(value)) for value in values.tolist()])
-
-
-def initialiser(texts: Sequence[str]) -> str:
-    """Write an array's initial values, a few in a line."""
-    rows = [", ".join(texts[k : k + VALUES_PER_LINE]) for k in range(0, len(texts), VALUES_PER_LINE)]
-    return "[\n        " + ",\n        ".join(rows) + "\n    ]"
 
 
 def _array(token: Token) -> Array:

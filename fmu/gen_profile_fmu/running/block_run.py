@@ -50,6 +50,28 @@ class CalledBlock:
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class Measurement:
+    """What a block's sensor tells it of the plant, and how the air pushes the loads.
+
+    Attributes
+    ----------
+    quantity : str
+        Name of the plant's variable that is measured.
+    shows, valid : int
+        Places of the block's inputs that take it, and that say whether there is news.
+    cycles : (cycles, 5) array
+        Of each cycle that there may be: gain and offset of the sensor, how many cycles ago the value is of,
+        whether there is news, and by how much, in m, the block's first axis is moved unseen: to the loads,
+        which see accelerations alone, that is a force in proportion to their masses.
+    """
+
+    quantity: str
+    shows: int
+    valid: int
+    cycles: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class Script:
     """What a block is given.
 
@@ -67,6 +89,7 @@ class Script:
         Cycles after the last row within which the axes must stand.
     settle, watch : int
         Cycles of standing before sway counts as residual, and while it does.
+    measured : Measurement or None
     """
 
     cycle: float
@@ -76,6 +99,7 @@ class Script:
     longest: int
     settle: int
     watch: int
+    measured: Measurement | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -185,6 +209,11 @@ class _History(Structure):
         ("ratios", POINTER(c_double)),
         ("n_marks", c_size_t),
         ("marks", POINTER(c_long)),
+        ("n_measured", c_long),
+        ("measured", POINTER(c_double)),
+        ("quantity", c_uint),
+        *((name, c_size_t) for name in ("shows", "valid")),
+        ("shown", POINTER(c_double)),
     ]
 
 
@@ -270,6 +299,7 @@ class BlockFollower:
         }
         size = ctypes.sizeof(block.memory)
         copies = np.empty((len(marks), size), dtype=np.uint8)
+        shown = np.zeros(0 if script.measured is None else len(script.measured.cycles))
         found = _Found(
             **{name: _doubles(array) for name, array in kept.items() if array.size},
             copies=copies.ctypes.data,
@@ -279,7 +309,7 @@ class BlockFollower:
         self._loop(
             byref(self._fmu),
             byref(_called(block, script)),
-            byref(self._history(script, values, led, hoists, marks)),
+            byref(self._history(script, values, led, hoists, marks=marks, shown=shown)),
             _doubles(room),
             byref(found),
         )
@@ -303,7 +333,9 @@ class BlockFollower:
         values: Mapping[str, float],
         led: Sequence[int],
         hoists: Sequence[Hoist],
+        *,
         marks: Sequence[int],
+        shown: Array,
     ) -> _History:
         start_cycles = (c_long * len(script.start_cycles))(*script.start_cycles)
         setpoints = [values[name] for name in self._setpoints]
@@ -331,7 +363,20 @@ class BlockFollower:
             ratios=(c_double * len(hoists))(*(hoist.ratio for hoist in hoists)),
             n_marks=len(marks),
             marks=(c_long * len(marks))(*marks),
+            **self._measured(script.measured, shown),
         )
+
+    def _measured(self, measured: Measurement | None, shown: Array) -> dict[str, Any]:
+        if measured is None:
+            return {"n_measured": 0}
+        return {
+            "n_measured": len(measured.cycles),
+            "measured": _doubles(measured.cycles),
+            "quantity": self._numbers([measured.quantity])[0],
+            "shows": measured.shows,
+            "valid": measured.valid,
+            "shown": _doubles(shown),
+        }
 
     def _numbers(self, names: Mapping[str, float] | Sequence[str]) -> Any:
         unknown = [name for name in names if variable_name(name) not in self._references]

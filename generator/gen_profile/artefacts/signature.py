@@ -85,11 +85,14 @@ def public_key(path: Path) -> Key:
 
 def sign_manifest(folder: Path, key: Key) -> Path:
     """Write the signature of a folder's manifest beside it, and give its path."""
-    content, secret = (
-        read_artefact(folder / FILENAME, DOCUMENT),
-        Ed25519PrivateKey.from_private_bytes(key.content),
-    )
-    comment = f"manifest of {parse_manifest(content, FILENAME).name}"
+    path = folder / FILENAME
+    name = parse_manifest(read_artefact(path, DOCUMENT), FILENAME).name
+    return sign_file(path, f"manifest of {name}", key)
+
+
+def sign_file(path: Path, comment: str, key: Key) -> Path:
+    """Write a file's signature beside it, with a trusted comment, and give its path."""
+    content, secret = read_artefact(path, DOCUMENT), Ed25519PrivateKey.from_private_bytes(key.content)
     signature = secret.sign(_hash(content))
     lines = (
         f"untrusted comment: signature by gen-profile, key {key.identity}",
@@ -97,9 +100,9 @@ def sign_manifest(folder: Path, key: Key) -> Path:
         f"trusted comment: {comment}",
         base64.b64encode(secret.sign(signature + comment.encode())).decode(),
     )
-    path = folder / SIGNATURE
-    deliver(path, ("\n".join(lines) + "\n").encode())
-    return path
+    beside = path.with_name(f"{path.name}.minisig")
+    deliver(beside, ("\n".join(lines) + "\n").encode())
+    return beside
 
 
 def require_signed(artefact: Path, key: Key) -> None:

@@ -13,6 +13,7 @@ from gen_profile.evaluation.phrases import machine, place_unit
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES
 from gen_profile.evaluation.simulation import Response
 from gen_profile.evaluation.spectrum import DECADES, natural_frequencies, spectrum
+from gen_profile.evaluation.static_deflection import StaticDeflection, in_wind
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.phrase import Phrase
@@ -26,6 +27,7 @@ ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), 
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
 TIME = "time (s)"
 FOLLOWED = Style(colour=PALETTE[1], dash="dash")
+WINDY = Style(colour=PALETTE[-1], dash="dot")
 
 
 @attrs.frozen(kw_only=True)
@@ -117,6 +119,9 @@ def sway_figure(
     responses = evaluation.swing.at(times)
     left_out = len(evaluation.machines) - len(shown)
     more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""
+    wind = in_wind(spec, evaluation.machines)
+    more += "" if wind is None else " Dotted lines: how far the wind holds the loads aside, on top of that."
+    end = float(times[-1])
     return Figure(
         caption=f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}",
         panels=[
@@ -129,8 +134,9 @@ def sway_figure(
                         name=one.name, x=times, y=1e3 * responses[one.index].sway[:, number], style=one.style
                     )
                     for one in shown
-                ],
-                levels=sway_levels(spec, load, arrival, float(times[-1])),
+                ]
+                + wind_lines(wind, load, arrival, end),
+                levels=sway_levels(spec, load, arrival, end),
                 bands=[Band(low=arrival, high=arrival)],
             )
             for number, load in enumerate(spec.machine().loads)
@@ -166,6 +172,16 @@ def sway_levels(spec: Spec, load: str, arrival: float, end: float) -> list[Level
         transient = 1e3 * spec.limits.sway
         levels += [Level(value=sign * transient, between=(0.0, arrival)) for sign in (1.0, -1.0)]
     return levels
+
+
+def wind_lines(wind: StaticDeflection | None, load: str, arrival: float, end: float) -> list[Line]:
+    """Draw how far a wind holds a load aside after the arrival, either way; nothing without wind."""
+    if wind is None:
+        return []
+    aside = 1e3 * wind.loads[load]
+    span = np.array([arrival, end])
+    name = f"wind, {wind.force:g} N"
+    return [Line(name=name, x=span, y=np.full(2, sign * aside), style=WINDY) for sign in (1.0, -1.0)]
 
 
 def end_load_sway(spec: Spec, response: Response) -> Array:

@@ -12,8 +12,8 @@ from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Level, Line, M
 from gen_profile.charts.picture import save
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
+from gen_profile.proof.closed_loop import Trace, trace
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.trace import Trace, trace
 from gen_profile.proof.verdict import JudgedHistory, Proof
 from gen_profile.spec.model import Spec
 

@@ -1,6 +1,17 @@
 """The command line: arguments in, one function called, words and exit codes out."""
 
-from gen_profile.cli import can, fmu, identify, planner, report, robustness, streaming, sweep
+from gen_profile.cli import can, deployment, fmu, identify, planner, report, robustness, streaming, sweep
 from gen_profile.cli.entry import main
 
-__all__ = ["can", "fmu", "identify", "main", "planner", "report", "robustness", "streaming", "sweep"]
+__all__ = [
+    "can",
+    "deployment",
+    "fmu",
+    "identify",
+    "main",
+    "planner",
+    "report",
+    "robustness",
+    "streaming",
+    "sweep",
+]

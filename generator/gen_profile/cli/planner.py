@@ -161,8 +161,21 @@ def write(
     type=OutputFile(),
     help="CSV of the block's events to write, if it keeps them (planner.events).",
 )
+@click.option(
+    "--sensor",
+    "sensor_path",
+    type=InputFile(),
+    help="CSV with time_s, value: what the block's sensor shows; a row holds until the next.",
+)
 @output_options
-def play(block: Path, commands_path: Path, path: Path, events_path: Path | None, as_json: bool) -> None:
+def play(
+    block: Path,
+    commands_path: Path,
+    path: Path,
+    events_path: Path | None,
+    sensor_path: Path | None,
+    as_json: bool,
+) -> None:
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
     from gen_profile.cli.progress import progress
@@ -173,7 +186,8 @@ def play(block: Path, commands_path: Path, path: Path, events_path: Path | None,
     content, commands = read_block(block), _read(commands_path)
     with progress() as tell:
         tell("executing the block")
-        setpoints = run(content, commands, with_events=events_path is not None)
+        shown = None if sensor_path is None else _read(sensor_path)
+        setpoints = run(content, commands, with_events=events_path is not None, sensor_text=shown)
     deliver(path, setpoints.table.encode("ascii"))
     if events_path is not None:
         deliver(events_path, setpoints.events.encode("ascii"))

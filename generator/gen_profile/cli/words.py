@@ -76,7 +76,7 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         *_peaks(outcome),
         ("sway on the way", mm(figures["sway_transient_peak_m"])),
         ("residual sway", residual),
-        *([] if outcome.check is None else _groups(outcome.check)),
+        *([] if outcome.check is None else (*_groups(outcome.check), *_wind(outcome.check))),
         ("check", _verdict(outcome.check)),
         *(row for certificate in certificates.values() for row in _proved(certificate)),
         *_cost_of_lag(figures, outcome.spec.cost.effort),
@@ -105,6 +105,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
         ("manifest", MANIFEST_WORDS[judged.manifest]),
         *findings,
         *_groups(check),
+        *_wind(check),
         ("check", _verdict(check)),
         *([] if certificate is None else (*_proved(certificate), *_written(judged.path, certificate))),
     ]
@@ -209,6 +210,14 @@ def _group(group: Mapping[str, Any]) -> str:
     shares = ", ".join(f"{100.0 * float(q):g} % ≤ {mm(sway)}" for q, sway in group["quantiles_m"].items())
     peak = f"worst {worst['load']} {mm(worst['residual_peak_m'])} (row {worst['row']})"
     return f"{verdict}{aside}: {peak}; end load {shares}"
+
+
+def _wind(check: Check) -> list[tuple[str, str]]:
+    """Tell how far the wind holds the loads aside, where the spec states one."""
+    if check.wind is None:
+        return []
+    aside = ", ".join(f"{load} {mm(by)}" for load, by in check.wind.loads.items())
+    return [(f"wind, {check.wind.force:g} N", f"holds aside {aside} ({check.wind.machine}); not judged")]
 
 
 def comparison(compared: Comparison) -> str:

@@ -17,7 +17,7 @@ from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed
+from gen_profile.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed, refined
 from gen_profile.solvers.search import Search, least, slope_of
 from gen_profile.spec.model import Spec
 from gen_profile.work import OutOfWork, budget, left, spend
@@ -118,8 +118,13 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
     Motions on few intervals lead near to it; where the work ends before one on many is found, one of those is
     taken.
     """
-    most, start = LONGEST * shortest_kept.duration, in_cycles(spec, shortest_kept.duration)
-    first = drafted(lasting(spec, start), shortest_kept.solution)
+    first = _drafted(spec, shortest_kept)
+    if first.excess_sway <= 0.0:
+        finer = refined(problem, shortest_kept, progress)
+        shorter = _drafted(spec, finer)
+        if shorter.excess_sway <= 0.0:
+            first, shortest_kept = shorter, finer
+    most, start = LONGEST * shortest_kept.duration, first.spec.move.duration
     # an axis without limits may fling a load about
     near = shortest_kept if first.excess_sway < math.inf else None
     rough, exact = {start: first}, dict[float, Draft]()
@@ -149,6 +154,11 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
             raise
         return rough[guess]
     return None if duration is None else exact[duration]
+
+
+def _drafted(spec: Spec, found: Relaxed) -> Draft:
+    """Take a shortest motion within limits, its duration rounded up to a cycle."""
+    return drafted(lasting(spec, in_cycles(spec, found.duration)), found.solution)
 
 
 def _slow(spec: Spec) -> Spec:

@@ -15,12 +15,13 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.events import COLUMNS, events_of
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.interface import BlockAxis, live_inputs
+from gen_profile.planner.interface import SENSED, SENSOR, BlockAxis, live_inputs
+from gen_profile.planner.sensor_log import SensorLog, read_sensor_log
 from gen_profile.suggestion import number_meant
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")
 FIRST = ("time_s", "command")
-WHOLE = ("bBusy", "bDone", "nErrorId", "bPromise")
+WHOLE = ("bBusy", "bDone", "nErrorId", "bPromise", "bDamping", "bSensorUsed", "nSensorFault")
 CHUNK = 10_000  # cycles between looks at whether the axis stands
 LONGEST = 3600.0  # s, of what follows the last command
 MOST_CYCLES = 10_000_000  # before the last command
@@ -154,7 +155,9 @@ class IssuedSetpoints:
     events: str = ""
 
 
-def play(text: str, commands_text: str, *, with_events: bool = False) -> IssuedSetpoints:
+def play(
+    text: str, commands_text: str, *, with_events: bool = False, sensor_text: str | None = None
+) -> IssuedSetpoints:
     """Execute a written block under a table of commands.
 
     Parameters
@@ -165,6 +168,8 @@ def play(text: str, commands_text: str, *, with_events: bool = False) -> IssuedS
         Table of commands; each row holds until the next, and the last one until the axis stands still.
     with_events : bool
         Whether its events are wanted, too.
+    sensor_text : str, optional
+        Log of its sensor, as `gen_profile.planner.sensor_log` reads it; there is no news without.
 
     Raises
     ------
@@ -176,11 +181,12 @@ def play(text: str, commands_text: str, *, with_events: bool = False) -> IssuedS
     if commands[-1].begin(cycle) > MOST_CYCLES:
         at, most = f"{commands[-1].time:g} s", f"{MOST_CYCLES * cycle:g} s"
         raise SpecError(f"commands: the last one comes at {at}, and at most {most} are played in one go.")
-    columns = _columns(block.axes)
+    log = None if sensor_text is None else read_sensor_log(sensor_text, block.inputs)
+    columns = _columns(block.axes) | (SENSED if SENSOR[0] in block.inputs else {})
     places = {name: block.outputs.index(output) for name, output in columns.items()}
     lines, promise = ["time_s," + ",".join(columns)], block.outputs.index("nPromise")
     shown: dict[int, None] = {}  # as an ordered set
-    issued = list(_issued(block, commands, cycle))
+    issued = list(_issued(block, commands, cycle, log))
     events = (
         [f"{e.time:.9g},{e.code},{e.value!r}" for e in events_of(block.outputs, np.concatenate(issued))]
         if with_events
@@ -278,12 +284,17 @@ def inputs_of(command: Command, axes: Sequence[BlockAxis]) -> dict[str, float]:
     }
 
 
-def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:
+def _issued(
+    block: BlockInstance, commands: tuple[Command, ...], cycle: float, log: SensorLog | None
+) -> Iterator[Array]:
     """Give the outputs, row of inputs by row of inputs."""
     start_cycles, rows = input_rows(commands, block.axes, block.inputs | {"bEnable": 1.0}, cycle)
+    if log is not None and log.cycles(cycle) > start_cycles[-1]:
+        start_cycles, rows = [*start_cycles, log.cycles(cycle)], np.vstack([rows, rows[-1]])
     for row, begin, end in zip(rows, start_cycles, start_cycles[1:], strict=False):
         for first in range(begin, end, CHUNK):
-            yield block.call(np.tile(row, (min(CHUNK, end - first), 1)))
+            repeated = np.tile(row, (min(CHUNK, end - first), 1))
+            yield block.call(repeated if log is None else log.given(repeated, block.inputs, first, cycle))
     yield from _until_still(block, rows[-1], cycle)
 
 

@@ -22,6 +22,7 @@ from gen_profile.planner.machine import (
     planned_axes,
     second_order_sway,
 )
+from gen_profile.planner.sensor import between, damping_room, sensor_constants
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
 from gen_profile_exporters.planner.block import (
@@ -93,7 +94,9 @@ def planner_block(spec: Spec) -> PlannerBlock:
         raise SpecError(
             placed("planner.operations", Phrase(template, least=least, found=spec.planner.operations))
         )
-    exponents, (rates, others) = same_terms(modes_of_live.interpolant, modes_of_live.others)
+    sensed = sensor_constants(spec, between(len(modes_of_live.live)), modes_of_live.others)
+    parts = [modes_of_live.interpolant, modes_of_live.others, *([sensed[1]] if sensed else [])]
+    exponents, coefficients = same_terms(*parts)
     constants = PlannerConstants(
         name=spec.name,
         machine=spec.machine().type,
@@ -123,7 +126,8 @@ def planner_block(spec: Spec) -> PlannerBlock:
         curvatures=[*modes_of_live.interpolant.curvatures, *modes_of_live.others.curvatures],
         exponents=exponents,
         modes=modes_of_live.modes,
-        model=np.vstack([rates, others]),
+        model=np.vstack(coefficients),
+        sensor=sensed[0] if sensed else None,
     )
     text = block_text(constants)
     declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
@@ -150,10 +154,10 @@ def quick_limits(spec: Spec, axis: int) -> tuple[float, float]:
 
 
 def target_range(spec: Spec, axis: int) -> tuple[float, float]:
-    """Least and greatest target of an axis, where its travel is stated: room is left for calming."""
+    """Least and greatest target of an axis, where its travel is stated: with room for calming and damping."""
     travel = spec.limits.of(axis).travel
     assert travel is not None
-    margin = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else 0.0
+    margin = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else damping_room(spec)
     return travel[0] + margin, travel[1] - margin
 
 

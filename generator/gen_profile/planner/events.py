@@ -43,6 +43,7 @@ WORDS = {  # {:g} is the event's value
     63: "not ready: no live parameters taken over yet",
     64: "nothing is promised while disabled",
     65: "the load may sway: what the stated errors leave has added up to more than is allowed",
+    66: "the load sways, as the sensor shows",
     70: "the target is reached, at {:g}",
 }
 

@@ -15,10 +15,19 @@ OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of ea
 ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
 STATES = ("bBusy", "bPromise", "nErrorId", "bEnabled")
 LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs that the first blocks had not
+SENSOR = ("fSensor", "bSensorValid", "fSensorAge")  # of blocks with one
+SENSED = {  # what such a block tells, by the columns of a table
+    "sway_estimated_m": "fSwayEstimated",
+    "sway_uncertainty_m": "fSwayUncertainty",
+    "damping": "bDamping",
+    "sensor_used": "bSensorUsed",
+    "sensor_fault": "nSensorFault",
+}
 LOST = {  # promises, by nPromise
     1: "a live parameter changed on the way",
     2: "there was a quick stop, or the axis was moved while the block was disabled",
     5: "what the stated errors leave adds up, from motion to motion, to more than is allowed",
+    6: "the sensor shows more sway than is allowed, or that is being damped",
 }
 UNITS = ("m", "rad")
 
@@ -85,5 +94,5 @@ def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, s
     known = list(inputs)
     if missing := [name for name in standard if name not in known]:
         raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
-    standard += [name for later in LATER for name in (later, *(axis.of(later) for axis in axes))]
+    standard += [*SENSOR, *(name for later in LATER for name in (later, *(axis.of(later) for axis in axes)))]
     return {name[1:]: name for name in known if name not in standard and "[" not in name}

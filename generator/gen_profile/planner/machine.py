@@ -66,7 +66,7 @@ def live_modes(spec: Spec) -> LiveModes:
     _refuse_rates(spec)
 
     def invariants(point: Sequence[float]) -> Array:
-        linear = _linearized(spec, point)
+        linear = linearized(spec, point)
         squares = linear.distinct_frequencies**2
         return np.array(
             [
@@ -77,14 +77,14 @@ def live_modes(spec: Spec) -> LiveModes:
 
     def others(point: Sequence[float]) -> Array:
         return (
-            _sway_matrix(_linearized(spec, point)).ravel()
+            _sway_matrix(linearized(spec, point)).ravel()
             if spec.planner.live_rate
             else left_by_errors(spec, point)
         )
 
-    modes = len(_linearized(spec, [0.0] * len(live)).distinct_frequencies)
+    modes = len(linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
-    exact = [_linearized(spec, point).distinct_frequencies for point in between]
+    exact = [linearized(spec, point).distinct_frequencies for point in between]
     straight = [0.0] * len(live)
     for degree, curvatures in product(
         DEGREES if live else (0,), (_curvatures(invariants, len(live)), straight)
@@ -146,7 +146,7 @@ def frequencies(invariants: Array) -> Array:
 
 def planned_axes(spec: Spec) -> dict[int, BlockAxis]:
     """Find the axes that make a load sway by their numbers: these the block plans, and no others."""
-    middle, axes = _linearized(spec, [0.0] * len(spec.planner.live)), spec.machine().actuated
+    middle, axes = linearized(spec, [0.0] * len(spec.planner.live)), spec.machine().actuated
     numbers = np.flatnonzero(np.abs(middle.input).max(axis=0) > STILL).tolist()
     several = len(numbers) > 1
     return {k: BlockAxis(name=axes[k].name if several else "", unit=axes[k].unit) for k in numbers}
@@ -165,7 +165,7 @@ def left_by_errors(spec: Spec, point: Sequence[float]) -> Array:
     A mode that is left swinging, ``∫ velocity · exp(iωt) dt`` in m (or rad), makes the load that shows it
     most sway by so many m times its modulus.
     """
-    at = _linearized(spec, point)
+    at = linearized(spec, point)
     modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
     shown, excited = at.sway_gain @ at.modes, np.linalg.solve(at.modes, at.input)
     gains = [
@@ -184,7 +184,7 @@ def second_order_sway(spec: Spec) -> Array:
     """
     sways = []
     for point in corners(spec.planner.live):
-        at = _linearized(spec, point)
+        at = linearized(spec, point)
         shown = np.abs(at.sway_gain @ at.modes).max(axis=0)
         excited = np.abs(np.linalg.solve(at.modes, at.input)).max(axis=1)
         modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
@@ -200,17 +200,17 @@ def corners(live: Collection[str]) -> list[Sequence[float]]:
 
 
 def _frequency_errors(spec: Spec, point: Sequence[float]) -> Array:
-    nominal, frequencies = spec.plant.parameters, _linearized(spec, point).distinct_frequencies
+    nominal, frequencies = spec.plant.parameters, linearized(spec, point).distinct_frequencies
     errors = np.zeros_like(frequencies)
     for name, ends in spec.checked_ranges().items():
         if nominal[name] == 0.0 or (name in spec.planner.live and name in spec.check.spans):
             continue  # of nothing there is no share, and a live one's span says where it may be
-        wrong = [_linearized(spec, point, {name: end / nominal[name]}) for end in ends]
+        wrong = [linearized(spec, point, {name: end / nominal[name]}) for end in ends]
         errors += np.max([np.abs(one.distinct_frequencies / frequencies - 1.0) for one in wrong], axis=0)
     return errors
 
 
-def _linearized(
+def linearized(
     spec: Spec, point: Sequence[float], errors: Mapping[str, float] | None = None
 ) -> Linearization:
     """Linearise the machine at a point of the live ranges, given in −1 … 1, some parameters times errors."""
@@ -263,7 +263,7 @@ def _refuse_rates(spec: Spec) -> None:
     plant, rates = spec.machine(), spec.planner.live_rate
     if not rates:
         return
-    middle = _linearized(spec, [0.0] * len(spec.planner.live))
+    middle = linearized(spec, [0.0] * len(spec.planner.live))
     if np.abs(middle.damping).max() > 0.0:
         raise SpecError(
             "planner.live_rate: the planner block follows machines without damping only; set the damping "
@@ -317,7 +317,7 @@ def _refuse_others(spec: Spec) -> None:
     plant = spec.machine()
     if len(spec.planner.live) > MOST_LIVE:
         raise SpecError(f"planner.live: at most {MOST_LIVE} parameters can be live; fix the others.")
-    middle = _linearized(spec, [0.0] * len(spec.planner.live))
+    middle = linearized(spec, [0.0] * len(spec.planner.live))
     for number, axis in enumerate(plant.actuated):
         if axis.name in spec.planner.live and number in planned_axes(spec):
             raise SpecError(

@@ -16,7 +16,7 @@ from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
-from gen_profile.planner.interface import BlockAxis, live_inputs
+from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
@@ -89,6 +89,7 @@ class _Orders:
     live: Mapping[str, ArrayLike] | None
     override: float | None
     velocity_limit: ArrayLike | None
+    sensor: ArrayLike | None
 
 
 class Planner:
@@ -214,6 +215,7 @@ class Planner:
         live: Mapping[str, float] | None = None,
         override: float | None = None,
         velocity_limit: ArrayLike | None = None,
+        sensor: float | None = None,
     ) -> Setpoint:
         """Issue the setpoint of the next cycle.
 
@@ -238,6 +240,8 @@ class Planner:
             Share of the greatest velocity. It holds, and so does the next.
         velocity_limit : float or (axes,) array, optional
             m/s; 0 for none but the machine's.
+        sensor : float, optional
+            What the sensor shows in this cycle, in its unit; there is no news where it is not given.
 
         Raises
         ------
@@ -255,6 +259,7 @@ class Planner:
             live=live,
             override=override,
             velocity_limit=velocity_limit,
+            sensor=sensor,
         )
         issued = self._issue(orders, 1)
         outputs = {name: column.item() for name, column in issued.items()}
@@ -278,6 +283,7 @@ class Planner:
         live: Mapping[str, ArrayLike] | None = None,
         override: float | None = None,
         velocity_limit: ArrayLike | None = None,
+        sensor: ArrayLike | None = None,
     ) -> SetpointHistory:
         """Issue the setpoints of many cycles, in a compiled loop.
 
@@ -291,6 +297,8 @@ class Planner:
             m/s; over the cycles it is the history of a stick.
         live : mapping of str to float or (cycles,) array, optional
             As of `step`; an array changes on the way.
+        sensor : float or (cycles,) array, optional
+            Likewise.
 
         Raises
         ------
@@ -311,6 +319,7 @@ class Planner:
             live=live,
             override=override,
             velocity_limit=velocity_limit,
+            sensor=sensor,
         )
         issued = self._issue(orders, cycles)
         return SetpointHistory(
@@ -355,6 +364,7 @@ class Planner:
                 columns |= _columns_of(name, what, value, self._axes, cycles)
         if orders.override is not None:
             columns["rOverride"] = _column("override", orders.override, cycles)
+        columns |= self._sensed(orders.sensor, cycles)
         for name, value in (orders.live or {}).items():
             if name not in self._live:
                 raise SpecError(
@@ -362,6 +372,15 @@ class Planner:
                 )
             columns[self._live[name]] = _column(f"live.{name}", value, cycles)
         return columns
+
+    def _sensed(self, shown: ArrayLike | None, cycles: int) -> dict[str, Array]:
+        """Give what the sensor shows, or that there is no news of it."""
+        value, valid, _ = SENSOR
+        if shown is None:
+            return {valid: np.zeros(1)} if valid in self._inputs else {}
+        if value not in self._inputs:
+            raise SpecError("sensor: the planner has none; state planner.sensor.")
+        return {value: _column("sensor", shown, cycles), valid: np.ones(1)}
 
     def _command(self, orders: _Orders, columns: dict[str, Array]) -> None:
         """Let another command take the place of the one that holds; one that was stopped is given anew."""

@@ -143,7 +143,7 @@ def machines_inside(problem: Problem, ranges: Mapping[str, tuple[float, float]])
 
 
 def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:
-    """Choose places all over a box: on the lines through its middle, at its corners, and spread within.
+    """Choose places all over a box: on the lines through its middle, at its corners, within and on its faces.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:
     ranges : int
         At least 1.
     most : int
-        Number of places to spread within at most; on all lines together twice as many.
+        Number of places to spread within at most, on faces and on edges; on all lines twice as many.
     """
     lines = [_line(phase_of, ranges, axis, max(2 * most // ranges, FEWEST)) for axis in range(ranges)]
     steps = np.array([1.0 / (len(line) - 1) for line in lines])
@@ -165,8 +165,20 @@ def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:
     coarse = sequence.random(min(FEWEST_SPREAD * ranges, most))
     span = np.ptp(phase_of(np.concatenate([coarse, *lines])), axis=0)
     count = int(min(np.prod(1.0 + span), most))
-    spread = [coarse, sequence.random(max(count - len(coarse), 0))]
+    spread = [coarse, sequence.random(max(count - len(coarse), 0)), *_on_faces(coarse)]
     return Start(places=np.concatenate([np.array(corners).reshape(-1, ranges), *lines, *spread]), steps=steps)
+
+
+def _on_faces(places: Array) -> list[Array]:
+    """Move places onto the faces of a box, one after another, and onto the edges between two of them."""
+    ranges, numbers = places.shape[1], np.arange(len(places))
+    found, moved = [], places
+    for beyond in range(min(ranges - 1, 2)):
+        moved = moved.copy()
+        column = (numbers + beyond * (1 + numbers // ranges % (ranges - 1))) % ranges
+        moved[numbers, column] = np.round(moved[numbers, column])
+        found.append(moved)
+    return found
 
 
 def _line(phase_of: Phases, ranges: int, axis: int, most: int) -> Array:
@@ -205,34 +217,67 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
     shares = _remembering(shares)
     values, ranges = shares(begun.places), begun.places.shape[1]
     rounds = ROUNDS + 2 * (ranges - 1)
-    starts = min(STARTS, max(POLLS // (rounds * 2 * ranges * values.shape[1]), keep))
+    starts = min(STARTS, max(POLLS // (rounds * (2 * ranges + 1) * values.shape[1]) - keep, keep))
     chosen = [
         (place, figure)
         for figure, column in enumerate(values.T)
         for place in _separate(begun.places, column, begun.steps)[:starts]
     ]
     index, figure = (np.array(column) for column in zip(*chosen, strict=True))
-    places, best = begun.places[index], values[index, figure]
-    random, reach, tried = np.random.default_rng(0), np.ones(len(places)), len(values)
-    for basis in np.linalg.qr(random.standard_normal((rounds, ranges, ranges)))[0]:
-        ways = np.concatenate([basis, -basis]) * begun.steps
-        polls = np.clip(places[:, None] + reach[:, None, None] * ways, 0.0, 1.0)
-        polled = shares(polls.reshape(-1, ranges)).reshape(*polls.shape[:2], -1)
-        tried += polls.shape[0] * polls.shape[1]
-        own = np.take_along_axis(polled, figure[:, None, None], axis=2)[:, :, 0]
-        top, rows = own.argmax(axis=1), np.arange(len(places))
-        better = own[rows, top] > best
-        places = np.where(better[:, None], polls[rows, top], places)
-        best = np.where(better, own[rows, top], best)
-        reach = np.where(better, reach, 0.5 * reach)
-    kept = [
-        place
-        for number in range(values.shape[1])
-        for place in places[figure == number][
-            _separate(places[figure == number], best[figure == number], begun.steps)[:keep]
+    climbers = _Climbers(
+        places=begun.places[index],
+        best=values[index, figure],
+        figure=figure,
+        reach=np.ones(len(index)),
+        way=np.zeros((len(index), ranges)),
+    )
+    bases = np.linalg.qr(np.random.default_rng(0).standard_normal((2 * rounds, ranges, ranges)))[0]
+    bases[rounds::2] = np.eye(ranges)  # along faces and edges, too
+    tried = len(values)
+    for number, basis in enumerate(bases[: rounds if ranges == 1 else None]):
+        if number == rounds:  # the greatest of the maxima more exactly
+            climbers = climbers.greatest(begun.steps, keep)
+        climbers = climbers.polled(shares, np.concatenate([basis, -basis]) * begun.steps)
+        tried += (2 * ranges + 1) * len(climbers.best)
+    return climbers.greatest(begun.steps, keep).places, tried
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Climbers:
+    """Local searches: where each is, its figure there, which one that is, how far it looks, and its way."""
+
+    places: Array
+    best: Array
+    figure: NDArray[np.intp]
+    reach: Array
+    way: Array  # of the last two rounds
+
+    def polled(self, shares: Shares, ways: Array) -> _Climbers:
+        """Look in some ways, and on as in the last rounds; go to the greatest figure, or look less far."""
+        around = self.places[:, None] + self.reach[:, None, None] * ways
+        polls = np.clip(np.concatenate([around, (self.places + self.way)[:, None]], axis=1), 0.0, 1.0)
+        found = shares(polls.reshape(-1, ways.shape[1])).reshape(*polls.shape[:2], -1)
+        own = np.take_along_axis(found, self.figure[:, None, None], axis=2)[:, :, 0]
+        top, rows = own.argmax(axis=1), np.arange(len(own))
+        better = own[rows, top] > self.best
+        places = np.where(better[:, None], polls[rows, top], self.places)
+        return _Climbers(
+            places=places,
+            best=np.where(better, own[rows, top], self.best),
+            figure=self.figure,
+            reach=np.where(better, np.minimum(2.0 * self.reach, 1.0), 0.5 * self.reach),
+            way=places - self.places + 0.5 * self.way,
+        )
+
+    def greatest(self, steps: Array, keep: int) -> _Climbers:
+        """Keep some of each figure that are not close to one another, greatest first."""
+        kept = [
+            rows[_separate(self.places[rows], self.best[rows], steps)[:keep]]
+            for rows in (np.flatnonzero(self.figure == number) for number in range(self.figure.max() + 1))
         ]
-    ]
-    return np.array(kept), tried
+        return _Climbers(
+            **{name: values[np.concatenate(kept)] for name, values in attrs.asdict(self).items()}
+        )
 
 
 def _remembering(shares: Shares) -> Shares:

@@ -1,12 +1,13 @@
-"""Machines of a spec that follow a written planner block, many histories side by side."""
+"""Machines of a spec that follow a written planner block, many histories side by side, or one in full."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from itertools import product
 from queue import SimpleQueue
 from typing import Self
 
@@ -14,10 +15,14 @@ import attrs
 import numpy as np
 
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
+from gen_profile.evaluation.simulation import AT_REST
+from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import SLOWEST, Histories, History
+from gen_profile.proof.sensing import sensor_faults
 from gen_profile.proof.watching import BlockWatch
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
@@ -30,6 +35,7 @@ WATCHED = 2.2  # of the slowest periods in which the residual sway shows
 PATIENCE = 30.0  # of these periods that the axes have to come to rest, and the travel's time beside
 NOISY_ON = 6.0  # of these periods after the last command, in which live parameters go on being noisy
 LONGEST = 10**9  # cycles, for ever
+MOST_MACHINES = 4  # at corners of the uncertain ranges
 HOIST_STARTS = 0.1  # of these periods, in which a hoist takes up its speed
 
 
@@ -118,6 +124,10 @@ class ClosedLoop:
         ExportError, CosimulationError
         """
         script, block = self._script(history), self._block.called()
+        if history.sensed is not None:
+            run = self._followed(history, block, script, rows=_cycles(script))
+            own = () if run.fault else tuple(self._sensor_faults(history, run))
+            return attrs.evolve(run, trace=None), own
         orders = self._watch.orders(script)
         run = self._followed(history, block, script, rows=orders[-1].end, marks=self._watch.marks(orders))
         faults = () if run.fault else self._watch.faults(period, script, orders, block, run)
@@ -176,8 +186,10 @@ class ClosedLoop:
         traced = self.run(history, rows=cycles).trace
         assert traced is not None
         position = np.tile(self._places(history), (len(traced) + 1, 1))
+        sensed = history.sensed
+        pushed = sensed.pushed(np.arange(1.0, len(position)) * self.cycle) if sensed else 0.0
         for number, axis in self._histories.axes.items():
-            position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))]
+            position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))] + pushed
         script = self._script(history)
         row = np.searchsorted(script.start_cycles, np.arange(len(traced)), side="right") - 1
         for hoist in self._hoists(history):
@@ -189,6 +201,7 @@ class ClosedLoop:
                 tau=self._spec.actuator.tau or 0.0,
                 max_step=self.max_step,
                 settle=0.0,
+                initial=history.sensed.starts if history.sensed else AT_REST,
                 by_fmpy=True,
             )
         return float(np.abs(response.sway[1:] - traced[:, len(self.outputs) :]).max())
@@ -202,12 +215,13 @@ class ClosedLoop:
             history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
         )
         start_cycles, inputs = self._changed(history, *self._noisy(start_cycles, inputs))
+        start_cycles, inputs = self._until_calm(history, start_cycles, inputs)
         period = self._histories.period
         patience = PATIENCE * period + max(map(self._crossing, axes))
         watch = max(SHORTEST_WATCH, WATCHED * period)
         settle = STANDSTILL * (self._spec.actuator.tau or 0.0)
         longest, settled, watched = (math.ceil(time / self.cycle) for time in (patience, settle, watch))
-        return Script(
+        script = Script(
             cycle=self.cycle,
             start_cycles=start_cycles,
             inputs=inputs,
@@ -216,6 +230,33 @@ class ClosedLoop:
             settle=settled,
             watch=watched,
         )
+        if history.sensed is None:
+            return script
+        found = history.sensed.measurement(self._spec, list(values), self.cycle, _cycles(script))
+        return attrs.evolve(script, measured=found)
+
+    def _until_calm(
+        self, history: History, start_cycles: Sequence[int], inputs: Array
+    ) -> tuple[Sequence[int], Array]:
+        """Let the last row begin no sooner than what swings at first, or after a gust, was measured."""
+        ends = 0
+        if history.sensed:
+            ends = math.ceil((history.sensed.ends + self._histories.period) / self.cycle)
+        return (
+            (start_cycles, inputs)
+            if ends <= start_cycles[-1]
+            else ([*start_cycles, ends], np.vstack([inputs, inputs[-1]]))
+        )
+
+    def _sensor_faults(self, history: History, run: BlockRun) -> Iterator[str]:
+        """Judge how the block used its sensor; after a quick stop at the end it does not."""
+        assert history.sensed is not None
+        if not history.brakes:
+            changed = [one.time + one.lasts for one in history.changes if math.isfinite(one.lasts)]
+            last = max(history.commands[-1].time, *changed, 0.0)
+            yield from sensor_faults(
+                self._spec, history.sensed, run, self.outputs, cycle=self.cycle, last=last
+            )
 
     def _crossing(self, axis: int) -> float:
         """Find the time in s that an axis needs from end to end by a history's slowest command, at most.
@@ -307,4 +348,66 @@ class ClosedLoop:
         values = {**self._parameters(history), TAU: self._spec.actuator.tau or 0.0, MAX_STEP: max_step}
         for axis, place in zip(self._machine.actuated, self._places(history), strict=True):
             values |= {f"{axis.name}.start": place, f"{axis.name}.setpoint": place}
-        return values
+        return values | dict(history.sensed.starts if history.sensed else {})
+
+
+def _cycles(script: Script) -> int:
+    """How many there may be."""
+    return script.start_cycles[-1] + script.longest + script.settle + script.watch + 1
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Trace:
+    """A history in full, one sample a cycle.
+
+    Attributes
+    ----------
+    history : History
+    times : (cycles,) array
+        s.
+    issued : mapping of str to (cycles,) array
+        By names of the block's outputs.
+    sway : mapping of str to (cycles,) array
+        Of the end load in m (its magnitude where it has two directions), by machines: that of the history,
+        the one that the block is given, and some at corners of the uncertain ranges.
+    """
+
+    history: History
+    times: Array
+    issued: Mapping[str, Array]
+    sway: Mapping[str, Array]
+
+
+def trace(
+    spec: Spec, text: str, histories: Histories, history: History, progress: Progress = no_progress
+) -> Trace:
+    """Follow a history, and the same commands on other machines.
+
+    Raises
+    ------
+    ExportError, CosimulationError
+    """
+    progress("following a history")
+    end_load = spec.machine().end_load
+    reported, *perturbed = [histories.perturbed(history, errors) for errors in _errors(histories)]
+    machines = {"this history": history.parameters, "as given": reported}
+    machines |= {f"perturbed {number}": machine for number, machine in enumerate(perturbed, start=1)}
+    sways = {}
+    with ClosedLoop(spec, text, histories) as loop:
+        cycles = loop.run(history).cycles
+        for name, parameters in machines.items():
+            kept = loop.run(attrs.evolve(history, parameters=parameters), rows=cycles).trace
+            assert kept is not None
+            outputs = len(loop.outputs)
+            sways[name] = length(kept[:, outputs:][:, end_load])[:, 0]
+            if name == "this history":
+                issued = dict(zip(loop.outputs, kept.T, strict=False))
+        times = np.arange(cycles, dtype=np.float64) * loop.cycle
+    return Trace(history=history, times=times, issued=issued, sway=sways)
+
+
+def _errors(histories: Histories) -> list[dict[str, float]]:
+    """None, and then corners of the uncertain ranges: the extreme ones, and some more."""
+    ranges = histories.uncertain
+    corners = [dict(zip(ranges, ends, strict=True)) for ends in product(*ranges.values())] if ranges else []
+    return [{}, *(corners if len(corners) <= MOST_MACHINES else [corners[0], corners[-1]])]

@@ -28,6 +28,7 @@ from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
 from gen_profile.proof.habits import Change, Manner, Surroundings
 from gen_profile.proof.habits import manner as habit
+from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
 
 COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PERIODS
@@ -69,6 +70,8 @@ class History:
         line, which begins with the value in `live` and ends constant.
     changes : tuple of Change
         Of inputs, beside the commands.
+    sensed : SensedHistory or None
+        What the block's sensor meets; without it there is no news of any.
     """
 
     live: Mapping[str, float]
@@ -78,6 +81,7 @@ class History:
     axes: Mapping[int, BlockAxis] = {0: BlockAxis(name="")}
     hoisting: Mapping[str, tuple[tuple[float, float], ...]] = attrs.field(factory=dict)
     changes: tuple[Change, ...] = ()
+    sensed: SensedHistory | None = None
 
     @property
     def starts(self) -> dict[str, float]:
@@ -136,7 +140,8 @@ class History:
     @property
     def disturbed(self) -> bool:
         """Whether what becomes of the load cannot be known for another reason."""
-        return any(map(self._has, ("bEnable", *(f"f{name}" for name in self.live))))
+        lost = self.sensed is not None and bool(self.sensed.fault)
+        return lost or any(map(self._has, ("bEnable", *(f"f{name}" for name in self.live))))
 
     @property
     def moved(self) -> bool:
@@ -235,6 +240,10 @@ class Histories:
     @property
     def choices(self) -> int:
         """Number of choices of a history."""
+        return self._first_sensed + (CHOICES if self.spec.planner.sensor is not None else 0)
+
+    @property
+    def _first_sensed(self) -> int:
         return self._first_leg + LEGS * _PER_LEG * len(self.spec.planner.live_rate)
 
     @property
@@ -304,7 +313,10 @@ class Histories:
             assert travel is not None
             places[number] = _between(travel, _widened(start))
         rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
-        manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending)]
+        sensor = choices[self._first_sensed :].tolist()
+        is_sensed = sensed(self.spec, sensor)
+        rough = not is_sensed and manner * len(MANNERS) % 1.0 < ROUGH
+        manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending, rough=rough)]
         commands = tuple(command for one in manners for command in one.commands)
         return History(
             live=live_values,
@@ -312,11 +324,16 @@ class Histories:
             places=tuple(places),
             commands=commands,
             axes=self.axes,
-            hoisting=self._hoisting(choices[self._first_leg :], live_values, commands[-1].time),
+            hoisting=self._hoisting(
+                choices[self._first_leg : self._first_sensed], live_values, commands[-1].time
+            ),
             changes=(
                 *self._zones(starts, first, amount),
                 *(change for one in manners for change in one.changes),
             ),
+            sensed=SensedHistory.of(self.spec, sensor, commands[-1].time, (parameters, places))
+            if is_sensed
+            else None,
         )
 
     def _hoisting(
@@ -340,12 +357,14 @@ class Histories:
         """Parameters of a machine that differs by some errors from what the block is given in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
-    def _manners(self, rows: Array, first: float, manner: float, ending: Sequence[float]) -> Iterator[Manner]:
+    def _manners(
+        self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: bool
+    ) -> Iterator[Manner]:
         """Follow the rows until their time is over, then come to rest."""
         within = max(COMMANDED, PERIODS * self.period)
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time, last = first * SOONEST, 1 + len(self.axes)
-        around, earliest = self._surroundings(rough=manner * len(MANNERS) % 1.0 < ROUGH), 0.0
+        around, earliest = self._surroundings(rough=rough), 0.0
         for row in rows.tolist():
             if time > within:
                 break

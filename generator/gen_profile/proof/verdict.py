@@ -76,6 +76,7 @@ class JudgedHistory:
             "parameters": dict(self.history.parameters),
             "commands": [self.history.described(command) for command in self.history.commands],
             "changes": self.history.other_inputs,
+            **({} if self.history.sensed is None else {"sensor": self.history.sensed.to_dict()}),
             "hoisting": {
                 name: [{"time_s": time, "value": value} for time, value in corners]
                 for name, corners in self.history.hoisting.items()

@@ -18,8 +18,8 @@ from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.check import BlockJudgement, check_block
+from gen_profile.proof.closed_loop import Trace, trace
 from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.trace import Trace, trace
 from gen_profile.proof.verdict import LISTED, JudgedHistory, Proof
 from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.page import render, require_pages

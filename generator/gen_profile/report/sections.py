@@ -62,7 +62,7 @@ def verdict(check: Check) -> Verdict:
             f"After the move the {load} sways by {mm(finding.residual[load])} at most "
             f"({machine(finding.scenario.name)}), and {mm(check.limit[load])} are allowed.",
             f"Co-simulated from the written file in {tried} scenario{'s' if tried > 1 else ''}; "
-            f"numerical error below {bound(check.error_bound)}, counted against the margin.",
+            f"integration error below {bound(check.error_bound)}, counted against the margin.",
             *(f"Beware: {sentence}" for sentence in check.warnings()),
         ),
     )
@@ -88,6 +88,7 @@ def facts(
         ("Sway on the way, nominal", mm(figures["sway_transient_peak_m"])),
         (f"Residual sway of the {load}, worst", mm(finding.residual[load])),
         ("Margin left", mm(margin)),
+        *_wind(check),
     ]
 
 
@@ -125,6 +126,13 @@ def sections(
 
 def _of(spec: Spec, axis: str) -> str:
     return f", {axis}" if len(spec.axis) > 1 else ""
+
+
+def _wind(check: Check) -> list[tuple[str, str]]:
+    if check.wind is None:
+        return []
+    held = f"held aside by a wind of {check.wind.force:g} N"
+    return [(f"The {load}, {held}", mm(aside)) for load, aside in check.wind.loads.items()]
 
 
 def _limits(spec: Spec, evaluation: MotionEvaluation, figures: Mapping[str, float], check: Check) -> Table:

@@ -18,6 +18,8 @@ from gen_profile.plants.machine_file import MachineFile, plant_of_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.can import CanSpec
+from gen_profile.spec.disturbances import PathSpec, WindSpec
+from gen_profile.spec.planner import PlannerSpec
 from gen_profile.spec.structure import Checked, kinds_of
 from gen_profile.spec.values import (
     NONE,
@@ -48,8 +50,6 @@ DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
 
 ParameterSpan = Annotated[str, Named("parameter", of="span")]
-LiveParameter = Annotated[str, Named("parameter", of="live", reorder=False)]
-LiveRate = Annotated[str, Named("parameter", of="rate", reorder=False)]
 Span = Annotated[tuple[float, float], Rising()]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("NAME = 0.2")]
@@ -255,44 +255,6 @@ class ExternalFmu(Checked, table="check"):
 
 
 @attrs.frozen(kw_only=True)
-class PathSpec(Checked, table="check.path"):
-    """The way of a setpoint from the artefact to the axis.
-
-    Attributes
-    ----------
-    quantum : float
-        Spacing in m (or rad) of the positions that the drive can be asked for; 0 where it takes any.
-    between : str
-        What the drive does until the next setpoint: interpolate linearly (60C2h), or hold the last one.
-    lag : (float, float) or None
-        Range of the drives' time constant in s, which need not be the one that the setpoints lead.
-    latency : float
-        s by which all setpoints come late.
-    jitter : float
-        s by which each of them comes earlier or later at most.
-    lost : float
-        Share of them that never comes; the axis stays where it is until the next one.
-    """
-
-    quantum: NotNegative = 0.0
-    between: Literal["linear", "hold"] = "linear"
-    lag: Annotated[tuple[NotNegative, NotNegative], Rising("times in s")] | None = None
-    latency: Annotated[float, Bounds(least=0.0, most=10.0)] = 0.0
-    jitter: Annotated[float, Bounds(least=0.0, most=1.0)] = 0.0
-    lost: Annotated[float, Bounds(least=0.0, most=0.5)] = 0.0
-
-    @property
-    def faulty(self) -> bool:
-        """Whether setpoints come at other times than they should, or not at all."""
-        return self.latency > 0.0 or self.jitter > 0.0 or self.lost > 0.0
-
-    @property
-    def alters_setpoints(self) -> bool:
-        """Whether the drive makes something else of setpoints that come in time than straight lines."""
-        return self.quantum > 0.0 or self.between != "linear" or self.lag is not None
-
-
-@attrs.frozen(kw_only=True)
 class CheckSpec(Checked, table="check"):
     """What may remain of the sway, on which machines, and who is to judge.
 
@@ -309,6 +271,8 @@ class CheckSpec(Checked, table="check"):
     seed : int
         Of what is random.
     path : PathSpec
+    wind : WindSpec
+        Whose deflection is reported and not judged.
     foreign : ExternalFmu or None
         An external FMU that judges in place of ours.
     """
@@ -318,7 +282,8 @@ class CheckSpec(Checked, table="check"):
     spans: Annotated[Mapping[ParameterSpan, Span], example("c2 = [0.0, 0.02]")] = NONE
     samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
     seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
-    path: PathSpec = PathSpec()
+    path: PathSpec = attrs.field(factory=PathSpec)
+    wind: WindSpec = attrs.field(factory=WindSpec)
     foreign: ExternalFmu | None = None
     default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
 
@@ -338,48 +303,11 @@ class ExportSpec(Checked, table="export"):
 
     cycle_time: CycleTime = 0.001
     plc_layout: Literal["segments", "samples", "counts"] = "segments"
+    plc_tables: Literal["constants", "variables"] = "constants"
     csv_dialect: Literal["rfc4180", "excel-de", "sew", "kollmorgen", "lenze"] = "rfc4180"
     csv_columns: Annotated[
         tuple[Column, ...], Words('must be a list such as ["position", "velocity"], found {found}')
     ] = ("position", "velocity", "acceleration", "jerk")
-
-
-@attrs.frozen(kw_only=True)
-class PlannerSpec(Checked, table="planner"):
-    """What a planner block is given at run time, and how it brakes at once.
-
-    Attributes
-    ----------
-    live : mapping of str to (float, float)
-        Ranges of the machine's parameters, or places of its hoist, that the controller knows.
-    live_rate : mapping of str to float
-        How fast some of them may change on the way, each in its unit per second.
-    live_noise : mapping of str to float
-        By how much what the controller is given of some may be off from cycle to cycle, each in its unit.
-    events : bool
-        Whether the last events are outputs of the block, for an operator's screen.
-    zones : bool
-        Whether blocked and slow intervals of the travel are inputs of the block.
-    operations : int or None
-        Floating-point operations that the block may spend in a cycle; None takes 3000 for each millisecond.
-    sway_share : float
-        Share of `check.residual_sway` that a motion may leave on the machines of the stated errors, for being
-        quick; 0 plans motions that leave none to first order.
-    quick_stop : float or None
-        Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
-    quick_stop_jerk : float or None
-        m/s³; None takes four times the limit.
-    """
-
-    live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
-    live_rate: Annotated[Mapping[LiveRate, Positive], example("NAME = 0.1")] = NONE
-    live_noise: Annotated[Mapping[LiveRate, Positive], example("L1 = 0.003")] = NONE
-    events: bool = False
-    zones: bool = False
-    operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
-    sway_share: Annotated[float, Bounds(least=0.0, most=0.8)] = 0.5
-    quick_stop: Positive | None = None
-    quick_stop_jerk: Positive | None = None
 
 
 @attrs.frozen(kw_only=True, repr=False)
@@ -398,7 +326,7 @@ class Spec(Summarised, Checked):
     axis: Mapping[AxisName, AxisSpec]
     export: ExportSpec = ExportSpec()
     can: CanSpec = attrs.field(factory=CanSpec)
-    planner: PlannerSpec = PlannerSpec()
+    planner: PlannerSpec = attrs.field(factory=PlannerSpec)
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -455,7 +383,9 @@ class Spec(Summarised, Checked):
         if self.cost.sway_scale is None:
             document["cost"]["sway_scale"] = "auto"
         del document["check"]["default"]
-        if self.planner == PlannerSpec():  # a spec without hashes as it did
+        if self.check.wind == WindSpec():  # a spec without hashes as it did
+            del document["check"]["wind"]
+        if self.planner == PlannerSpec():
             del document["planner"]
         elif not self.planner.live_rate:
             del document["planner"]["live_rate"]

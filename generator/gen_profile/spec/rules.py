@@ -176,6 +176,14 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
                     yield where, Phrase(template, end=end, bounds=bounds)
 
 
+def _wind(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse a wind where no energy is known that it works against."""
+    if spec.check.wind.force > 0.0 and not plant.bodies:
+        yield "check.wind.force", "the machine states no bodies (mechanics), so its deflection is not known"
+    if spec.check.wind.force > 0.0 and spec.check.foreign is not None:
+        yield "check.wind.force", "a foreign FMU (check.fmu) has no input for wind; remove one of them"
+
+
 def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Hold the ranges of the check to what can be tried, and to what tries it."""
     del plant
@@ -241,5 +249,27 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 yield place(f"planner.{key}", name), problem, place("planner.live", name)
 
 
+def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold a sensor and what it is for to each other, and to the machine."""
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    if sensor is None or disturbance is None:
+        if sensor is not None or disturbance is not None:
+            missing, of = ("disturbance", "sensor") if disturbance is None else ("sensor", "disturbance")
+            yield f"planner.{missing}", Phrase("required by planner.{of}", of=of), f"planner.{of}"
+        return
+    known = [coordinate.name for coordinate in plant.unactuated]
+    if sensor.of not in known:
+        hint = suggestion(sensor.of, known)
+        yield "planner.sensor.of", Phrase("no coordinate that swings{hint}", hint=hint)
+    if not disturbance.swing:
+        yield "planner.disturbance.swing", "must name a load"
+    for name in ("live_rate", "zones"):
+        if getattr(spec.planner, name):
+            problem = Phrase("not together with planner.{name} so far; leave one out", name=name)
+            yield "planner.sensor", problem
+
+
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
-OF_MACHINE = (_at_start, _at_end, _shares, _checked_machines, _axis_limits, _units, _all_axes, _live)
+OF_MACHINE = (
+    _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes, _live, _sensor,
+)  # fmt: skip

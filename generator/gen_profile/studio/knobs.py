@@ -29,6 +29,7 @@ UNITS = {
     "check.path.latency": "s",
     "check.path.jitter": "s",
     "check.path.quantum": "m",
+    "check.wind.force": "N",
     "export.cycle_time": "s",
     "planner.quick_stop": "m/s²",
     "planner.quick_stop_jerk": "m/s³",
@@ -151,6 +152,7 @@ def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
                 yield from _residual_sway(spec, document.get("check", {}))
                 yield from _fields(spec.check, table, table)
                 yield from _fields(spec.check.path, "check.path", table)
+                yield from _fields(spec.check.wind, "check.wind", table)
                 for one in spec.machine().parameters:
                     yield _range(one, "check.spans", table, spec.check.spans.get(one.name))
             case "planner":

@@ -17,6 +17,7 @@ from gen_profile.evaluation.residual_sway import (
 )
 from gen_profile.evaluation.scenarios import Scenario
 from gen_profile.evaluation.simulation import Response, Sway
+from gen_profile.evaluation.static_deflection import in_wind
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import linearize
@@ -127,6 +128,7 @@ def judge(
             for machine, response in zip(machines, responses, strict=True)
         ),
         sway_limit=spec.limits.sway,
+        wind=in_wind(spec, machines),
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
         plausibility_warnings=(*plausibility_warnings(spec), *beyond_equations(spec, machines, responses)),

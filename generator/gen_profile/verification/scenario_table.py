@@ -8,7 +8,8 @@ from io import StringIO
 
 import attrs
 
-from gen_profile.spec.model import PathSpec, Spec
+from gen_profile.spec.disturbances import PathSpec
+from gen_profile.spec.model import Spec
 from gen_profile.verification.setpoint_path import lag_of, path_taken
 from gen_profile.verification.verdict import Check, Finding
 

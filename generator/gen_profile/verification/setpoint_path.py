@@ -10,7 +10,8 @@ import numpy as np
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.scenarios import SEARCH, TIMING, Scenario
 from gen_profile.motion.profile import Array, SampledProfile
-from gen_profile.spec.model import PathSpec, Spec
+from gen_profile.spec.disturbances import PathSpec
+from gen_profile.spec.model import Spec
 from gen_profile.verification.batch import Feed
 
 LEAP = 1e-3  # of a cycle, in which a drive that holds setpoints is given the next one

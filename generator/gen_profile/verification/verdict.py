@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_profile.errors import CheckFailed
 from gen_profile.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
+from gen_profile.evaluation.static_deflection import StaticDeflection
 from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.summary import Summarised
@@ -91,6 +92,8 @@ class Check(Summarised, Examination):
         Number of machines that were looked at for the worst ones in the ranges.
     plausibility_warnings : tuple of str
         What the spec states and hardly means, a sentence each.
+    wind : StaticDeflection or None
+        What the spec's wind adds to every sway for as long as it blows, which is not judged.
     """
 
     limit: Mapping[str, float]
@@ -103,6 +106,7 @@ class Check(Summarised, Examination):
     sway_limit: float | None = None
     searched: int = 0
     plausibility_warnings: tuple[str, ...] = ()
+    wind: StaticDeflection | None = None
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -183,14 +187,14 @@ class Check(Summarised, Examination):
         if self._share_after(finding, load) > 1.0:
             template = (
                 "The {load} sways by {found:.4g} mm after the move ({name}), and {limit:.4g} mm are allowed "
-                "(check.residual_sway; numerical error up to {error})."
+                "(check.residual_sway; integration error up to {error})."
             )
             yield self._exceeded(template, finding, load, finding.residual[load], self.limit[load])
         swaying, load = max(findings, key=self._share_on_the_way), self._end_load_name()
         if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:
             template = (
                 "The {load} sways by {found:.4g} mm on the way ({name}), and {limit:.4g} mm are allowed "
-                "(limits.sway; numerical error up to {error}); allow more, take more time, or narrow the "
+                "(limits.sway; integration error up to {error}); allow more, take more time, or narrow the "
                 "ranges."
             )
             yield self._exceeded(template, swaying, load, swaying.on_the_way or 0.0, self.sway_limit)
@@ -217,6 +221,7 @@ class Check(Summarised, Examination):
             "strict": self.strict,
             "sway_limit_m": self.sway_limit,
             "machines_searched": self.searched,
+            "wind": None if self.wind is None else self.wind.to_dict(),
             "groups": [self._group(name, findings) for name, findings in self.groups.items()],
             "scenarios": [
                 {

@@ -22,6 +22,11 @@ typedef struct {
     size_t size;                         /* of the instance in bytes */
 } Block;
 
+/* Of a cycle: what the sensor makes of the quantity of so many cycles ago, gain x value + added, and how the air pushes. */
+typedef struct {
+    double gain, added, age, valid, pushed; /* pushed: m, as if the first axis were moved by so much */
+} Measured;
+
 typedef struct {
     double cycle;
     size_t n_rows;
@@ -40,6 +45,11 @@ typedef struct {
     const double *ratios;                /* of the axis's position to the input */
     size_t n_marks;
     const long *marks;                   /* rising cycles, before which the block's instance is copied */
+    long n_measured;                     /* 0: no sensor; else cycles, as many as there may be */
+    const Measured *measured;
+    unsigned quantity;                   /* what it shows */
+    size_t shows, valid;                 /* places of two inputs */
+    double *shown;                       /* n_measured values, to be written */
 } History;
 
 /* Of an axis; gap: by how far the position is not the velocity's integral, nor this the acceleration's. */
@@ -110,6 +120,16 @@ static void take_loads(const History *history, const double *sway, bool counts, 
     }
 }
 
+/* What the sensor tells in a cycle, of which the plant stands at the beginning. */
+static int measure(const Fmu *fmu, const History *history, long k, double *inputs) {
+    const Measured *now = history->measured + k;
+    const int status = get(fmu, &history->quantity, 1, history->shown + k);
+    const long then = k - (long)now->age;
+    inputs[history->shows] = now->gain * history->shown[then < 0 ? 0 : then] + now->added;
+    inputs[history->valid] = now->valid;
+    return status;
+}
+
 /* `room`: 2 x n_outputs + n_loads + n_axes + n_inputs. */
 EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history, double *room, Found *found) {
     double *before = NULL, *now = room;
@@ -123,6 +143,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         while (row + 1 < history->n_rows && history->start_cycles[row + 1] <= k) row++;
         memcpy(inputs, history->inputs + row * block->n_inputs, block->n_inputs * sizeof(double));
         for (size_t i = 0; i < block->n_axes; i++) inputs[history->actual[i]] += history->setpoints[history->led[i]];
+        if (history->n_measured > 0 && measure(fmu, history, k, inputs) != GOOD) found->status = !GOOD;
         for (; mark < history->n_marks && history->marks[mark] == k; mark++) {
             memcpy(found->copies + mark * block->size, block->instance, block->size);
         }
@@ -145,7 +166,10 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         for (size_t i = 0; i < history->n_hoists; i++) {
             history->setpoints[history->hoists[i]] = history->ratios[i] * inputs[history->columns[i]];
         }
-        found->status = set(fmu, history->setpoint_references, history->n_setpoints, history->setpoints);
+        const double alone = history->setpoints[history->led[0]];
+        if (history->n_measured > 0) history->setpoints[history->led[0]] += history->measured[k].pushed;
+        if (found->status == GOOD) found->status = set(fmu, history->setpoint_references, history->n_setpoints, history->setpoints);
+        history->setpoints[history->led[0]] = alone;
         if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);
         if (found->status == GOOD) found->status = get(fmu, history->load_references, history->n_loads, sway);
         take_loads(history, sway, found->stands >= 0 && k >= found->stands + history->settle, found);

@@ -64,7 +64,7 @@ def usual_effort(problem: Problem) -> float:
 
 def cost(
     transcription: Transcription,
-    forms: Sequence[Array],
+    effort: Matrix,
     sway_cost: SwayCost,
     iterate: Iterate,
     maps: IntervalMaps,
@@ -73,13 +73,13 @@ def cost(
 
     Parameters
     ----------
-    forms : sequence of (intervals, size, size) arrays
-        Twice the effort of every axis, dimensionless.
+    effort : (variables, variables) sparse matrix
+        Twice the effort as a quadratic form, dimensionless.
     sway_cost : SwayCost
         Divided by the cost's scale.
     """
     width = transcription.variables
-    quadratic, linear = transcription.effort(forms, width), np.zeros(width)
+    quadratic, linear = effort, np.zeros(width)
     if sway_cost.beta > 0.0:
         sway, matrix, offset = transcription.end_sway(iterate, maps, width)
         points, directions = sway.shape
@@ -105,7 +105,7 @@ def held(
     sizes = transcription.units[:columns].reshape(-1, piece.size)
     weights = np.where(np.arange(piece.size) < piece.order, 0.0, HELD / sizes**2).ravel()
     padding = (0, len(linear) - columns)
-    whole = sparse.diags(np.pad(weights, padding), format="csc")
+    whole = sparse.diags(np.pad(weights, padding), format="csr")
     return quadratic + whole, linear - np.pad(weights * iterate.local.ravel(), padding)
 
 
@@ -184,7 +184,7 @@ def keep_limits(
         Places of limits that the program's last variable widens so many times, such as ``limits.jerk``;
         travel at either end by so many times its width, less one.
     """
-    for limit in axis_limits(problem, transcription):
+    for limit in axis_limits(problem, transcription) if problem.limits.stated() else ():
         give = limit.give if limit.place in widened else 0.0
         transcription.bound(program, limit.rows, (limit.low, limit.high), limit.axis, give)
 
@@ -217,7 +217,7 @@ def keep_sway(
     entries = sparse.coo_matrix(matrix)
     below = entries.row + entries.row // directions + 1  # the first row of each cone is empty
     shape = (points * (directions + 1), program.variables)
-    rows = sparse.csc_matrix((-entries.data / limit, (below, entries.col)), shape=shape)
+    rows = sparse.csr_matrix((-entries.data / limit, (below, entries.col)), shape=shape)
     sides = np.column_stack([np.ones(points), offset.reshape(points, directions) / limit])
     program.within_cones(rows, sides, give)
 
@@ -282,7 +282,7 @@ def bound_worst(
         for mode, rows in zip(modes, machine.rows, strict=True):
             radius = place(-np.ones((1, 1, 1)), np.array([mode]), program.variables)
             sides = np.append(0.0, rows @ offset)
-            program.within_cones(sparse.vstack([radius, -sparse.csc_matrix(rows) @ end]), sides[None])
+            program.within_cones(sparse.vstack([radius, -sparse.csr_matrix(rows) @ end]), sides[None])
         sums = place(machine.fractions[None], modes[:1], program.variables)
         all_fractions = place(np.ones((1, len(machine.fractions), 1)), np.array([worst]), program.variables)
         program.at_most(sums - all_fractions, np.zeros(len(machine.fractions)))

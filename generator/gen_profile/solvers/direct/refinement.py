@@ -6,6 +6,8 @@ as exact.
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,18 +21,37 @@ from gen_profile.solvers.direct.transcription import Iterate
 REACHED = 1e-4  # fraction of a limit that may lack of all of it; 1e-3 costs up to 1e-4, 1e-5 saves 5e-6
 
 
-def switching(setup: Setup, iterate: Iterate, sway_limit: float | None) -> NDArray[np.bool_]:
-    """Tell within which intervals some limit begins or ceases to bind, shape (intervals,)."""
+def switching(
+    setup: Setup,
+    iterate: Iterate,
+    sway_limit: float | None,
+    widened: Container[str] = (),
+    wider: float = 1.0,
+) -> NDArray[np.bool_]:
+    """Tell within which intervals some limit begins or ceases to bind, shape (intervals,).
+
+    Parameters
+    ----------
+    setup : Setup
+    iterate : Iterate
+    sway_limit : float or None
+        m, at the collocation points.
+    widened : container of str
+        Places of limits that are so many times as wide, as `goals.keep_limits` widens them.
+    wider : float
+    """
     transcription = setup.transcription
     local = iterate.local.reshape(transcription.intervals, len(transcription.target), -1)
     taken = []
     for limit in goals.axis_limits(setup.problem, transcription):
         values = np.einsum("krs,ks->kr", limit.rows, local[:, limit.axis])
-        middle, half = (limit.high + limit.low) / 2.0, (limit.high - limit.low) / 2.0
+        give = limit.give * (wider - 1.0) if limit.place in widened else 0.0
+        middle, half = (limit.high + limit.low) / 2.0, (limit.high - limit.low) / 2.0 + give
         taken += [(values - middle) / half, (middle - values) / half]
     if sway_limit is not None:
         sway = np.linalg.norm(transcription.end_sway_found(iterate), axis=1)
-        taken.append(sway.reshape(transcription.intervals, STAGES) / sway_limit)
+        give = wider if "limits.sway" in widened else 1.0
+        taken.append(sway.reshape(transcription.intervals, STAGES) / (give * sway_limit))
     binds = [fractions > 1.0 - REACHED for fractions in taken]
     return np.asarray(np.any([some.any(axis=1) & ~some.all(axis=1) for some in binds], axis=0))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache, cached_property
 
 import attrs
@@ -16,20 +17,24 @@ import attrs
 from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.direct.conic import ConicStatus
+from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.direct.set_up import Setup, set_up
-from gen_profile.solvers.direct.solver import ROUGH, Goal, ProgramSequence, conclude, sequence
-from gen_profile.solvers.direct.transcription import Iterate
+from gen_profile.solvers.direct.solver import ROUGH, Goal, ProgramSequence, begun_at, conclude, sequence
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import LimitsSpec
-from gen_profile.work import budget, left
+from gen_profile.work import OutOfWork, budget, left, spend
 
-PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
+# of the effort without limits: ever less sway would take ever more of it
+PRICES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 ENOUGH = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
 KEPT = 2e-4  # by how much it must fall short of it in the shortest motion; ten times that costs 0.2 %
 RESTS = 0.985  # fraction of a load's limit, for the worst machine after the move; 0.95 to 0.999 give the same
 NEARBY = math.log(1.2)  # to a duration's logarithm, from where a motion is a start for the next one
 SEARCHING = 0.6  # fraction of the work that is left, to find the shortest duration
+REFINING = 0.3  # likewise, to find a shorter one on bisected intervals
+WORTH_REFINING = 1e-3  # of the duration, by which it must fall for another round
+FINEST = 1.0 / 320.0  # of the duration: intervals that are no longer are not bisected
 TINY = 1e-6  # below which how little of the limits is taken does not matter
 
 # what limits take falls with the duration's power of 1 to 4: accelerations with 2, more or less
@@ -60,10 +65,27 @@ class Relaxed:
         """Of the motion, in s."""
         return self.sequence_result.setup.problem.duration
 
-    def start(self, problem: Problem) -> Iterate | None:
+    def start(self, problem: Problem) -> ProgramSequence | None:
         """Give the motion, on its mesh, to begin at; nothing for a problem that is not about as long."""
         nearby = abs(math.log(problem.duration / self.duration)) < NEARBY
-        return self.sequence_result.iterate if nearby else None
+        return self.sequence_result if nearby else None
+
+    def bisected(self) -> Relaxed | None:
+        """Quarter the intervals where limits begin or cease to bind; None where they are short already."""
+        sequence_result, goal = self.sequence_result, self.sequence_result.goal
+        for _ in range(2):
+            where = switching(goal.setup, sequence_result.iterate, goal.sway_limit, goal.widened, self.wider)
+            where &= goal.setup.transcription.piece.length > FINEST
+            if not where.any():
+                break
+            finer, iterate = bisected(goal.setup, sequence_result.iterate, where)
+            goal = attrs.evolve(goal, setup=finer)
+            sequence_result = attrs.evolve(sequence_result, goal=goal, iterate=iterate)
+        return (
+            None
+            if sequence_result is self.sequence_result
+            else attrs.evolve(self, sequence_result=sequence_result)
+        )
 
     @property
     def solution(self) -> Solution:
@@ -99,9 +121,11 @@ class Relaxation:
         unbounded = attrs.evolve(setup, tried=())
         if not self._tried:
             setup = unbounded
+        if self._near is not None and (near := self._near.start(problem)):
+            alike, start = begun_at(setup, near)
+            if start is near.iterate:
+                return alike, near
         rest = setup.transcription.rest()
-        if self._near is not None and (start := self._near.start(problem)) and start.like(rest):
-            return setup, self._near.sequence_result
         free = attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec()))
         return setup, sequence(rest, Goal(setup=free, sway_limit=None), ROUGH)
 
@@ -216,3 +240,25 @@ def shortest(
     with budget(SEARCHING * left()):
         duration = least(excess, start, search)
     return None if duration is None else by_duration[duration]
+
+
+def refined(problem: Problem, found: Relaxed, progress: Progress = no_progress) -> Relaxed:
+    """Find a shorter motion on intervals that are bisected where limits begin or cease to bind.
+
+    Programs with the snap, or with limits of the sway, hardly find any, so they are not asked.
+
+    Parameters
+    ----------
+    problem : Problem
+    found : Relaxed
+        The shortest motion on its mesh, of the nominal machine only.
+    progress : Progress
+    """
+    if problem.worst_case is not None or problem.effort == "snap" or problem.limits.sway is not None:
+        return found
+    longer = math.inf
+    with suppress(OutOfWork), budget(REFINING * left()):
+        while found.duration < (1.0 - WORTH_REFINING) * longer and (finer := found.bisected()) is not None:
+            longer, found = found.duration, shortest(problem, finer, progress=progress) or found
+    spend(0.0)
+    return found

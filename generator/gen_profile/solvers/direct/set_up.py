@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import attrs
 import numpy as np
@@ -20,6 +21,7 @@ from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.bezier import Piece
 from gen_profile.solvers.direct.condensing import axes_map
+from gen_profile.solvers.direct.conic import Matrix
 from gen_profile.solvers.direct.transcription import Iterate, TranscribedMachine, Transcription
 from gen_profile.solvers.indirect.boundary_value_problem import (
     BoundaryValueProblem,
@@ -100,6 +102,11 @@ class Setup:
     def sees_all(self) -> bool:
         """Whether the effort depends on the highest derivative of the motion's polynomials."""
         return self.problem.effort != "reference" or self.transcription.piece.order == 3
+
+    @cached_property
+    def effort_form(self) -> Matrix:
+        """Twice the effort of a motion as a quadratic form of a program's variables but the goal's."""
+        return self.transcription.effort(self.forms)
 
     def effort(self, local: Array) -> float:
         """Evaluate the effort of a motion, in units of `cost_scale`."""

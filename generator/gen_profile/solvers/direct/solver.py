@@ -14,7 +14,6 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from scipy import sparse
 
 from gen_profile.motion.profile import Array
 from gen_profile.problem.axis_reach import axis_reach
@@ -26,7 +25,7 @@ from gen_profile.solvers.direct.bezier import power_basis
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
 from gen_profile.solvers.direct.refinement import bisected, switching
-from gen_profile.solvers.direct.set_up import DirectOptions, Setup, set_up
+from gen_profile.solvers.direct.set_up import DirectOptions, Setup, on_mesh, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.solvers.solution import HORIZONTAL, LATER, LONGER, WIDER, Optimum, Solution, Status
@@ -99,10 +98,12 @@ class Goal:
             linear[-1] = 1.0
             if self.widened:
                 program.at_most(-linear[None], np.zeros(1))
-            return self.effort_price * transcription.effort(setup.forms, program.variables), linear
+            quadratic = self.effort_price * setup.effort_form
+            quadratic.resize(program.variables, program.variables)
+            return quadratic, linear
         scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
-        expanded, slope = goals.cost(transcription, setup.forms, scaled, iterate, maps[0])
-        quadratic = sparse.csc_matrix(expanded)
+        expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
+        quadratic = expanded.copy()
         quadratic.resize(program.variables, program.variables)
         linear[: len(slope)] = slope
         return quadratic, linear
@@ -155,7 +156,7 @@ class ProgramSequence:
 
 def solve(
     problem: Problem,
-    near: Iterate | None = None,
+    near: ProgramSequence | None = None,
     *,
     coarse: bool = False,
     options: DirectOptions | None = None,
@@ -165,10 +166,10 @@ def solve(
     Parameters
     ----------
     problem : Problem
-    near : Iterate, optional
-        A motion to begin at, in place of standing still, if it is on as many intervals.
+    near : ProgramSequence, optional
+        A motion to begin at, on its mesh, in place of standing still.
     coarse : bool
-        On even intervals only, which tell as well whether there is a motion.
+        On the first mesh only, which tells as well whether there is a motion.
     options : DirectOptions, optional
 
     Returns
@@ -178,9 +179,7 @@ def solve(
     """
     setup, redundant = set_up(problem, options=options)
     sway_cost, iterations = resolve_sway_cost(setup.problem)
-    start = setup.transcription.rest()
-    if near is not None and near.like(start):
-        start = near
+    setup, start = begun_at(setup, near)
 
     def attempt(sway_limit: float | None) -> Solution:
         nonlocal setup, iterations, start
@@ -193,6 +192,15 @@ def solve(
         return conclude(result, iterations)
 
     return attrs.evolve(within_sway(problem, attempt), problem=problem, redundant=redundant)
+
+
+def begun_at(setup: Setup, near: ProgramSequence | None) -> tuple[Setup, Iterate]:
+    """Take over a motion with its mesh, if it is one of as many machines; else stand still."""
+    if near is not None:
+        alike = on_mesh(setup, near.setup.transcription.piece.length)
+        if near.iterate.like(alike.transcription.rest()):
+            return alike, near.iterate
+    return setup, setup.transcription.rest()
 
 
 def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:

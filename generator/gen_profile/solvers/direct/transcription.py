@@ -20,6 +20,7 @@ convex programming).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import attrs
 import numpy as np
@@ -187,18 +188,11 @@ class Transcription:
         """
         width = self.variables + extra
         program = ConicProgram(np.concatenate([self.units, np.ones(extra)]))
-        orders = self.piece.order
-        first = self._per_axis(np.eye(self.piece.size)[:orders])
-        ends = [self.piece.derivative(order)[:, -1] for order in range(orders)]
-        last = self._per_axis(np.stack(ends, axis=1))
-        columns = self.local_columns
-        program.equal(
-            _repeated(first, columns, width) - _after(place(last[:-1], columns[:-1], width), len(first)),
-            np.zeros(len(first) * self.intervals),
-        )
-        end = np.zeros((len(self.target), orders))
-        end[:, 0], end[:, 1] = self.target, self.final_velocity
-        program.equal(place(last[-1:], columns[-1:], width), end.ravel())
+        columns, (joints, end) = self.local_columns, self._joints
+        program.equal(joints, np.zeros(joints.shape[0]))
+        reached = np.zeros((len(self.target), self.piece.order))
+        reached[:, 0], reached[:, 1] = self.target, self.final_velocity
+        program.equal(end, reached.ravel())
         machine, linear, nodes = self.machines[0], maps[0], self.node_columns
         n = len(machine.scale)
         moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
@@ -208,6 +202,16 @@ class Transcription:
         )
         program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
         return program
+
+    @cached_property
+    def _joints(self) -> tuple[Matrix, Matrix]:
+        """From the variables to leaps of the axes' motion and derivatives at nodes, and these at the end."""
+        orders, columns, width = self.piece.order, self.local_columns, self.variables
+        first = self._per_axis(np.eye(self.piece.size)[:orders])
+        ends = [self.piece.derivative(order)[:, -1] for order in range(orders)]
+        last = self._per_axis(np.stack(ends, axis=1))
+        before = _after(place(last[:-1], columns[:-1], width), len(first))
+        return _repeated(first, columns, width) - before, place(last[-1:], columns[-1:], width)
 
     def bound(
         self, program: ConicProgram, rows: Array, bounds: tuple[float, float], axis: int, give: float = 0.0
@@ -229,13 +233,14 @@ class Transcription:
         program.at_most(matrix, upper, give)
         program.at_most(-matrix, -lower, give)
 
-    def effort(self, blocks: Sequence[Array], width: int) -> Matrix:
+    def effort(self, blocks: Sequence[Array]) -> Matrix:
         """Join quadratic forms per axis, of every interval's local coordinates, into one of all variables."""
         whole = np.zeros((self.intervals, *(len(self.target), self.piece.size) * 2))
         for axis, block in enumerate(blocks):
             whole[:, axis, :, axis] = block
-        square = place(whole.reshape(self.intervals, self.breadth, -1), self.local_columns, width)
-        return sparse.vstack([square, sparse.csc_matrix((width - square.shape[0], width))], format="csc")
+        square = place(whole.reshape(self.intervals, self.breadth, -1), self.local_columns, self.variables)
+        square.resize(self.variables, self.variables)
+        return square
 
     def end_sway(self, iterate: Iterate, maps: IntervalMaps, width: int) -> tuple[Array, Matrix, Array]:
         """Linearise the end load's sway of the nominal machine at the collocation points.
@@ -326,7 +331,7 @@ class Transcription:
 
 def _after(matrix: Matrix, rows: int) -> Matrix:
     """Move a matrix down by some rows of zeros."""
-    return sparse.vstack([sparse.csc_matrix((rows, matrix.shape[1])), matrix], format="csc")
+    return sparse.vstack([sparse.csr_matrix((rows, matrix.shape[1])), matrix], format="csr")
 
 
 def _repeated(block: Array, columns: IntArray, width: int) -> Matrix:

@@ -1,0 +1,156 @@
+"""What a planner block knows of a sensor of the load: constants, and words of its header."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile_exporters.block_source import initialiser
+from gen_profile_exporters.playback.structured_text import literal
+
+Array = NDArray[np.float64]
+
+LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
+KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
+NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
+ROWS_BEFORE = 4  # of the model by mode, where one axis is planned: frequency, decay, error and sway
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SensorConstants:
+    """A sensor, and what is done by it.
+
+    Attributes
+    ----------
+    words, unit, load : str
+        What is measured, in which unit; and the load whose sway is an output.
+    rate : bool
+        Whether it measures a rate.
+    age, oldest, drop_out : float
+        s: usual age of a value, the greatest, and for how long there may be none.
+    most, step, gate, frozen, noisy, offset : float
+        In its unit: what it may show; change from cycle to cycle; difference from what is expected, and
+        the change of that while the value stays the same; mean square change; offset.
+    swing, floor, begin, again, end : float
+        m, of the slowest mode: what is unknown at first and later; where damping begins as the axis arrives,
+        where later at rest, and where it ends.
+    gains : (3,) sequence of float
+        Of sway, its rate and position, in pulses of a slot.
+    room : float
+        m, by which damping may lead away.
+    """
+
+    words: str
+    unit: str
+    load: str
+    rate: bool
+    age: float
+    oldest: float
+    drop_out: float
+    most: float
+    step: float
+    gate: float
+    frozen: float
+    noisy: float
+    offset: float
+    swing: float
+    floor: float
+    begin: float
+    again: float
+    end: float
+    gains: Sequence[float]
+    room: float
+
+
+def damping_slots(frequencies: Array) -> int:
+    """Slots of the damping kernel at some frequencies, rising."""
+    if len(frequencies) == 1:
+        return LEAST_SLOTS
+    return max(LEAST_SLOTS, round(KERNEL_PERIODS * float(frequencies[0] / frequencies[1])))
+
+
+def damping_rows(modes: int) -> int:
+    """Conditions of the damping kernel."""
+    return 2 * modes - 1
+
+
+def values(sensor: SensorConstants | None) -> dict[str, str]:
+    """Words and numbers of the declarations."""
+    if sensor is None:
+        return {}
+    return {
+        "measured": sensor.words,
+        "sensor_unit": sensor.unit,
+        "sensor_age": literal(sensor.age),
+        "drop_out": f"{sensor.drop_out:g}",
+        "room": f"{sensor.room:.3g}",
+        "end_load": sensor.load,
+    }
+
+
+def lengths(sensor: SensorConstants | None, modes: int, cycle: float) -> dict[str, int]:
+    """Lengths of arrays."""
+    if sensor is None:
+        return {}
+    rows = damping_rows(modes)
+    return {"expected": _expected(sensor, cycle), "damp_row": rows, "damp_gram": rows**2}
+
+
+def whole(sensor: SensorConstants | None, modes: int, cycle: float) -> dict[str, int]:
+    """Give the constants that are whole numbers."""
+    if sensor is None:
+        return {}
+    return {
+        "cSensorRow": ROWS_BEFORE * modes,
+        "cExpectedLength": _expected(sensor, cycle),
+        "cDropOutCycles": max(1, round(sensor.drop_out / cycle)),
+        "cDampRows": damping_rows(modes),
+        "cDampLeastSlots": LEAST_SLOTS,
+    }
+
+
+def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
+    """Give the other constants."""
+    if sensor is None:
+        return {}
+    return {
+        "cSensorOldest": sensor.oldest,
+        "cSensorMost": sensor.most,
+        "cSensorStep": sensor.step,
+        "cSensorGate": sensor.gate,
+        "cSensorFrozen": sensor.frozen,
+        "cSensorNoisy": sensor.noisy,
+        "cSensorSmoothing": min(1.0, cycle / NOISE_WATCHED),
+        "cSensorOffset": sensor.offset,
+        "cSensorFloor": sensor.floor,
+        "cSwing": sensor.swing,
+        "cDampFrom": sensor.begin,
+        "cDampAgain": sensor.again,
+        "cDampTo": sensor.end,
+        "cDampRoom": sensor.room,
+        "cDampLength": KERNEL_PERIODS,
+    }
+
+
+def _expected(sensor: SensorConstants, cycle: float) -> int:
+    """Cycles in which a value may be as old as the oldest."""
+    return int(sensor.oldest / cycle) + 3
+
+
+def cycle_work(sensor: SensorConstants | None, modes: int) -> int:
+    """Floating-point operations of every cycle."""
+    return 0 if sensor is None else 60 + 40 * modes
+
+
+def other(sensor: SensorConstants | None) -> list[str]:
+    """Declare the constants that are no single numbers."""
+    if sensor is None:
+        return []
+    gains = initialiser([literal(gain) for gain in sensor.gains])
+    return [
+        f"    cSensorRate : BOOL := {str(sensor.rate).upper()}; (* it measures a rate *)",
+        f"    cDampGain : ARRAY [0..{len(sensor.gains) - 1}] OF LREAL := {gains};",
+    ]

@@ -1,0 +1,5 @@
+"""Commands that put a table into a controller, and one that simulates a controller."""
+
+from gen_profile.cli.deployment import commands
+
+__all__ = ["commands"]

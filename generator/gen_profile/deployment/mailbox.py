@@ -1,0 +1,233 @@
+"""Requests to a playback block whose numbers are variables, and its replies (``buffers.st`` answers them)."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import DeploymentError
+from gen_profile.motion.profile import Array
+from gen_profile_exporters.playback.buffers import FIRST, LENGTH, RESULTS, TRIALS, WINDOW
+
+READ, WRITE, SWITCH, RELEASE = range(4)
+IN_USE, IDLE = 0, 1  # buffers
+ACCEPTED, HELD, MOVES, UNFIT = range(len(RESULTS))
+UNTRIED, TRIED, PASSED, REJECTED = range(len(TRIALS))
+UNCHECKED, RIGHT, WRONG = range(3)  # the checksum of the buffer in use
+REFUSALS = {
+    HELD: "Another deployment is under way, or broke off within the last 30 s; run this again after it.",
+    MOVES: "The block moves, waits to, or is trying another table; run this again when it stands still.",
+    UNFIT: "The block finds another table in its idle buffer than was written there, as if something else "
+    "wrote to it; find out what does, and run this again.",
+}
+REOPENED, SENT, LOOKS = 3, 4, 200  # times that a connection, a request, and a reply to it are tried
+PAUSE = 0.005  # s between two looks for a reply
+
+
+class LinkLostError(Exception):
+    """The connection to a controller broke."""
+
+
+class BlockRefusedError(DeploymentError):
+    """The block declined a request, and uses the table that it had."""
+
+
+class MailboxLink(Protocol):
+    """A way to the two arrays of a block."""
+
+    def write(self, request: Array) -> None:
+        """Write the whole of ``aRequest``; raises `LinkLostError`, or `DeploymentError` if it is refused."""
+
+    def read(self) -> Array:
+        """Read the whole of ``aReply``; raises likewise."""
+
+    def reopen(self) -> None:
+        """Connect again; raises likewise."""
+
+
+def _whole() -> Any:
+    """Take a whole number that came as a double."""
+    return attrs.field(converter=int)
+
+
+@attrs.frozen(kw_only=True)
+class BlockStatus:
+    """What a block says of itself with every reply."""
+
+    result: int
+    interface: int = _whole()
+    kind: int = _whole()
+    layout: int = _whole()
+    axes: int = _whole()
+    cycle_time: float
+    capacity: int = _whole()
+    state: int = _whole()
+    trial: int = _whole()
+    buffer: int = _whole()
+    checked: int = _whole()
+    checksum: float
+
+
+class Mailbox:
+    """A client of a block, which the block knows by a number.
+
+    Parameters
+    ----------
+    link : MailboxLink
+    pause : callable
+        Waits for so many seconds.
+    """
+
+    def __init__(self, link: MailboxLink, pause: Callable[[float], None] = time.sleep) -> None:
+        self._link, self._pause = link, pause
+        self._owner = 1 + secrets.randbelow(2**31 - 2)
+        self._number = 1 + secrets.randbelow(2**30)
+
+    def status(self) -> BlockStatus:
+        """Ask how the block stands."""
+        return self._exchange(READ)[0]
+
+    def settled(self) -> BlockStatus:
+        """Ask until the checksum of the buffer in use was worked out, a second or two.
+
+        Raises
+        ------
+        DeploymentError
+            It is not.
+        """
+        for _ in range(20 * LOOKS):
+            status = self.status()
+            if status.trial != TRIED and status.checked != UNCHECKED:
+                return status
+            self._pause(PAUSE)
+        raise DeploymentError("The block does not work out its table's checksum; look after its task.")
+
+    def read(self, buffer: int, length: int) -> Array:
+        """Read a buffer's first values."""
+        parts = [
+            self._exchange(READ, buffer=buffer, place=place, count=min(WINDOW, length - place))[1]
+            for place in range(0, length, WINDOW)
+        ]
+        return np.concatenate(parts)
+
+    def write(self, values: Array) -> None:
+        """Write to the idle buffer, and hold every part to its echo.
+
+        Raises
+        ------
+        DeploymentError
+        """
+        for place in range(0, len(values), WINDOW):
+            part = values[place : place + WINDOW]
+            _, echo = self._exchange(WRITE, buffer=IDLE, place=place, count=len(part), data=part)
+            require_same(echo, part, place)
+
+    def switch(self, checksum: float) -> None:
+        """Have the idle buffer used, if it is the one of a checksum; wait until the block has tried it.
+
+        Raises
+        ------
+        BlockRefusedError
+            The block moves or holds another table, or finds it wrong and uses the former one again.
+        DeploymentError
+        """
+        self._exchange(SWITCH, checksum=checksum)
+        status = self.settled()
+        if status.checksum != checksum:
+            raise BlockRefusedError(
+                "The block found the new table's checksum wrong: a value was altered in the controller. Run "
+                "this again; if that recurs, its memory is at fault."
+            )
+
+    def release(self) -> None:
+        """Let others write."""
+        self._exchange(RELEASE)
+
+    def _exchange(
+        self,
+        command: int,
+        *,
+        buffer: int = IN_USE,
+        place: int = 0,
+        count: int = 0,
+        checksum: float = 0.0,
+        data: Array | None = None,
+    ) -> tuple[BlockStatus, Array]:
+        """Send a request until its reply comes; all of them may be sent again."""
+        self._number += 1
+        request = np.zeros(LENGTH)
+        request[:7] = (self._number, self._owner, command, buffer, place, count, checksum)
+        if data is not None:
+            request[FIRST : FIRST + len(data)] = data
+        request[-1] = self._number
+        lost = 0
+        for _ in range(SENT):
+            while True:
+                try:
+                    if (reply := self._answered(request)) is not None:
+                        return _understood(reply, count)
+                    break
+                except LinkLostError:
+                    lost += 1
+                    if lost > REOPENED:
+                        raise
+                    self._pause(PAUSE)
+                    self._link.reopen()
+        raise DeploymentError(
+            "The block does not answer, as if it were not called in any task, or another client wrote to it "
+            "all the time; look after the task, and run this again."
+        )
+
+    def _answered(self, request: Array) -> Array | None:
+        self._link.write(request)
+        for _ in range(LOOKS):
+            reply = self._link.read()
+            if len(reply) != LENGTH:
+                raise DeploymentError(
+                    f"aReply has {len(reply)} values there in place of {LENGTH}: something shortened it. "
+                    "Restart the controller's server, and run this again."
+                )
+            if reply[0] == reply[-1] == request[0]:
+                return reply
+            self._pause(PAUSE)
+        return None
+
+
+def _understood(reply: Array, count: int) -> tuple[BlockStatus, Array]:
+    """Read a reply; raises DeploymentError where it refuses."""
+    result, *rest = reply[1:13].tolist()
+    if result in REFUSALS:
+        raise BlockRefusedError(REFUSALS[int(result)])
+    names = [field.name for field in attrs.fields(BlockStatus)][1:]
+    status = BlockStatus(result=int(result), **dict[str, Any](zip(names, rest, strict=True)))
+    return status, reply[FIRST : FIRST + count].copy()
+
+
+def differing(found: Array, due: Array) -> list[int]:
+    """List the places where values differ in any bit."""
+    return np.flatnonzero(found.view(np.uint64) != due.view(np.uint64)).tolist()
+
+
+def require_same(found: Array, due: Array, place: int = 0) -> None:
+    """Hold values that were read back to those that were written, bit for bit.
+
+    Raises
+    ------
+    DeploymentError
+    """
+    places = differing(found, due)
+    if not places:
+        return
+    first = places[0]
+    words = f"value {place + first} is {float(found[first])!r} there, not {float(due[first])!r}"
+    if (found == due.astype(np.float32)).all():
+        words += ": something on the way rounds to REAL"
+    raise DeploymentError(
+        f"{len(places)} of {len(due)} values were altered on the way ({words}); let the controller show "
+        "aRequest and aReply as arrays of LREAL, and run this again."
+    )

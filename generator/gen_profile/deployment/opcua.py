@@ -1,0 +1,253 @@
+"""A playback block behind an OPC UA server: found by browsing, reached through its two arrays."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Coroutine
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import attrs
+import numpy as np
+from asyncua import Client, ua
+from asyncua.crypto import security_policies
+from asyncua.crypto.uacrypto import CertProperties, x509_from_der
+
+from gen_profile.deployment.certificates import fingerprint, own_certificate, require_current
+from gen_profile.deployment.mailbox import LinkLostError
+from gen_profile.errors import DeploymentError
+from gen_profile.motion.profile import Array
+from gen_profile_exporters.playback.buffers import LENGTH, REPLY, REQUEST
+
+Security = Literal["sign-and-encrypt", "sign", "none"]
+MODES = {"sign-and-encrypt": "SignAndEncrypt", "sign": "Sign", "none": "None_"}
+POLICIES = ("Aes256Sha256RsaPss", "Basic256Sha256", "Aes128Sha256RsaOaep")  # the strongest first
+TIMEOUT, SESSION = 4.0, 600  # s of a single service, and that a server keeps a silent session
+DEPTH, MOST_NODES = 10, 50_000  # that are browsed
+REFUSED = (  # what the server has decided, and would decide again
+    ua.uaerrors.BadUserAccessDenied,
+    ua.uaerrors.BadIdentityTokenInvalid,
+    ua.uaerrors.BadIdentityTokenRejected,
+    ua.uaerrors.BadNotWritable,
+    ua.uaerrors.BadNotReadable,
+    ua.uaerrors.BadTypeMismatch,
+    ua.uaerrors.BadWriteNotSupported,
+    ua.uaerrors.BadSecurityChecksFailed,
+    ua.uaerrors.BadCertificateUntrusted,
+    ua.uaerrors.BadCertificateTimeInvalid,
+)
+
+Given = TypeVar("Given")
+logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
+
+
+@attrs.frozen(kw_only=True)
+class OpcUaAccess:
+    """How a server is reached.
+
+    Attributes
+    ----------
+    url : str
+        ``opc.tcp://…``
+    security : str
+    certificate : Path or None
+        PEM file with this program's certificate and key; made where it is not there.
+    fingerprint : str
+        SHA-256 of the server's certificate, which was compared.
+    user, password : str
+        Empty for none.
+    instance : str
+        End of the path of the block's instance, where the server shows several.
+    """
+
+    url: str
+    security: Security = "sign-and-encrypt"
+    certificate: Path | None = None
+    fingerprint: str = ""
+    user: str = ""
+    password: str = attrs.field(default="", repr=False)
+    instance: str = ""
+
+
+class OpcUaLink:
+    """A connection to one instance of a block; a context.
+
+    Parameters
+    ----------
+    access : OpcUaAccess
+
+    Raises
+    ------
+    DeploymentError
+        The server cannot be reached or trusted, refuses, or shows no block, or several.
+    """
+
+    def __init__(self, access: OpcUaAccess) -> None:
+        self._access, self._runner = access, asyncio.Runner()
+        self._client: Any = None
+        self._request: Any = None
+        self._reply: Any = None
+        self.instance = ""
+        self.server: dict[str, str] = {}
+        try:
+            self._run(self._connect())
+        except LinkLostError as error:
+            self.close()
+            raise DeploymentError(
+                f"{access.url} cannot be reached ({error}); look at the address, the port and the network."
+            ) from error
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> OpcUaLink:
+        """Give itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the connection."""
+        self.close()
+
+    def close(self) -> None:
+        """End the connection, if it stands."""
+        with suppress(LinkLostError, DeploymentError):
+            self._run(self._disconnect())
+        self._runner.close()
+
+    def write(self, request: Array) -> None:
+        """Write the whole request; without time stamps, which some servers refuse."""
+        value = ua.DataValue(ua.Variant(request.tolist(), ua.VariantType.Double))
+        self._run(self._request.write_value(value))
+
+    def read(self) -> Array:
+        """Read the whole reply."""
+        return _doubles(self._run(self._reply.read_data_value()), REPLY)
+
+    def reopen(self) -> None:
+        """Connect again."""
+        with suppress(LinkLostError, DeploymentError):
+            self._run(self._disconnect())
+        self._run(self._connect())
+
+    def _run(self, work: Coroutine[Any, Any, Given]) -> Given:
+        try:
+            return self._runner.run(work)
+        except REFUSED as error:
+            raise DeploymentError(f"The server refuses: {error}; look at the rights of this user.") from error
+        except (OSError, TimeoutError, ua.UaError) as error:
+            raise LinkLostError(str(error) or type(error).__name__) from error
+
+    async def _connect(self) -> None:
+        access = self._access
+        self._client = client = Client(access.url, timeout=TIMEOUT)
+        client.session_timeout = 1000 * SESSION
+        await self._secure(client)
+        if access.user:
+            client.set_user(access.user)
+            client.set_password(access.password)
+        await client.connect()
+        path, self._request, self._reply = _chosen(
+            [found async for found in _instances(client)], access.instance, access.url
+        )
+        self.instance = path
+        for node, name in ((self._request, REQUEST), (self._reply, REPLY)):
+            if (length := len(_doubles(await node.read_data_value(), name))) != LENGTH:
+                raise DeploymentError(
+                    f"{path}/{name} has {length} values there in place of {LENGTH}: an earlier client "
+                    "shortened it, or the block is of another version. Restart the controller's server."
+                )
+        self.server = {"url": access.url, "instance": path, "security": access.security, **self.server}
+
+    async def _secure(self, client: Any) -> None:
+        """Choose an endpoint, and hold its certificate to the fingerprint that was compared."""
+        access = self._access
+        offered = await client.connect_and_get_server_endpoints()
+        mode = getattr(ua.MessageSecurityMode, MODES[access.security])
+        found = {one.SecurityPolicyUri.rpartition("#")[2].replace("_", ""): one for one in offered
+                 if one.SecurityMode == mode}  # fmt: skip
+        name = next((name for name in POLICIES if name in found), None)
+        if access.certificate is None and "None" in found:
+            self.server = {"policy": "None", "certificate_sha256": "", "user": ""}
+            return
+        if access.certificate is None or name is None:
+            modes = sorted({one.SecurityMode.name.rstrip("_") for one in offered})
+            raise DeploymentError(
+                f"{access.url} offers no {access.security} with a policy that is still held to be safe, only "
+                f"{', '.join(modes)}; enable it there, or ask for the security that there is."
+            )
+        der = found[name].ServerCertificate
+        shown = fingerprint(der)
+        if shown != _plain(access.fingerprint):
+            asked = "another one than was named" if access.fingerprint else "not known here yet"
+            raise DeploymentError(
+                f"The certificate of {access.url} is {asked}: its SHA-256 is {shown}. Compare that with what "
+                f"the controller itself shows, and name it as the fingerprint."
+            )
+        require_current(x509_from_der(der), f"The certificate of {access.url}")
+        own = own_certificate(access.certificate)
+        client.application_uri = own.uri
+        await client.set_security(
+            getattr(security_policies, f"SecurityPolicy{name}"),
+            CertProperties(own.der),
+            CertProperties(own.key, extension="pem"),
+            server_certificate=CertProperties(der),
+            mode=mode,
+        )
+        self.server = {"policy": name, "certificate_sha256": shown, "user": access.user}
+
+    async def _disconnect(self) -> None:
+        if self._client is not None:
+            client, self._client = self._client, None
+            await client.disconnect()
+
+
+def _plain(text: str) -> str:
+    """Leave out what a fingerprint is written with."""
+    return "".join(sign for sign in text.lower() if sign.isalnum()).removeprefix("sha256")
+
+
+def _doubles(value: Any, name: str) -> Array:
+    """Take an array of doubles, and nothing that was converted to another type."""
+    found = value.Value
+    if found is None or found.VariantType != ua.VariantType.Double or not isinstance(found.Value, list):
+        kind = "nothing" if found is None else f"{'array' if isinstance(found.Value, list) else 'value'} of "
+        type_ = "" if found is None else found.VariantType.name
+        raise DeploymentError(
+            f"{name} is {kind}{type_} there, not an array of Double; let the server show it as LREAL."
+        )
+    return np.array(found.Value, dtype=np.float64)
+
+
+async def _instances(client: Any) -> Any:
+    """Browse for what has both arrays, level by level; give paths and the two nodes."""
+    level: list[tuple[str, Any]] = [("", client.nodes.objects)]
+    seen: set[Any] = {client.nodes.server.nodeid}
+    for _ in range(DEPTH):
+        below: list[tuple[str, Any]] = []
+        for path, node in level:
+            children = await node.get_children_descriptions()
+            named = {one.BrowseName.Name: one.NodeId for one in children}
+            if REQUEST in named and REPLY in named:
+                yield path, client.get_node(named[REQUEST]), client.get_node(named[REPLY])
+            for one in children:
+                if one.NodeId not in seen and one.NodeClass != ua.NodeClass.Method:
+                    seen.add(one.NodeId)
+                    name = one.BrowseName.Name
+                    below.append((f"{path}/{name}" if path else name, client.get_node(one.NodeId)))
+        level = below if len(seen) < MOST_NODES else []
+
+
+def _chosen(found: list[tuple[str, Any, Any]], instance: str, url: str) -> tuple[str, Any, Any]:
+    fitting = [one for one in found if f"/{one[0]}".endswith(f"/{instance}" if instance else "")]
+    if len(fitting) == 1:
+        return fitting[0]
+    paths = ", ".join(one[0] for one in found)
+    if not found:
+        raise DeploymentError(
+            f"{url} shows no block with {REQUEST} and {REPLY}: load one that was exported with "
+            'export.plc_tables = "variables", and let the server show these two arrays of its instance.'
+        )
+    words = f"none that ends in {instance}" if instance and not fitting else "several"
+    raise DeploymentError(f"{url} shows {words} ({paths}); name one as the instance.")

@@ -1,0 +1,155 @@
+"""A simulated controller: an OPC UA server with a playback block that runs behind it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import attrs
+import numpy as np
+from asyncua import Server, ua
+from asyncua.crypto.permission_rules import User, UserRole
+
+from gen_profile.deployment.certificates import fingerprint, own_certificate
+from gen_profile.deployment.simulated_block import SimulatedBlock
+from gen_profile.deployment.table import BlockTable
+from gen_profile.errors import OutputError
+
+LOOPBACK = "127.0.0.1"
+LONGEST = 0.02  # s between two looks at what clients wrote
+NAMESPACE = "urn:gen-profile:plc-sim"
+logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
+
+
+@attrs.frozen(kw_only=True)
+class PlcSimOptions:
+    """How the server may be reached: its port, its certificate (made for the time if None), a user.
+
+    Without security, any program on this computer is let in.
+    """
+
+    port: int = 4840
+    secure: bool = True
+    certificate: Path | None = None
+    user: str = ""
+    password: str = attrs.field(default="", repr=False)
+
+
+class SimulatedController:
+    """The server.
+
+    Parameters
+    ----------
+    table : BlockTable
+    options : PlcSimOptions
+    """
+
+    def __init__(self, table: BlockTable, options: PlcSimOptions) -> None:
+        self.block, self._options = SimulatedBlock(table), options
+        self.name, self._cycle = table.source.name, table.spec.export.cycle_time
+        self._inputs: dict[str, Any] = {}
+        self._outputs: dict[str, Any] = {}
+        self.fingerprint = ""
+        self.ended = asyncio.Event()
+
+    async def serve(self, ready: Callable[[str, str], None]) -> None:
+        """Play until `ended` is set; tell the address and the certificate's fingerprint once it answers.
+
+        Raises
+        ------
+        OutputError
+            The port cannot be had.
+        """
+        users = _Users(self._options) if self._options.user else None
+        server = Server(user_manager=users)
+        await server.init()
+        address = f"opc.tcp://{LOOPBACK}:{self._options.port}"
+        server.set_endpoint(address)
+        server.set_server_name("gen-profile plc-sim")
+        await self._secure(server)
+        await self._show(server)
+        try:
+            await server.start()
+        except OSError as error:
+            raise OutputError(f"port {self._options.port}: {error.strerror}; name another one.") from error
+        try:
+            ready(address, self.fingerprint)
+            await self._play()
+        finally:
+            await server.stop()
+
+    async def _secure(self, server: Any) -> None:
+        if not self._options.secure:
+            server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+            return
+        with TemporaryDirectory() as folder:
+            own = own_certificate(self._options.certificate or Path(folder) / "own.pem")
+        await server.set_application_uri(own.uri)
+        await server.load_certificate(own.der)
+        await server.load_private_key(own.key, format="pem")
+        self.fingerprint = fingerprint(own.der)
+        kinds = ("Aes256Sha256RsaPss", "Basic256Sha256", "Aes128Sha256RsaOaep")
+        server.set_security_policy(
+            [getattr(ua.SecurityPolicyType, f"{kind}_SignAndEncrypt") for kind in kinds]
+        )
+        user = ua.UserNameIdentityToken if self._options.user else ua.AnonymousIdentityToken
+        server.set_identity_tokens([user])
+
+    async def _show(self, server: Any) -> None:
+        """Add the instance, with its inputs, which clients write, and its outputs."""
+        space = await server.register_namespace(NAMESPACE)
+        instance = await server.nodes.objects.add_object(space, self.name)
+        for name in self.block.names:
+            node = await instance.add_variable(space, name, _shown(name, self.block.get(name)))
+            await node.set_writable()
+            self._inputs[name] = node
+        for name, values in self.block.outputs.items():
+            self._outputs[name] = await instance.add_variable(space, name, _shown(name, values))
+
+    async def _play(self) -> None:
+        """Call the block as often as the time that has passed asks for."""
+        begun, called = time.monotonic(), 0
+        while not self.ended.is_set():
+            due = int((time.monotonic() - begun) / self._cycle)
+            if due > called:
+                await self.turn(due - called)
+                called = due
+            await asyncio.sleep(min(self._cycle, LONGEST))
+
+    async def turn(self, cycles: int) -> None:
+        """Take the inputs over, call the block, show the outputs."""
+        for name, node in self._inputs.items():
+            given = np.ravel(np.asarray(await node.read_value(), dtype=np.float64))
+            if len(given) == len(self.block.inputs[name]):
+                self.block.set(name, given)
+        before = self.block.outputs
+        self.block.run(cycles)
+        for name, values in self.block.outputs.items():
+            if not np.array_equal(values, before[name]):
+                await self._outputs[name].write_value(_shown(name, values))
+
+
+class _Users:
+    """Lets one user in."""
+
+    def __init__(self, options: PlcSimOptions) -> None:
+        self._options = options
+
+    def get_user(self, _server: Any, username: str = "", password: str = "", **_: Any) -> Any:
+        known = (username, password) == (self._options.user, self._options.password)
+        return User(role=UserRole.User) if known else None
+
+
+def _shown(name: str, values: np.ndarray[Any, Any]) -> Any:
+    """Give a variable of the block the type that its name tells."""
+    type_ = {"b": ua.VariantType.Boolean, "n": ua.VariantType.Int32, "r": ua.VariantType.Double}.get(
+        name[0], ua.VariantType.Double
+    )
+    convert = {ua.VariantType.Boolean: bool, ua.VariantType.Int32: int}.get(type_, float)
+    listed = [convert(value) for value in values.tolist()]
+    return ua.Variant(listed if len(listed) > 1 else listed[0], type_)

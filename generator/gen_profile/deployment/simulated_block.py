@@ -1,0 +1,73 @@
+"""A playback block in a controller that is simulated: its own text, compiled, called cycle by cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from gen_profile.deployment.table import BlockTable
+from gen_profile.motion.profile import Array
+from gen_profile.planner.execution import BlockInstance
+from gen_profile_exporters.playback.buffers import REPLY, REQUEST
+
+GUIDING = ("bBusy", "bDone", "bAborted")  # while one of them is set, the axes follow
+
+
+class SimulatedBlock:
+    """An instance with its inputs and outputs, and axes that stand wherever it sends them.
+
+    Parameters
+    ----------
+    table : BlockTable
+
+    Raises
+    ------
+    ExportError, CosimulationError
+        As `BlockInstance`.
+    """
+
+    def __init__(self, table: BlockTable) -> None:
+        self._instance = BlockInstance(table.source.text())
+        self.inputs = _places(self._instance.inputs)
+        self._places = _places(self._instance.outputs)
+        self._row = np.array(list(self._instance.inputs.values()))
+        self.outputs = {name: np.zeros(len(places)) for name, places in self._places.items()}
+        self.set("fCycleTime", np.array([table.spec.export.cycle_time]))
+        self.set("fActPosition", table.start)
+
+    @property
+    def names(self) -> list[str]:
+        """Inputs that a user sets."""
+        return [name for name in self.inputs if name not in {"fCycleTime", "fActPosition"}]
+
+    def get(self, name: str) -> Array:
+        """Give an input's elements."""
+        return self._row[self.inputs[name]].copy()
+
+    def set(self, name: str, values: Array) -> None:
+        """Set an input's elements."""
+        self._row[self.inputs[name]] = values
+
+    def run(self, cycles: int) -> None:
+        """Call the block so often; the axes follow from cycle to cycle."""
+        issued = self._instance.call(np.tile(self._row, (cycles, 1)))[-1]
+        self.outputs = {name: issued[places] for name, places in self._places.items()}
+        if any(self.outputs[name][0] for name in GUIDING):
+            self.set("fActPosition", self.outputs["fPosition"])
+
+    def request(self, values: Array) -> None:
+        """Write a request."""
+        self.set(REQUEST, values)
+
+    def reply(self) -> Array:
+        """Read the reply."""
+        return self.outputs[REPLY].copy()
+
+
+def _places(elements: Iterable[str]) -> dict[str, list[int]]:
+    """Gather the places of each variable's elements: those of ``a[0]`` and ``a[1]`` under ``a``."""
+    found: dict[str, list[int]] = {}
+    for number, name in enumerate(elements):
+        found.setdefault(name.partition("[")[0], []).append(number)
+    return found

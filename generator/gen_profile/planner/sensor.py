@@ -1,0 +1,357 @@
+"""What a planner block has to know of a sensor of the load: an observer's gains, and when to damp.
+
+Each mode is followed in the sway z of the load that shows it most, z'' = push a − ω² z, and measured as
+y = Σ shown z (or of z') + offset. The gains are those of the steady Kalman filter of these and the offset
+(Kalman and Bucy 1961); they are functions of the live parameters, as the frequencies are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from math import hypot
+
+import attrs
+import numpy as np
+from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
+
+from gen_profile.errors import SpecError
+from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
+from gen_profile.planner.machine import linearized, planned_axes
+from gen_profile.problem.linearization import Linearization
+from gen_profile.spec.model import Spec
+from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
+from gen_profile_exporters.planner.block import KERNEL_SLOTS, SLOTS_PER_PERIOD
+from gen_profile_exporters.planner.sensor_constants import SensorConstants, damping_rows, damping_slots
+
+BANDWIDTH = 1.0  # of the observer at most, by the slowest frequency: what ropes and delays are wrong by
+FAST = 0.1  # how much other modes are expected to be excited, by what the sensor shows of them
+OFFSET_TIME = 0.7  # slow periods, in which an offset is learnt
+NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cycles are shorter
+LIGHT = 0.02  # damping that modes are taken to have at least, so that one that is not shown is no obstacle
+ROOM = 1.25  # of the stated swing: how far damping may lead
+BEGIN, AGAIN, END = 0.4, 0.7, 0.2  # of the allowed sway: where damping begins, at rest again, and ends
+SURE = 4.0  # standard deviations of what is estimated, that lie between the first two
+NOISES = 8.0  # standard deviations of the noise that no value is off by
+STUCK = 4.0  # of them, by which what is expected may change while the value stays the same
+UPDATE = 0.1  # s between new values at most, from which steps are judged
+POSITION_WEIGHT, PULSE_WEIGHT = 0.05, 3.0  # of the law, beside a weight of 1 of the sway
+LEAST_EFFECT = 0.3  # of damping pulses on the slowest mode, by what one without a kernel would do
+LEAST_SHOWN = 1e-3  # of the slowest mode, by what the sensor shows of the others
+LARGEST_DELAY, UNKNOWN_DELAY = 0.7, 0.25  # rad of the slowest mode
+ACCURATE = 5e-3  # of what the sensor shows, between the points of interpolation
+MOST_EXPECTED = 4000  # cycles in which a value may be as old as the oldest
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SensedModes:
+    """The modes at a point of the live ranges, as the block follows them.
+
+    Attributes
+    ----------
+    frequencies, decays : (modes,) arrays
+        In rad/s and 1/s.
+    push, shown, end_load : (modes,) arrays
+        What an acceleration does to z, what the sensor shows of it, and the end load's sway by it.
+    swing : float
+        m, stated for z of the slowest mode.
+    """
+
+    frequencies: Array
+    decays: Array
+    push: Array
+    shown: Array
+    end_load: Array
+    swing: float
+
+
+def sensor_constants(
+    spec: Spec, points: Sequence[Sequence[float]], interpolated: Interpolant
+) -> tuple[SensorConstants, Interpolant] | None:
+    """Find what the block needs to know of the sensor, and the model's rows for it.
+
+    Parameters
+    ----------
+    spec : Spec
+    points : sequence of points
+        Of the live ranges, each from −1 to 1, where all is judged.
+    interpolated : Interpolant
+        Of the same live parameters, whose degree and bends are taken.
+
+    Returns
+    -------
+    tuple or None
+        None where there is no sensor.
+
+    Raises
+    ------
+    SpecError
+        The block cannot be served by this sensor.
+    """
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    if sensor is None or disturbance is None:
+        return None
+    _refuse_machine(spec)
+    sensed = {tuple(point): _sensed(spec, sensor, disturbance, point) for point in points}
+    for one in sensed.values():
+        _refuse(spec, sensor, one)
+    degree = int(interpolated.exponents.max(initial=0))
+    rows = interpolate(lambda at: _rows(spec, sensor, disturbance, at), interpolated.curvatures, degree)
+    _require_accurate(spec, sensor, disturbance, rows, list(sensed))
+    return _constants(spec, sensor, disturbance, list(sensed.values())), rows
+
+
+def _constants(
+    spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, sensed: Sequence[SensedModes]
+) -> SensorConstants:
+    rate, of = sensor.quantity == "rate", sensor.of
+    axis = spec.limits.of(next(iter(planned_axes(spec))))
+    assert axis.acceleration
+    allowed = min(spec.check.residual_sway.values())
+    disturbed = max(_disturbed(sensor, disturbance, one) for one in sensed)
+    own, own_slope = (
+        max(
+            2.0
+            * axis.acceleration
+            * float(np.abs(one.shown * one.push) @ one.frequencies ** (int(rate) + order - 2.0))
+            for one in sensed
+        )
+        for order in (0, 1)
+    )
+    slope = own_slope + disturbed * max(float(one.frequencies[0]) for one in sensed)
+    noise = sensor.noise
+    floor = max(_floor(sensor, one) for one in sensed)
+    (unit,) = (axis.unit for axis in spec.machine().unactuated if axis.name == of)
+    return SensorConstants(
+        words=f"the rate of {of}" if rate else of,
+        unit=f"{unit}/s" if rate else unit,
+        load=spec.machine().end_load_name,
+        rate=rate,
+        age=_age(sensor),
+        oldest=sensor.delay[1] + sensor.drop_out,
+        drop_out=sensor.drop_out,
+        most=2.0 * (disturbed + own) + 2.0 * sensor.offset + NOISES * noise,
+        step=UPDATE * slope + NOISES * noise,
+        gate=_gate(sensor, disturbed),
+        frozen=STUCK * noise,
+        noisy=(NOISES * noise) ** 2 + slope**2 * UPDATE * spec.export.cycle_time,
+        offset=2.0 * sensor.offset + 0.25 * disturbed,
+        swing=max(one.swing for one in sensed),
+        floor=floor,
+        begin=BEGIN * allowed,
+        again=AGAIN * allowed,
+        end=END * allowed,
+        gains=_law().tolist(),
+        room=damping_room(spec),
+    )
+
+
+def damping_room(spec: Spec) -> float:
+    """By how much, in m (or rad), damping may lead an axis away; 0 without a sensor."""
+    disturbance = spec.planner.disturbance
+    if spec.planner.sensor is None or disturbance is None or not disturbance.swing:
+        return 0.0
+    return ROOM * max(disturbance.swing.values())
+
+
+def largest_innovation(spec: Spec) -> float:
+    """Find what a value may differ by, at most, from what the block expects, in the sensor's unit."""
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    assert sensor is not None and disturbance is not None
+    points = between(len(spec.planner.live))
+    sensed = (_sensed(spec, sensor, disturbance, point) for point in points)
+    return _gate(sensor, max(_disturbed(sensor, disturbance, one) for one in sensed))
+
+
+def _gate(sensor: SensorSpec, disturbed: float) -> float:
+    return 1.5 * disturbed + 2.0 * sensor.offset + NOISES * sensor.noise
+
+
+def _disturbed(sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
+    """Find what the sensor shows of the stated swing and gusts at most."""
+    slowest, gust = float(one.frequencies[0]), disturbance.gust.acceleration if disturbance.gust else 0.0
+    swing = one.swing + 2.0 * abs(float(one.push[0])) * gust / slowest**2
+    return abs(float(one.shown[0])) * slowest ** int(sensor.quantity == "rate") * swing
+
+
+def _age(sensor: SensorSpec) -> float:
+    return 0.5 * (sensor.delay[0] + sensor.delay[1])
+
+
+def _sensed(
+    spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]
+) -> SensedModes:
+    at = linearized(spec, point)
+    (axis,) = planned_axes(spec)
+    shown = at.sway_gain @ at.modes
+    driven = np.linalg.solve(at.modes, at.input)[:, axis]
+    largest = _largest(spec)
+    scale = shown[largest, range(len(driven))] * np.sign(driven * shown[largest, range(len(driven))])
+    names = [coordinate.name for coordinate in spec.machine().unactuated]
+    end = spec.machine().end_load.start
+    by_load = dict(zip(spec.machine().loads, (shown[:, 0] / scale[0]).tolist(), strict=True))
+    return SensedModes(
+        frequencies=at.distinct_frequencies,
+        decays=at.distinct_damping_ratios * at.distinct_frequencies,
+        push=driven * scale,
+        shown=at.modes[names.index(sensor.of)] / scale,
+        end_load=shown[end] / scale,
+        swing=min(swing / abs(by_load[load]) for load, swing in disturbance.swing.items()),
+    )
+
+
+def _largest(spec: Spec) -> list[int]:
+    """Find the load that shows each mode most in the middle of the live ranges, by its number."""
+    middle: Linearization = linearized(spec, [0.0] * len(spec.planner.live))
+    found: list[int] = np.abs(middle.sway_gain @ middle.modes).argmax(axis=0).tolist()
+    return found
+
+
+def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
+    """State matrix and row of what is measured, each of z, z' by mode and the offset, and the gains."""
+    modes, slowest = len(one.frequencies), float(one.frequencies[0])
+    state, measured = np.zeros((2 * modes + 1,) * 2), np.zeros((1, 2 * modes + 1))
+    spread, rate = np.zeros(2 * modes + 1), int(sensor.quantity == "rate")
+    push = (one.swing * slowest) ** 2 * slowest / (2.0 * np.pi)
+    for mode, (frequency, decay) in enumerate(zip(one.frequencies, one.decays, strict=True)):
+        state[2 * mode, 2 * mode + 1] = 1.0
+        state[2 * mode + 1, 2 * mode : 2 * mode + 2] = (
+            -(frequency**2),
+            -2.0 * max(decay, LIGHT * frequency),
+        )
+        measured[0, 2 * mode + rate] = one.shown[mode]
+        like = abs(one.shown[0]) / max(abs(one.shown[mode]), 0.05 * abs(one.shown[0]))
+        spread[2 * mode + 1] = push * (FAST * like**2 if mode else 1.0)
+    measured[0, -1] = 1.0
+    shows = abs(one.shown[0]) * slowest**rate
+    noise = max(sensor.noise**2 * NOISE_TIME, push * shows**2 / (BANDWIDTH * slowest) ** 4)
+    spread[-1] = noise / (OFFSET_TIME * 2.0 * np.pi / slowest) ** 2
+    covariance = solve_continuous_are(state.T, measured.T, np.diag(spread), np.array([[noise]]))
+    return state, measured, np.asarray(covariance @ measured.T / noise)[:, 0]
+
+
+def _floor(sensor: SensorSpec, one: SensedModes) -> float:
+    """Find the standard deviation in m that the sensor's noise gives the slowest mode's estimate."""
+    state, measured, gain = _filter(sensor, one)
+    kicks = np.outer(gain, gain) * sensor.noise**2 * NOISE_TIME
+    spread = solve_continuous_lyapunov(state - np.outer(gain, measured[0]), -kicks)
+    return hypot(np.sqrt(spread[0, 0]), np.sqrt(spread[1, 1]) / float(one.frequencies[0]))
+
+
+def _rows(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]) -> Array:
+    """Values of the model's rows: push, shown, end load's sway, gains of z and z' by mode, and the offset's.
+
+    The gains are those for a cycle, of what differed as long ago as a value usually is old.
+    """
+    one = _sensed(spec, sensor, disturbance, point)
+    state, _, gain = _filter(sensor, one)
+    now = spec.export.cycle_time * expm(state * _age(sensor)) @ gain
+    return np.concatenate([one.push, one.shown, one.end_load, now[:-1:2], now[1:-1:2], now[-1:]])
+
+
+def _law() -> Array:
+    """Gains of a pulse by sway, rate and place, in pulses: a linear-quadratic regulator from slot to slot."""
+    angle = 2.0 * np.pi / SLOTS_PER_PERIOD
+    c, s = np.cos(angle), np.sin(angle)
+    turn, pushed = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([[c], [s], [1.0]])
+    weight = np.diag([1.0, 1.0, POSITION_WEIGHT])
+    cost = solve_discrete_are(turn, pushed, weight, np.array([[PULSE_WEIGHT]]))
+    gains: Array = np.linalg.solve(PULSE_WEIGHT + pushed.T @ cost @ pushed, pushed.T @ cost @ turn)[0]
+    return gains
+
+
+def damping_kernel(frequencies: Array) -> Array:
+    """Make the kernel of damping pulses as the block does, shape (slots,), at slots of the usual length."""
+    slots = damping_slots(frequencies)
+    angles = 2.0 * np.pi / SLOTS_PER_PERIOD * frequencies / frequencies[0]
+    out = np.arange(slots) - 0.5 * (slots - 1)
+    weight = 1.0 - (out / (0.5 * (slots + 1))) ** 2
+    rows = [np.ones(slots)]
+    for angle in angles[1:]:
+        rows += [np.cos(angle * out), out * np.sin(angle * out)]
+    conditions = np.array(rows)
+    wanted = np.eye(damping_rows(len(frequencies)))[0]
+    factors = np.linalg.solve(conditions * weight @ conditions.T, wanted)
+    return np.asarray(weight * (conditions.T @ factors))
+
+
+def _refuse_machine(spec: Spec) -> None:
+    """Refuse what no sensor serves so far."""
+    sensor = spec.planner.sensor
+    assert sensor is not None
+    axes, middle = planned_axes(spec), linearized(spec, [0.0] * len(spec.planner.live))
+    if len(axes) > 1 or len(middle.frequencies) > len(middle.distinct_frequencies):
+        raise SpecError(
+            "planner.sensor: the block damps by one axis whose loads swing along it alone so far, and this "
+            "machine has more directions; leave the sensor out."
+        )
+    for number in axes:
+        travel, room = spec.limits.of(number).travel, damping_room(spec)
+        if travel and travel[1] - travel[0] <= 2.0 * room:
+            raise SpecError(
+                f"{spec.limits.place(number, 'travel')}: must be longer than {2.0 * room:.3g}, as damping "
+                "takes half of that at each end; lengthen it, or state a smaller planner.disturbance.swing."
+            )
+    if sensor.delay[1] + sensor.drop_out > MOST_EXPECTED * spec.export.cycle_time:
+        raise SpecError(
+            f"planner.sensor: delay and drop_out together may be {MOST_EXPECTED} cycles of "
+            "export.cycle_time at most; state a shorter drop_out."
+        )
+
+
+def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
+    """Refuse a sensor that does not show the slowest mode, or too late, and pulses that do not act on it."""
+    slowest = float(one.frequencies[0])
+    shown = np.abs(one.shown * one.frequencies ** (sensor.quantity == "rate"))
+    if not shown[0] > LEAST_SHOWN * shown.max():
+        raise SpecError(
+            f"planner.sensor.of: {sensor.of} does not show the slowest swing; measure another coordinate."
+        )
+    allowed, floor = min(spec.check.residual_sway.values()), _floor(sensor, one)
+    if SURE * floor > (AGAIN - BEGIN) * allowed:
+        raise SpecError(
+            f"planner.sensor.noise: the load's sway would be known to {SURE * floor:.2g} m only, and "
+            f"{(AGAIN - BEGIN) * allowed:.2g} m are needed to damp to check.residual_sway; take a better "
+            "sensor, or allow more."
+        )
+    late, unknown = slowest * sensor.delay[1], 0.5 * slowest * (sensor.delay[1] - sensor.delay[0])
+    if late > LARGEST_DELAY or unknown > UNKNOWN_DELAY:
+        most, width = LARGEST_DELAY / slowest, 2.0 * UNKNOWN_DELAY / slowest
+        raise SpecError(
+            f"planner.sensor.delay: at most {most:.2g} s, known to {width:.2g} s, for a load that swings "
+            "this fast; take a faster sensor, or give the block fSensorAge and state its error alone."
+        )
+    kernel = damping_kernel(one.frequencies)
+    out = np.arange(len(kernel)) - 0.5 * (len(kernel) - 1)
+    effect = float(kernel @ np.cos(2.0 * np.pi / SLOTS_PER_PERIOD * out))
+    if effect < LEAST_EFFECT or len(kernel) > KERNEL_SLOTS:
+        ratio = float(one.frequencies[1] / slowest)
+        raise SpecError(
+            f"planner.sensor: the second mode has {ratio:.2g} times the frequency of the slowest, too near "
+            "to damp one without exciting the other"
+            + (", at an end of the live ranges; narrow planner.live." if spec.planner.live else ".")
+        )
+
+
+def _require_accurate(
+    spec: Spec,
+    sensor: SensorSpec,
+    disturbance: DisturbanceSpec,
+    rows: Interpolant,
+    points: Sequence[Sequence[float]],
+) -> None:
+    """Refuse live ranges over which what the sensor shows would be known too roughly."""
+    true = np.array([_rows(spec, sensor, disturbance, point) for point in points])
+    error = np.abs(np.array([rows(point) for point in points]) - true)
+    modes = (true.shape[1] - 1) // 5
+    worst = float((error / np.abs(true).max(axis=0))[:, : 3 * modes].max())
+    if worst > ACCURATE:
+        raise SpecError(
+            f"planner.live: over these ranges what the sensor shows would be known to {worst:.1g} only; "
+            "narrow the ranges."
+        )
+
+
+def between(live: int) -> list[tuple[float, ...]]:
+    """Points of the live ranges between those of interpolation, each from −1 to 1."""
+    return list(product(np.linspace(-1.0, 1.0, 6).tolist(), repeat=live))

@@ -1,0 +1,242 @@
+"""What a block's sensor meets in a history: a swing, gusts, its own errors and a fault; and its verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Self
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array
+from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.sensor import largest_innovation
+from gen_profile.problem.linearization import linearize
+from gen_profile.spec.model import Spec
+from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
+from gen_profile_fmu.running.block_run import BlockRun, Measurement
+
+CHOICES = 14
+NONE, SOUND = 0.35, 0.8  # up to which choice there is no sensor, or a sound one; beyond, one that fails
+FAULTS = ("silent", "no number", "out of range", "frozen", "jump", "noise")
+NOTICED = ("silent", "no number", "out of range", "jump")  # others are noticed where they do harm
+GUSTS = 2
+SHORTEST = 0.5  # s, of a gust
+LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
+NOISIER = 10.0
+JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing
+FAR_OUT = 1e3  # of the same
+TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
+
+
+@attrs.frozen(kw_only=True)
+class Gust:
+    """A push on all loads in proportion to their masses, half a sine: s, s and m/s² at most."""
+
+    time: float
+    lasts: float
+    acceleration: float
+
+
+@attrs.frozen(kw_only=True)
+class SensedHistory:
+    """What a sensor meets.
+
+    Attributes
+    ----------
+    starts : mapping of str to float
+        What swings at first, in the slowest mode: coordinates by name, their rates as ``NAME.rate``.
+    gusts : tuple of Gust
+    delay, offset : float
+        s, and in the sensor's unit.
+    seed : int
+        Of its noise.
+    lost : float
+        s, from which on news fails to come for a while.
+    fault : str
+        One of `FAULTS`, or empty.
+    fails, innovation : float
+        s, when; and the greatest difference from what is expected that counts as a swing, in its unit.
+    """
+
+    starts: Mapping[str, float]
+    gusts: tuple[Gust, ...]
+    delay: float
+    offset: float
+    seed: int
+    lost: float
+    fault: str
+    fails: float
+    innovation: float
+
+    @classmethod
+    def of(
+        cls,
+        spec: Spec,
+        choices: Sequence[float],
+        last: float,
+        machine: tuple[Mapping[str, float], Sequence[float]],
+    ) -> Self:
+        """Make what some choices say of a history.
+
+        Parameters
+        ----------
+        spec : Spec
+        choices : (CHOICES,) sequence of float
+        last : float
+            When its last command comes, in s.
+        machine : (parameters, places of its axes)
+        """
+        sensor, disturbance = _stated(spec)
+        kind, swing, phase, delay, offset, seed, lost, fails, *others = choices
+        fault = ""
+        if kind >= SOUND:
+            fault = FAULTS[min(int((kind - SOUND) / (1.0 - SOUND) * len(FAULTS)), len(FAULTS) - 1)]
+        until = last + 0.5 * disturbance.settle
+        gusts = [
+            Gust(
+                time=share * until,
+                lasts=SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST),
+                acceleration=_stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration,
+            )
+            for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True)
+            if disturbance.gust is not None and not fault
+        ]
+        return cls(
+            starts=_starts(spec, max(0.0, _stretched(swing)), 2.0 * np.pi * phase, *machine),
+            gusts=tuple(gusts),
+            delay=sensor.delay[0] + min(1.0, 1.1 * delay) * (sensor.delay[1] - sensor.delay[0]),
+            offset=_stretched(2.0 * offset - 1.0) * sensor.offset,
+            seed=int(seed * 2**32),
+            lost=lost * until,
+            fault=fault,
+            fails=fails * until,
+            innovation=largest_innovation(spec) if fault else 0.0,
+        )
+
+    @property
+    def ends(self) -> float:
+        """When the last gust does, in s."""
+        return max((gust.time + gust.lasts for gust in self.gusts), default=0.0)
+
+    def pushed(self, times: Array) -> Array:
+        """Tell by how much in m an axis would have to move to push the loads alike, at some times in s."""
+        way = np.zeros_like(times)
+        for gust in self.gusts:
+            since, turn = np.maximum(times - gust.time, 0.0), np.pi / gust.lasts
+            within = np.minimum(since, gust.lasts)
+            speed = gust.acceleration / turn
+            way += speed * (within - np.sin(turn * within) / turn) + 2.0 * speed * (since - within)
+        return way
+
+    def measurement(self, spec: Spec, inputs: Sequence[str], cycle: float, cycles: int) -> Measurement:
+        """Give what the sensor tells a block of these inputs in so many cycles, each of `cycle` s."""
+        sensor, _ = _stated(spec)
+        times, random = np.arange(cycles) * cycle, np.random.default_rng(self.seed)
+        rows = np.zeros((cycles, 5))
+        gain, added, age, valid, pushed = rows.T
+        gain[:], added[:] = 1.0, self.offset + sensor.noise * random.standard_normal(cycles)
+        age[:], valid[:], pushed[:] = (
+            round(self.delay / cycle),
+            1.0,
+            self.pushed(np.asarray(times + cycle, dtype=np.float64)),
+        )
+        valid[(times >= self.lost) & (times < self.lost + LOST * sensor.drop_out)] = 0.0
+        first = min(round(self.fails / cycle), cycles - 1)
+        match self.fault:
+            case "silent":
+                valid[first:] = 0.0
+            case "no number":
+                added[first:] = np.nan
+            case "out of range":
+                added[first:] = FAR_OUT * self.innovation
+            case "frozen":
+                age[first:] += np.arange(cycles - first)
+                added[first:] = added[first]
+            case "jump":
+                added[first:] += JUMP * self.innovation
+            case "noise":
+                added[first:] = self.offset + NOISIER * (added[first:] - self.offset)
+        rate = sensor.quantity == "rate"
+        return Measurement(
+            quantity=f"{sensor.of}.rate" if rate else sensor.of,
+            shows=list(inputs).index("fSensor"),
+            valid=list(inputs).index("bSensorValid"),
+            cycles=rows,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return attrs.asdict(self)
+
+
+def sensed(spec: Spec, choices: Sequence[float]) -> bool:
+    """Whether some choices are of a history with a sensor."""
+    return spec.planner.sensor is not None and choices[0] >= NONE
+
+
+def sensor_faults(
+    spec: Spec, one: SensedHistory, run: BlockRun, outputs: Sequence[str], *, cycle: float, last: float
+) -> Iterator[str]:
+    """Say what is wrong with how a block used its sensor, each in words that end a sentence.
+
+    Parameters
+    ----------
+    spec : Spec
+    one : SensedHistory
+    run : BlockRun
+        With its trace, which has these outputs, then the loads' sway.
+    outputs : sequence of str
+    cycle, last : float
+        s: a cycle, and when the last command came, or an input last changed.
+    """
+    assert run.trace is not None
+    issued = dict(zip(outputs, run.trace.T, strict=False))
+    noticed = issued["nSensorFault"]
+    if not one.fault and noticed.any():
+        at = int(np.argmax(noticed != 0.0))
+        when = f"at {at * cycle:.2f} s"
+        yield f"a sound sensor is taken for a faulty one (nSensorFault {noticed[at]:.0f}), {when}"
+    if one.fault in NOTICED and not noticed[-1]:
+        yield f"the sensor's fault is not noticed ({one.fault}, at {one.fails:.2f} s)"
+    if one.fault or run.stands < 0:
+        return
+    rests = (issued["bDamping"] != 0.0) | (issued["bBusy"] == 0.0)
+    first = min(round(last / cycle) + TAKEN_UP, len(rests) - 1)
+    arrived = first + int(np.argmax(rests[first:]))
+    _, disturbance = _stated(spec)
+    settled = max(arrived, round(one.ends / cycle)) + round(disturbance.settle / cycle)
+    sway = np.abs(run.trace[settled:, len(outputs) :])
+    for (load, most), column in zip(spec.check.residual_sway.items(), sway.T, strict=True):
+        if len(column) and column.max() > most:
+            late = np.flatnonzero(column > most)[-1] * cycle
+            yield (
+                f"the {load} is damped to check.residual_sway later than allowed by {late:.3g} s, at "
+                f"{settled * cycle:.2f} s"
+            )
+
+
+def _starts(
+    spec: Spec, share: float, phase: float, parameters: Mapping[str, float], places: Sequence[float]
+) -> dict[str, float]:
+    """Let the slowest mode swing by a share of what is stated."""
+    plant, (_, disturbance) = spec.machine(), _stated(spec)
+    at = linearize(plant, parameters, places)
+    by_load = dict(zip(plant.loads, np.abs(at.sway_gain @ at.modes[:, 0]).tolist(), strict=True))
+    size = share * min(swing / by_load[load] for load, swing in disturbance.swing.items())
+    swings, rate = size * np.cos(phase), -size * np.sin(phase) * at.frequencies[0]
+    found: dict[str, float] = {}
+    for coordinate, shape in zip(plant.unactuated, at.modes[:, 0].tolist(), strict=True):
+        found |= {coordinate.name: swings * shape, f"{coordinate.name}.rate": rate * shape}
+    return found
+
+
+def _stated(spec: Spec) -> tuple[SensorSpec, DisturbanceSpec]:
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    assert sensor is not None and disturbance is not None and len(planned_axes(spec)) == 1
+    return sensor, disturbance
+
+
+def _stretched(value: float) -> float:
+    """Stretch a number between −1 and 1, so that both ends come up with a share of their own."""
+    return min(max(1.1 * value, -1.0), 1.0)

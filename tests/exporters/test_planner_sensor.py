@@ -1,0 +1,163 @@
+"""A planner block with a sensor, on a nonlinear crane that nothing of the program had a part in."""
+
+import numpy as np
+import pytest
+from exporters.counted_block import CountedBlock, compile_counting
+from exporters.measured_crane import MeasuredCrane
+
+from gen_profile.errors import SpecError
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.sensor import damping_kernel, damping_room
+from gen_profile.spec.reading import preset_spec
+
+LIVE = "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}"
+SENSOR = 'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}'
+SWING = "planner.disturbance={swing={payload=0.5}, settle=12.0}"
+MEASURED = [LIVE, SENSOR, SWING]
+ALLOWED = 0.05  # m
+SHORTEST = {3.0: 5.3, 6.0: 5.7, 9.0: 5.9}  # s, of an independent linear programme, at the worst phase
+STANDS = 20.0  # m
+CYCLE = 0.004
+ROUNDING = 1e-9
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return preset_spec("bay-crane", MEASURED)
+
+
+@pytest.fixture(scope="module")
+def compiled(spec):
+    return compile_counting(planner_block(spec).text)
+
+
+def crane(compiled, rope=6.0, *, rope_given=None, **machine):
+    found = MeasuredCrane(CountedBlock(compiled), rope, **machine)
+    found.inputs |= {"bEnable": 1.0, "fActPosition": STANDS, "fL1": rope_given or rope}
+    return found
+
+
+def require_limits(issued, room=0.0):
+    assert issued["operations"].max() <= 12_000
+    jerk = np.diff(issued["fAcceleration"]) / CYCLE
+    for values, most in ((issued["fVelocity"], 1.1), (issued["fAcceleration"], 0.3), (jerk, 1.5)):
+        assert np.abs(values).max() <= most * (1.0 + ROUNDING)
+    integral = np.diff(issued["fPosition"]) - 0.5 * CYCLE * (
+        issued["fVelocity"][1:] + issued["fVelocity"][:-1]
+    )
+    assert np.abs(integral).max() <= 1e-7
+    if room:
+        assert np.abs(issued["fPosition"] - STANDS).max() <= room + ROUNDING
+
+
+@pytest.mark.parametrize(("rope", "phase"), [(3.0, 0.4), (6.0, 3.5), (9.0, 1.9)])
+def test_a_swing_that_nobody_computed_is_damped_in_time(spec, compiled, rope, phase):
+    swung = crane(compiled, rope, swing=(0.5, phase))
+    issued = swung.run(24.0, noise=0.002, offset=0.005, random=np.random.default_rng(1))
+    start = int(np.argmax(issued["bDamping"] > 0.0))
+    assert 0 < start * CYCLE < 3.5
+    late = np.flatnonzero(np.abs(issued["sway"]) > ALLOWED)[-1]
+    assert (late - start) * CYCLE <= 1.25 * SHORTEST[rope]
+    require_limits(issued, damping_room(spec))
+    assert not issued["fVelocity"][-500:].any()  # at rest, the noise going on
+    assert issued["bPromise"][-1] and not issued["bBusy"][-1]
+    assert (issued["nPromise"][start : start + 100] == 6.0).all()
+    apart = np.abs(issued["fSwayEstimated"] - issued["sway"])[-1000:]
+    assert apart.max() < 0.015
+
+
+def test_a_rope_that_is_wrong_an_offset_and_a_late_sensor_leave_little(spec, compiled):
+    swung = crane(compiled, 6.3, rope_given=6.0, swing=(0.5, 1.0), load=1000.0)
+    swung.inputs["fm2"] = 1000.0
+    issued = swung.run(24.0, noise=0.002, offset=0.005, delay=0.15, random=np.random.default_rng(2))
+    assert np.abs(issued["sway"][-1500:]).max() < ALLOWED
+    require_limits(issued, damping_room(spec))
+
+
+def test_it_comes_back_to_the_target_and_is_done_then(compiled):
+    swung = crane(compiled, swing=(0.3, 0.0))
+    swung.run(0.1)
+    issued = swung.run(34.0, fTarget=STANDS + 3.0, bExecute=1.0)
+    assert issued["bDamping"].any()
+    done = issued["bDone"] > 0.0
+    assert done[-1] and not (done & (issued["bDamping"] > 0.0)).any()
+    assert abs(issued["fPosition"][-1] - STANDS - 3.0) <= 1e-9
+    require_limits(issued)
+
+
+def test_after_a_quick_stop_the_promise_comes_back_by_itself(compiled):
+    swung = crane(compiled)
+    swung.run(1.0)
+    swung.run(5.0, bVelocity=1.0, fVelocityCommand=1.0)
+    swung.run(3.0, bQuickStop=1.0, bVelocity=0.0)
+    assert swung.rows["nPromise"][-1] == 2.0 or swung.rows["nPromise"][-1] == 6.0
+    issued = swung.run(28.0, bQuickStop=0.0)
+    assert issued["bDamping"].any() and issued["bPromise"][-1]
+    assert np.abs(issued["sway"][-1000:]).max() < ALLOWED
+
+
+FAULTS = {
+    1: lambda _, value: None,
+    2: lambda _, value: np.nan,
+    3: lambda _, value: value + 0.25,
+    4: lambda _, value: 0.04,
+    6: lambda number, value: value + 0.02 * np.sin(37.0 * number * number),
+}
+
+
+@pytest.mark.parametrize("number", FAULTS)
+def test_a_sensor_that_fails_is_left_out_and_the_axis_comes_to_rest(compiled, number):
+    swung = crane(compiled, swing=(0.5, 0.5))
+    swung.run(5.0)
+    assert swung.rows["bDamping"][-1]
+    issued = swung.run(8.0, sensor=FAULTS[number])
+    assert issued["nSensorFault"][-1] == number and not issued["bSensorUsed"][-1]
+    assert not issued["bDamping"][-1] and not issued["fVelocity"][-1]
+    assert issued["nPromise"][-1] == 2.0  # so much was left that it is not known how it swings
+    require_limits(issued)
+    if number == 1:  # news alone is enough then
+        assert not swung.run(1.0)["nSensorFault"][-1]
+    else:
+        assert swung.run(1.0)["nSensorFault"][-1] == number
+        assert not swung.run(1.0, bReset=1.0)["nSensorFault"][-1]
+
+
+def test_the_kernel_leaves_the_fast_mode_alone():
+    for ratio in (1.8, 4.0, 9.0):
+        frequencies = np.array([1.0, ratio])
+        kernel = damping_kernel(frequencies)
+        out = np.arange(len(kernel)) - 0.5 * (len(kernel) - 1)
+        assert kernel.sum() == pytest.approx(1.0)
+        for error, most in ((0.0, 1e-12), (0.03, 6e-3)):  # to first order
+            assert abs(kernel @ np.exp(0.1j * np.pi * ratio * (1.0 + error) * out)) < most
+
+
+REFUSED = {
+    "live": (["planner.live={L1=[3.0, 9.0], m2=[0.0, 2000.0]}"], "1.4 times the frequency of the slowest"),
+    "of": (['planner.sensor.of="theta3"'], "planner.sensor.of: no coordinate that swings"),
+    "noise": (["planner.sensor.noise=0.02"], "planner.sensor.noise: .* take a better sensor"),
+    "delay": (["planner.sensor.delay=[0.0, 0.5]"], "planner.sensor.delay: at most 0.45 s, known to 0.32 s"),
+    "rate": (["planner.live_rate={L1=0.1}"], "not together with planner.live_rate"),
+    "zones": (["planner.zones=true"], "not together with planner.zones"),
+    "travel": (
+        ["limits.travel=[0.0, 1.0]", "move={start=0.0, target=1.0, duration=8.0}"],
+        "must be longer than",
+    ),
+    "swing": (["planner.disturbance.swing={}"], "must name a load"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_served_is_refused_in_a_sentence(name):
+    changes, words = REFUSED[name]
+    with pytest.raises(SpecError, match=words):
+        planner_block(preset_spec("bay-crane", [*MEASURED, *changes]))
+
+
+def test_a_sensor_needs_a_disturbance_and_one_axis():
+    with pytest.raises(SpecError, match=r"planner\.disturbance: required by planner.sensor"):
+        preset_spec("bay-crane", [LIVE, SENSOR])
+    limits = "limits={velocity=1.0, acceleration=0.3, jerk=1.0, travel=[0.0, 40.0]}"
+    changes = [SENSOR.replace("theta1", "theta_x"), SWING.replace("payload", "payload-x"), limits]
+    with pytest.raises(SpecError, match="more directions"):
+        planner_block(preset_spec("gantry-crane", changes))

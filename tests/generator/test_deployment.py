@@ -1,0 +1,336 @@
+"""Deployment under faults: whatever goes wrong, a controller uses the former table or the proved one."""
+
+import random
+import struct
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+from gen_profile.deployment.deploy import deploy, require_fit, verify
+from gen_profile.deployment.mailbox import IN_USE, RIGHT, LinkLostError, Mailbox
+from gen_profile.deployment.simulated_block import SimulatedBlock
+from gen_profile.deployment.table import BlockTable, read_table
+from gen_profile.designs.design import design
+from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.spec.reading import preset_spec
+
+FAULTS = 150
+VARIABLES = ("export.plc_tables=variables", "export.cycle_time=0.02", "move.duration=3.0")
+
+
+def exported(folder, *changes, preset="paper"):
+    """What is written is checked when it is deployed."""
+    spec = preset_spec(preset, [*VARIABLES, *changes])
+    outcome = design(spec, ["plc"], folder, check=False)
+    return Path(folder) / outcome.artefacts[0].path
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    """What is in use at first, what is deployed, and what another host deploys."""
+    moves = {"old": 0.3, "new": 0.25, "other": 0.2}
+    return {
+        name: read_table(exported(tmp_path_factory.mktemp(name), f"move.distance={distance}"))
+        for name, distance in moves.items()
+    }
+
+
+@pytest.fixture
+def block(tables):
+    return fresh(tables)
+
+
+class DirectLink:
+    """A way to a simulated block without any network: every look is a cycle."""
+
+    def __init__(self, block):
+        self.block, self.operations = block, 0
+
+    def write(self, request):
+        self.operations += 1
+        self.block.request(request)
+
+    def read(self):
+        self.operations += 1
+        self.block.run(1)
+        return self.block.reply()
+
+    def reopen(self):
+        self.operations += 1
+
+
+class FaultyLink(DirectLink):
+    """One where something happens at an operation, and perhaps for a few more."""
+
+    def __init__(self, block, at, times, request=None, reply=None, happen=None, lose=False):
+        super().__init__(block)
+        self.span, self.lose = range(at, at + times), lose
+        self.alter_request, self.alter_reply, self.happen = request, reply, happen
+        self.happened = False
+
+    def _due(self):
+        due = self.operations + 1 in self.span
+        if due and self.happen is not None and not self.happened:
+            self.happen()
+        self.happened |= due
+        return due
+
+    def write(self, request):
+        due = self._due()
+        if due and self.lose and self.operations % 2:
+            self.operations += 1
+            raise LinkLostError("before it was sent")
+        super().write(self.alter_request(request.copy()) if due and self.alter_request else request)
+        if due and self.lose:
+            self.block.run(1)
+            raise LinkLostError("after it was sent")
+
+    def read(self):
+        due = self._due()
+        reply = super().read()
+        if due and self.lose:
+            raise LinkLostError("reading")
+        return self.alter_reply(reply) if due and self.alter_reply else reply
+
+    def reopen(self):
+        due = self._due()
+        super().reopen()
+        if due and self.lose:
+            raise LinkLostError("connecting")
+
+
+def box_of(link):
+    return Mailbox(link, pause=lambda _: None)
+
+
+def fresh(tables):
+    block = SimulatedBlock(tables["old"])
+    block.run(60)  # until its checksum is known
+    return block
+
+
+@pytest.fixture
+def unchecked(tables, monkeypatch):
+    """Co-simulate nothing, but note what was to be: that takes most of the time."""
+    judgement = tables["new"].check(tables["new"].values, lambda *_: None)
+    assert judgement.check.passed
+    checked = []
+
+    def note(_self, values, _progress):
+        checked.append(values)
+        return judgement
+
+    monkeypatch.setattr(BlockTable, "check", note)
+    return checked
+
+
+def flip(values, choices):
+    """Turn one bit of one value."""
+    place, bit = choices.randrange(len(values)), choices.randrange(64)
+    (whole,) = struct.unpack("<Q", struct.pack("<d", values[place]))
+    values[place] = struct.unpack("<d", struct.pack("<Q", whole ^ 1 << bit))[0]
+    return values
+
+
+def poked(block, values, choices):
+    """Flip a bit of a table where the block keeps it, as failing memory does."""
+    memory = block._instance._memory
+    place = memory.raw.rfind(values[-40:].tobytes())
+    if place >= 0:
+        at = place + choices.randrange(40 * 8)
+        memory[at] = memory.raw[at] ^ 1 << choices.randrange(8)
+
+
+def rounded(request):
+    request[16:] = request[16:].astype(np.float32)
+    request[-1] = request[0]
+    return request
+
+
+def swapped(request):
+    data = request[16:-1].copy().view(np.uint32).reshape(-1, 2)[:, ::-1].ravel().view(np.float64)
+    request[16:-1] = data
+    return request
+
+
+def started(block):
+    block.set("bExecute", np.array([1.0]))
+    block.run(1)
+
+
+def faults(tables, block, choices):
+    """Draw a kind of fault."""
+    new, other = tables["new"], tables["other"]
+
+    def rival():
+        try:
+            deploy(other, box_of(DirectLink(block)))
+        except DeploymentError as error:
+            assert "Another deployment" in str(error)
+
+    return choices.choice(
+        [
+            {"lose": True},
+            {"lose": True},
+            {"request": rounded},
+            {"request": swapped},
+            {"request": lambda row: flip(row, choices)},
+            {"reply": lambda row: flip(row, choices)},
+            {"reply": lambda row: row[: choices.randrange(256)]},
+            {"request": lambda row: np.append(row[:100], np.zeros(156))},
+            {"happen": lambda: poked(block, new.values, choices)},
+            {"happen": lambda: started(block)},
+            {"happen": rival},
+        ]
+    )
+
+
+def used(block, tables):
+    """Tell which table a block uses, once it has settled; by a link without faults."""
+    block.set("bExecute", np.array([0.0]))
+    block.run(400)
+    link = DirectLink(block)
+    for name, table in tables.items():
+        try:
+            verify(table, box_of(link))
+        except CheckFailed:
+            continue
+        return name
+    return None
+
+
+def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tables, unchecked):
+    choices, ends = random.Random(31), []
+    count = DirectLink(fresh(tables))
+    deploy(tables["new"], box_of(count))
+    for number in range(FAULTS):
+        block, times = fresh(tables), choices.choice([1, 1, 1, 2, 3, 20, 1000])
+        fault = faults(tables, block, choices)
+        link = FaultyLink(block, choices.randint(1, count.operations), times, **fault)
+        unchecked.clear()
+        try:
+            done, error = deploy(tables["new"], box_of(link)), None
+        except (DeploymentError, CheckFailed, ExportError) as raised:
+            done, error = None, str(raised)
+        found = used(block, tables)
+        case = (number, fault, error)
+        if found is None:  # memory that failed once all was confirmed: nothing starts
+            assert "happen" in fault and box_of(DirectLink(block)).status().checked != RIGHT, case
+        elif done is not None:
+            assert found == "new" or "happen" in fault, case
+            assert any(np.array_equal(one, tables["new"].values) for one in unchecked), case
+        else:
+            assert found == "old" or "happen" in fault or (unchecked and "verify which" in error), case
+        ends.append((done is not None, found))
+    assert {(True, "new"), (False, "old")} <= set(ends)
+
+
+def test_the_connection_may_break_at_every_step(tables, unchecked):
+    """One break, before or after what was sent had its effect, is taken up; none is too many."""
+    steps = DirectLink(fresh(tables))
+    deploy(tables["new"], box_of(steps))
+    for at in range(1, steps.operations + 1):
+        block = fresh(tables)
+        assert deploy(tables["new"], box_of(FaultyLink(block, at, 1, lose=True))).action == "deployed"
+        assert used(block, tables) == "new"
+
+
+def test_what_is_deployed_is_in_use_already_the_next_time_and_can_be_rolled_back(tables, block, unchecked):
+    old, new, box = tables["old"], tables["new"], box_of(DirectLink(block))
+    assert deploy(old, box).action == "in use already"
+    done = deploy(new, box)
+    assert (done.action, done.held_sha256) == ("deployed", new.hashes["table_sha256"])
+    assert (done.before.checksum, done.after.checksum) == (old.checksum, new.checksum)
+    verify(new, box)
+    with pytest.raises(CheckFailed, match=r"does not use .*old"):
+        verify(old, box)
+    assert deploy(old, box, rollback=True).action == "rolled back"
+    verify(old, box)
+    with pytest.raises(
+        DeploymentError, match=r"does not hold .*other.*\nThe controller uses the table that it had"
+    ):
+        deploy(tables["other"], box, rollback=True)
+
+
+def test_what_sways_too_much_is_not_switched_to(tables, block):
+    """Another machine than the one that the table was designed for, as if a manifest were wrong."""
+    spec = preset_spec("paper", [*VARIABLES, "move.distance=0.25", "plant.L1=0.9"])
+    wrong = attrs.evolve(tables["new"], spec=spec)
+    with pytest.raises(CheckFailed, match="The controller uses the table that it had"):
+        deploy(wrong, box_of(DirectLink(block)))
+    assert used(block, tables) == "old"
+
+
+def test_the_check_is_of_what_was_read_back(tables):
+    judgement = tables["new"].check(tables["new"].values, lambda *_: None)
+    assert judgement.check.passed and judgement.manifest == "none"
+    altered = tables["new"].values.copy()
+    altered[100] += 1e-9
+    with pytest.raises(ExportError, match="checksum"):
+        tables["new"].check(altered, lambda *_: None)
+
+
+def test_a_block_that_moves_is_left_alone(tables, block, unchecked):
+    started(block)
+    with pytest.raises(DeploymentError, match="The block moves"):
+        deploy(tables["new"], box_of(DirectLink(block)))
+    assert used(block, tables) == "old"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("export.plc_layout=samples", "another table's layout, segments and not samples"),
+        ("export.cycle_time=0.01", r"another cycle time in s, 0\.02 and not 0\.01"),
+        ("axis.unit=mm", "is for axes of other names, units or signs"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_the_cure(change, words, tables, block, tmp_path):
+    table = read_table(exported(tmp_path, change))
+    with pytest.raises(ExportError, match=f"{words}.*; export the block with these settings"):
+        deploy(table, box_of(DirectLink(block)))
+
+
+@pytest.mark.parametrize(
+    ("there", "words"),
+    [
+        ({"interface": 2}, "another version, 2 and not 1"),
+        ({"axes": 2}, "another number of axes, 2 and not 1"),
+        ({"capacity": 100}, "The buffers in the controller hold 100 values"),
+    ],
+)
+def test_another_block_is_refused(there, words, tables, block):
+    status = box_of(DirectLink(block)).status()
+    with pytest.raises(ExportError, match=words):
+        require_fit(tables["new"], attrs.evolve(status, **there))
+
+
+def test_a_block_of_constants_is_deployed_likewise(tables, block, unchecked, tmp_path):
+    path = exported(tmp_path, "export.plc_tables=constants", "move.distance=0.25")
+    assert deploy(read_table(path), box_of(DirectLink(block))).action == "deployed"
+    assert used(block, tables) == "new"
+
+
+def test_an_altered_file_is_refused(tmp_path):
+    path = exported(tmp_path)
+    path.write_text(
+        path.read_text("ascii").replace(
+            "fStartTolerance : LREAL := 0.001", "fStartTolerance : LREAL := 0.002"
+        )
+    )
+    with pytest.raises(CheckFailed, match="altered after its export"):
+        read_table(path)
+
+
+def test_memory_that_fails_later_stops_the_block_and_is_told(tables, block):
+    box = box_of(DirectLink(block))
+    before = box.read(IN_USE, len(tables["old"].values))
+    poked(block, tables["old"].values, random.Random(3))
+    block.run(300)
+    assert not np.array_equal(box.read(IN_USE, len(before)), before)
+    with pytest.raises(CheckFailed, match="does not use"):
+        verify(tables["old"], box)
+    assert deploy(tables["old"], box).action == "deployed"  # which repairs it
+    assert used(block, tables) == "old"

@@ -1,0 +1,128 @@
+"""The proof of a block with a sensor, and what gives it the sensor's values."""
+
+import attrs
+import numpy as np
+import pytest
+
+from gen_profile.errors import SpecError
+from gen_profile.planner.commands import play
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.planner import Planner
+from gen_profile.planner.sensor_log import read_sensor_log
+from gen_profile.proof.histories import Histories
+from gen_profile.proof.numbering import Numbering
+from gen_profile.proof.prove import prove
+from gen_profile.proof.sensing import Gust, sensor_faults
+from gen_profile.spec.reading import preset_spec
+from gen_profile_fmu.running.block_run import BlockRun
+
+MEASURED = [
+    "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}",
+    'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}',
+    "planner.disturbance={swing={payload=0.5}, gust={acceleration=0.1, longest=5.0}, settle=12.0}",
+]
+HISTORIES = 32
+CYCLE = 0.004
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return preset_spec("bay-crane", MEASURED)
+
+
+@pytest.fixture(scope="module")
+def text(spec):
+    return planner_block(spec).text
+
+
+def test_histories_have_sensors_of_every_kind_and_old_ones_stay(spec):
+    histories = Histories.of(spec)
+    drawn = Numbering.of(histories, 400, 0).drawn
+    sensed = [histories.history(choices).sensed for choices in drawn]
+    kinds = [one.fault for one in sensed if one is not None]
+    assert 0.3 < sensed.count(None) / len(sensed) < 0.4
+    assert {*kinds} == {"", "silent", "no number", "out of range", "frozen", "jump", "noise"}
+    assert all(not one.gusts for one in sensed if one is not None and one.fault)
+    plain = Histories.of(preset_spec("bay-crane", MEASURED[:1]))
+    assert histories.choices > plain.choices
+
+
+def test_a_gust_pushes_as_its_acceleration_says(spec):
+    histories = Histories.of(spec)
+    drawn = (histories.history(choices) for choices in Numbering.of(histories, 60, 0).drawn)
+    one = next(h.sensed for h in drawn if h.sensed is not None and h.sensed.gusts)
+    times = np.arange(0.0, one.ends + 2.0, 1e-3)
+    pushed = np.diff(one.pushed(times), 2) / 1e-6
+    due = sum(
+        gust.acceleration * np.sin(np.pi * np.clip((times[1:-1] - gust.time) / gust.lasts, 0.0, 1.0))
+        for gust in one.gusts
+    )
+    assert np.abs(pushed - due).max() < 2e-3
+
+
+def followed(sway, *, damping=0.0, fault=0.0, stands=0):
+    """A run of 20 s that arrives at once, and its outputs."""
+    cycles = 5000
+    columns = {"bDamping": damping, "bBusy": 0.0, "nSensorFault": fault, "hook": 0.0, "payload": sway}
+    trace = np.column_stack([np.broadcast_to(value, cycles) for value in columns.values()])
+    run = BlockRun(
+        axes=(),
+        on_the_way=np.zeros(2),
+        residual=np.zeros(2),
+        cycles=cycles,
+        stands=stands,
+        promise=True,
+        error=0,
+        fault=0,
+        trace=trace,
+    )
+    return run, list(columns)[:3]
+
+
+def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
+    histories = Histories.of(spec)
+    drawn = [histories.history(choices).sensed for choices in Numbering.of(histories, 60, 0).drawn]
+    sound = attrs.evolve(next(one for one in drawn if one is not None and not one.fault), gusts=())
+    times = np.arange(5000) * CYCLE
+
+    def faults(one, run, outputs):
+        return [*sensor_faults(spec, one, run, outputs, cycle=CYCLE, last=1.0)]
+
+    assert not faults(sound, *followed(0.2 * (times < 12.9)))
+    (late,) = faults(sound, *followed(0.2 * (times < 14.0)))
+    assert "the payload is damped to check.residual_sway later than allowed by 0.976 s" in late
+    (alarm,) = faults(sound, *followed(0.0, fault=5.0))
+    assert "nSensorFault 5" in alarm
+    gusty = attrs.evolve(sound, gusts=(Gust(time=2.0, lasts=1.0, acceleration=0.1),))
+    assert not faults(gusty, *followed(0.2 * (times < 14.0)))
+    silent = attrs.evolve(sound, fault="silent", fails=3.0)
+    assert "not noticed" in faults(silent, *followed(0.0))[0]
+    assert not faults(silent, *followed(0.2, fault=1.0))
+
+
+@pytest.mark.slow
+def test_a_block_with_a_sensor_passes_its_proof(spec, text):
+    proof = prove(spec, text, histories=HISTORIES, workers=2)
+    assert proof.passed, proof.reasons()
+    assert proof.apart <= 1e-9  # FMPy finds the same, with what swings at first and gusts
+    assert any("sensor" in one.to_dict() for one in proof.judged)
+
+
+@pytest.mark.slow
+def test_python_and_play_give_it_what_the_sensor_shows(text, spec):
+    planner = Planner(spec, position=20.0)
+    shown = planner.hold(3.0, sensor=0.05 * np.cos(1.16 * CYCLE * np.arange(750))).outputs
+    assert shown["bSensorUsed"][-1] and shown["bDamping"][-1]
+    assert planner.hold(1.0).outputs["nSensorFault"][-1] == 1
+    log = "time_s,value\n" + "".join(
+        f"{0.02 * k:.2f},{0.05 * np.cos(1.16 * 0.02 * k):.4f}\n" for k in range(200)
+    )
+    with pytest.raises(SpecError, match=r"sensor: the block has none; state planner\.sensor"):
+        read_sensor_log(log, {})
+    issued = play(text, "time_s,command,value\n0.0,stop,\n", sensor_text=log)
+    head, *rows = issued.table.splitlines()
+    damping = head.split(",").index("damping")
+    assert any(row.split(",")[damping] == "1" for row in rows)
+    for wrong, words in (("time,value\n0,0\n", "no column time_s"), ("time_s,value\n0,x\n", "line 2")):
+        with pytest.raises(SpecError, match=words):
+            play(text, "time_s,command,value\n0.0,stop,\n", sensor_text=wrong)
