@@ -408,7 +408,7 @@ def test_a_fault_in_the_commands_is_told_with_its_line(text, commands, words):
     [
         ("FUNCTION_BLOCK x VAR END_VAR y := 1; END_FUNCTION_BLOCK", "y is not declared"),
         (
-            "FUNCTION_BLOCK x VAR\n  y : INT; END_VAR END_FUNCTION_BLOCK",
+            "FUNCTION_BLOCK x VAR\n  y : REAL; END_VAR END_FUNCTION_BLOCK",
             r"line 2, column 7 is not understood",
         ),
         ("FUNCTION_BLOCK x VAR", "line 1, column [0-9]+ is not understood"),
