@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 from flint import arb, arb_poly
@@ -14,11 +15,13 @@ from flint import arb, arb_poly
 FINER = 4  # parts of a cycle, between whose ends bounds are by the greatest acceleration
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AxisPiece:
     """One axis on a piece of time: its smooth position as a polynomial on −1 … 1, and bounds of the rest.
 
-    `gap` bounds |ε| in m (or rad), `rate` its rate, `mean` |ε̄|, `swing` |ψ|, and `first` |ε| at first.
+    `gap` bounds |ε| in m (or rad), `rate` its rate, `mean` |ε̄|, `swing` |ψ|, and `first` |ε| at first;
+    `mean_gap` and `mean_swing` the means of |ε| and |ψ| over the piece. Its parts take these `shares` of
+    its time; on them `gaps` and `rates` bound |ε| and its rate.
     """
 
     smooth: arb_poly
@@ -27,6 +30,25 @@ class AxisPiece:
     mean: arb
     swing: arb
     first: arb
+    mean_gap: arb
+    mean_swing: arb
+    shares: Sequence[arb]
+    gaps: Sequence[arb]
+    rates: Sequence[arb]
+
+
+@cache
+def mean_products(pieces: tuple[AxisPiece, ...]) -> list[list[arb]]:
+    """Bound the means over a piece of all products of two of every axis' |ε|, and their rates after them."""
+    sizes = [*(one.gaps for one in pieces), *(one.rates for one in pieces)]
+    return [[_mean(pieces[0].shares, one, two) for two in sizes] for one in sizes]
+
+
+def _mean(*factors: Sequence[arb]) -> arb:
+    total = arb(0)
+    for share, one, two in zip(*factors, strict=True):
+        total += share * one * two
+    return total.abs_upper()
 
 
 def magnitude(values: Sequence[arb]) -> arb:
@@ -92,21 +114,33 @@ def _piece(smooth: arb_poly, points: Sequence[tuple[arb, arb]]) -> AxisPiece:
     bend = sum((abs(one) for one in slope.derivative().coeffs()), start=arb(0)) / half**2
     local = [(time - begin) / half - 1 for time, _ in points]
     off = [position - smooth(x) for (_, position), x in zip(points, local, strict=True)]
-    rates, area, areas, longest = [], arb(0), [arb(0)], arb(0)
+    rates, area, areas, longest, steps = [], arb(0), [arb(0)], arb(0), []
     for ((time, position), (later, farther)), (x, y) in zip(pairwise(points), pairwise(local), strict=True):
         step = later - time
         rates.append((farther - position) / step - slope((x + y) / 2) / half)
         area += step * (position + farther) / 2 - half * (primitive(y) - primitive(x))
         areas.append(area)
         longest = longest.max(step.abs_upper())
+        steps.append(step)
     mean = area / (end - begin)
-    swings = [one - mean * (time - begin) for one, (time, _) in zip(areas, points, strict=True)]
-    rate = magnitude(rates) + bend * longest / 2
+    swings = [abs(one - mean * (time - begin)) for one, (time, _) in zip(areas, points, strict=True)]
+    rates = [abs(one) + bend * longest / 2 for one in rates]
+    gaps = [magnitude(pair) + bend * longest**2 / 8 for pair in pairwise(off)]
+    swung = [
+        magnitude(pair) + rate * longest**2 / 8 for pair, rate in zip(pairwise(swings), rates, strict=True)
+    ]
+    shares = [step / (end - begin) for step in steps]
+    whole = [arb(1)] * len(shares)
     return AxisPiece(
         smooth=smooth,
-        gap=magnitude(off) + bend * longest**2 / 8,
-        rate=rate,
+        gap=magnitude(gaps),
+        rate=magnitude(rates),
         mean=magnitude([mean]),
-        swing=magnitude(swings) + rate * longest**2 / 8,
+        swing=magnitude(swung),
         first=magnitude(off[:1]),
+        mean_gap=_mean(shares, gaps, whole),
+        mean_swing=_mean(shares, swung, whole),
+        shares=shares,
+        gaps=gaps,
+        rates=rates,
     )

@@ -16,7 +16,7 @@ from typing import Any
 
 from flint import arb, arb_mat, arb_poly
 
-from gen_profile_recheck.axes import magnitude
+from gen_profile_recheck.axes import magnitude, mean_products
 from gen_profile_recheck.boxes import (
     Expansion,
     MachineBox,
@@ -128,7 +128,7 @@ class BoxProof:
             tube = [(reach * row).abs_upper() for row in scale.rows]
             growth = self._growth(piece, scale, tube)
             disturbance = Disturbance(piece, tube)
-            added = norm(scale.sizes_of(disturbance.sizes))
+            added = sum((norm(scale.sizes_of(term)) for term in disturbance.terms), start=arb(0))
             factor = (growth * time).exp()
             most = factor.max(arb(1))
             step = (source + added) * time * most
@@ -292,7 +292,11 @@ def _norm_of(sizes: Sequence[Sequence[arb]]) -> arb:
 
 
 class Disturbance:
-    """What setpoints beside the smooth motion add: bounds of r in `sizes`, and of x − z in `shift`."""
+    """What setpoints beside the smooth motion add: bounds of x − z in `shift`, and of r in `terms`.
+
+    Each term is a vector times a function of time, whose mean over the piece is taken: errors grow with the
+    integral of |S r|, and that is at most the sum of the terms' integrals.
+    """
 
     def __init__(self, piece: MotionPiece, tube: Sequence[arb]) -> None:
         self.piece, self.machine = piece, piece.box.machine
@@ -302,7 +306,7 @@ class Disturbance:
         self._at(tube, guess)
         if not all(one <= most for one, most in zip(self.shift, guess, strict=True)):
             raise NotProvedError("the setpoints are too far from the smooth motion")
-        self.sizes = self._sizes()
+        self.terms = self._terms()
 
     def _at(self, tube: Sequence[arb], guess: Sequence[arb]) -> None:
         s = self.piece.everywhere([a + b for a, b in zip(tube, guess, strict=True)])
@@ -311,7 +315,7 @@ class Disturbance:
         self.pulls = [self.pull(chosen, self.x, self.a, self.v, self.bend) for chosen in range(len(self.a))]
         lifted = _summed(zip(self.lifts, self.gaps, strict=True), len(self.x))
         pulled = _summed(zip(self.pulls, (one.swing for one in self.piece.axes), strict=True), len(self.x))
-        self.lifted, self.shift = lifted, [a + b for a, b in zip(lifted, pulled, strict=True)]
+        self.shift = [a + b for a, b in zip(lifted, pulled, strict=True)]
 
     def rate(self, x: Values, a: Values, v: Values) -> Values:
         """Give f."""
@@ -335,9 +339,8 @@ class Disturbance:
         crossed = self.rate(moved(x, flow, 2), moved(a, v, 2), moved(later, unit, 1))
         return [one - along(along(two, 1), 2) for one, two in zip(beside, crossed, strict=True)]
 
-    def _sizes(self) -> list[arb]:
-        n, pieces = len(self.x), self.piece.axes
-        first, sizes = self._by_axes()
+    def _terms(self) -> list[list[arb]]:
+        first, found = self._by_axes()
         faster = [wide(one) for one in first]
         true = [one + two for one, two in zip(self.rate(self.x, self.a, self.v), faster, strict=True)]
         moving = (
@@ -346,46 +349,47 @@ class Disturbance:
             moved(self.v, self.bend, 4),
             moved(self.bend, self.jerk, 4),
         )
-        for chosen, (axis, pull) in enumerate(zip(pieces, self.pulls, strict=True)):
-            unit = [1 if row == chosen else 0 for row in range(len(self.v))]
+        off = moved(self.x, [wide(one) for one in self.shift], 1)
+        for chosen, axis in enumerate(self.piece.axes):
+            pull, unit = self.pulls[chosen], [int(row == chosen) for row in range(len(self.v))]
             changed = [along(one, 4) for one in self.pull(chosen, *moving)]
             passed = [along(one, 1) for one in self.rate(moved(self.x, pull, 1), self.a, self.v)]
-            crossed = self.rate(moved(self.x, faster, 1), self.a, moved(self.v, unit, 2))
-            for row in range(n):
-                sizes[row] += (
-                    abs(arb(pull[row])) * axis.mean + abs(arb(along(along(crossed[row], 1), 2))) * axis.gap
-                )
-                sizes[row] += (abs(arb(changed[row])) + abs(arb(passed[row]))) * axis.swing
-        whole, lifted = [wide(one) for one in self.shift], [wide(one) for one in self.lifted]
-        bent = self.rate(moved(moved(self.x, whole, 1), lifted, 2), self.a, self.v)
-        return [
-            (one + abs(arb(along(along(two, 1), 2)))).abs_upper()
-            for one, two in zip(sizes, bent, strict=True)
-        ]
+            lift_change = self.rate(moved(self.x, faster, 1), self.a, moved(self.v, unit, 2))
+            bent = self.rate(moved(off, self.lifts[chosen], 2), self.a, self.v)
+            found += [
+                _weighted(axis.mean, pull),
+                _weighted(axis.mean_swing, changed, passed),
+                _weighted(
+                    axis.mean_gap, *([along(along(one, 1), 2) for one in two] for two in (lift_change, bent))
+                ),
+            ]
+        return found
 
-    def _by_axes(self) -> tuple[list[arb], list[arb]]:
+    def _by_axes(self) -> tuple[list[arb], list[list[arb]]]:
         """Bound what the axes' being elsewhere changes in f, and by how much more than its slopes tell.
 
         Derivatives are taken along one axis at a time, so that what cancels in them does.
         """
         pieces, m = self.piece.axes, len(self.a)
-        sizes = [*self.gaps, *(one.rate for one in pieces)]
+        sizes, products = [*self.gaps, *(one.rate for one in pieces)], mean_products(tuple(pieces))
         near = [one + wide(size) for one, size in zip([*self.a, *self.v], sizes, strict=True)]
-        first, second = [arb(0)] * len(self.x), [arb(0)] * len(self.x)
+        first, second = [arb(0)] * len(self.x), []
         for i, j in product(range(2 * m), repeat=2):
             if j > i:
                 continue
             once = moved(near, [int(row == i) for row in range(2 * m)], 1)
             both = moved(once, [int(row == j) for row in range(2 * m)], 2)
-            weight = sizes[i] * sizes[j] / (2 if i == j else 1)
-            for row, one in enumerate(self.rate(self.x, both[:m], both[m:])):
-                second[row] += abs(arb(along(along(one, 1), 2))) * weight
-                if i == j:
-                    slope = along(one, 1)
-                    first[row] += (
-                        abs(arb(slope.parts.get(0, 0) if isinstance(slope, Jet) else slope)) * sizes[i]
-                    )
+            slopes = [along(one, 1) for one in self.rate(self.x, both[:m], both[m:])]
+            second.append(_weighted(products[i][j] / (2 if i == j else 1), [along(one, 2) for one in slopes]))
+            if i == j:
+                only = [one.parts.get(0, 0) if isinstance(one, Jet) else one for one in slopes]
+                first = [one + abs(arb(two)) * sizes[i] for one, two in zip(first, only, strict=True)]
         return first, second
+
+
+def _weighted(weight: arb, *columns: Sequence[Any]) -> list[arb]:
+    """Bound a weight times the sum of columns, entry by entry."""
+    return [sum((abs(arb(one)) for one in row), start=arb(0)) * weight for row in zip(*columns, strict=True)]
 
 
 def _first_gap(piece: MotionPiece, leap: Sequence[arb]) -> list[arb]:

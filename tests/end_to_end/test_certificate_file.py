@@ -210,7 +210,7 @@ def test_a_proof_without_a_check_is_refused_before_anything_is_designed(tmp_path
 
 
 def test_where_counts_are_too_coarse_for_a_bound_that_is_said(tmp_path):
-    coarse = ("axis.unit=counts", "axis.counts_per_metre=10000", "robustness.uncertain={L1=0.01}")
+    coarse = ("axis.unit=counts", "axis.counts_per_metre=3000", "robustness.uncertain={L1=0.01}")
     spec = gp.preset_spec("double-pendulum-crane", [*coarse, "export.cycle_time=0.02"])
     written = gp.design(spec, ["csv"], tmp_path, check=False)
     proof = gp.certify_artefact(written.folder / written.artefacts[0].path)

@@ -4,6 +4,7 @@ from functools import cache, partial
 from itertools import pairwise
 from types import SimpleNamespace
 
+import attrs
 import flint
 import numpy as np
 import pytest
@@ -140,9 +141,23 @@ def test_the_axes_are_as_near_to_the_smooth_motion_as_is_said(find, tau):
         assert np.abs(np.diff(off) / np.diff(t)).max() <= gap.velocity[piece, 0] + 1e-8
         assert abs(mean) <= gap.mean[piece, 0] + 1e-11  # of the trapezoids
         assert np.abs(integral).max() <= gap.integral[piece, 0] + 1e-14
+        rate, apart = np.diff(off) / np.diff(t), 0.5 * np.abs(off[1:] + off[:-1])
+        both = np.stack([apart, np.abs(rate)])
+        assert apart.mean() <= gap.mean_position[piece, 0] + 1e-13
+        assert np.abs(integral).mean() <= gap.mean_integral[piece, 0] * (1.0 + 1e-6) + 1e-14
+        assert (both @ both.T / len(rate) <= gap.mean_squares[piece] * (1.0 + 1e-6) + 1e-12).all()
     moving = gap.position[gap.position > 1e-12]
     assert moving.max() < 2e-5 * np.ptp(setpoints.position)
     assert gap.mean.max() < 1e-4 * moving.max()
+
+
+def test_rounding_to_coarse_counts_is_taken_as_it_is():
+    """Setpoints leap by 33 µm: where only the greatest leap of a piece counted, there was no bound."""
+    spec, setpoints = planned("paper", "check.uncertain={}")
+    counts = np.round(3e4 * setpoints.position) / 3e4
+    found = attempt(spec, attrs.evolve(setpoints, position=counts, resolution=np.array([1.0 / 3e4])))
+    assert found.bounds.shape == (1, 2)
+    assert (found.largest_met <= found.bounds[0]).all() and found.bounds.max() < 4e-4
 
 
 @pytest.mark.parametrize("tau", [0.0, 0.03])

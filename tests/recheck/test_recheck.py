@@ -52,7 +52,9 @@ CERTIFIED = [
     ("flexible-joint", "robustness.uncertain={J=0.02}"),
     pytest.param(("flexible-joint", "robustness.uncertain={k=0.02, c=0.2}"), marks=slow),
     pytest.param(("flexible-joint", "check.uncertain={}"), marks=slow),
-    pytest.param(("flexible-joint", "axis.unit=counts", "axis.counts_per_metre=1e6"), marks=slow),
+    pytest.param(
+        ("paper", "check.uncertain={}", "axis.unit=counts", "axis.counts_per_metre=30000"), marks=slow
+    ),
     pytest.param(("slosh-tank",), marks=slow),
     pytest.param(("slosh-tank", "plant.mu=0", "limits.sway=0.1"), marks=slow),
     pytest.param(("mass-spring-chain", "robustness.uncertain={m3=0.02}"), marks=slow),

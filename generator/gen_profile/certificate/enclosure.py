@@ -325,7 +325,7 @@ class Enclosure:
         shift += np.einsum(
             "bpla,pa->bpl", array(eq.sway_by_position(*arguments), shape).most, self.gap.position
         )
-        disturbance = norm(matmul_most(scaling.most, self._disturbance(near, shifted)))
+        disturbance = self._disturbance(near, shifted)
         growth = self._growth(near, tube)
         return growth, disturbance, slopes, shift * ROUND_UP
 
@@ -352,7 +352,11 @@ class Enclosure:
         return array(self.equations.jacobian_change(*self._state(near), split(change, -1)), near.shape[:2])
 
     def _disturbance(self, near: Ball, shifted: Array) -> Array:
-        """Bound r, what the setpoints make of the motion beside the smooth one, (boxes, pieces, 2 n_u)."""
+        """Bound the mean over each piece of |S r|, r being what the setpoints add, (boxes, pieces).
+
+        Each term of r is a vector that is bounded over the piece, times a function of time of known mean;
+        the mean of a sum's length is at most the sum of these.
+        """
         eq, gap, shape, state = self.equations, self.gap, near.shape[:2], self._state(near)
         ddq_a, jerk = (split(self._axes_on(1.0, order), -1) for order in (2, 3))
         lift = array(eq.lift(*state), shape).most
@@ -360,19 +364,18 @@ class Enclosure:
         jacobian = array(eq.jacobian(*state), shape).most
         rate = [row[0] for row in eq.rate(*state)]
         both = np.concatenate([gap.position, gap.velocity], axis=1)
-        squares = (both[:, :, None] * both[:, None, :]).reshape(len(both), -1)
-        second = 0.5 * times(array(eq.curvature(*state), shape).most, squares)
+        curvature = 0.5 * array(eq.curvature(*state), shape).most
         faster = times(lift, gap.velocity) + times(array(eq.by_position(*state), shape).most, gap.position)
-        faster = (faster + second) * ROUND_UP
+        faster += times(curvature, (both[:, :, None] * both[:, None, :]).reshape(len(both), -1))
         bent = self._jacobian_change(near, Ball(0.0 * shifted, shifted)).most
+        faster = faster * ROUND_UP
         lifted = array(eq.lift_change(*state, split(Ball(0.0 * faster, faster), -1)), shape).most
         changed = array(eq.pull_change(*state, ddq_a, rate, jerk), shape).most
-        disturbance = (
-            times(pull, gap.mean) + times(changed, gap.integral) + times(lifted, gap.position) + second
-        )
-        disturbance += np.einsum("bpxy,bpy->bpx", jacobian, times(pull, gap.integral))
-        disturbance += np.einsum("bpxy,bpy->bpx", bent, times(lift, gap.position))
-        return disturbance * ROUND_UP
+        vectors = [pull, changed + jacobian @ pull, lifted + bent @ lift, curvature]
+        squares = gap.mean_squares.reshape(len(both), -1)
+        means = np.concatenate([gap.mean, gap.mean_integral, gap.mean_position, squares], axis=1)
+        lengths = norm(np.swapaxes(self.approximation.scaling.most @ np.concatenate(vectors, axis=3), 2, 3))
+        return np.asarray(np.einsum("bpk,pk->bp", lengths, means) * ROUND_UP)
 
     @cached_property
     def _still(self) -> Array:

@@ -214,19 +214,27 @@ class Gap:
         Of ε̄.
     integral : (pieces, m) array
         Of ψ, in m s (or rad s).
+    mean_position, mean_integral : (pieces, m) arrays
+        Of the means of |ε| and |ψ| over time.
+    mean_squares : (pieces, 2 m, 2 m) array
+        Of the means of all products of two of |ε| and |η|, those of |ε| first.
     """
 
     position: Array
     velocity: Array
     mean: Array
     integral: Array
+    mean_position: Array
+    mean_integral: Array
+    mean_squares: Array
 
 
 def gap_between(motion: AxisMotion, track: Track) -> Gap:
     """Bound how far the axes are from a motion.
 
     Between two points, the axes are away from a straight line by |a| h²/8 at most, and from its velocity by
-    |a| h/2, with a their acceleration; so is the motion.
+    |a| h/2, with a their acceleration; so is the motion. Rounded setpoints leap about a smooth one:
+    means over a piece are summed up from point to point, and are a fraction of the greatest values.
     """
     c, half = motion.coefficients(), motion.halves
     bend = (widened(c, 1.0, 2) / (half * half)[:, None]).most
@@ -235,8 +243,8 @@ def gap_between(motion: AxisMotion, track: Track) -> Gap:
     for piece, (first, last) in enumerate(pairwise(ends.tolist())):
         part = _part(track, first, last) if last > first else _beyond(track, motion.knots[piece : piece + 2])
         rows.append(_piece_gap(c[:, piece : piece + 1], half[piece], bend[piece], part))
-    position, velocity, mean, integral = np.moveaxis(np.array(rows), 1, 0) * (1.0 + 1e-12)
-    return Gap(position=position, velocity=velocity, mean=mean, integral=integral)
+    names = [field.name for field in attrs.fields(Gap)]
+    return Gap(**{name: np.array([getattr(row, name) for row in rows]) * (1.0 + 1e-12) for name in names})
 
 
 def _part(track: Track, first: int, last: int) -> Track:
@@ -259,23 +267,37 @@ def _beyond(track: Track, times: Array) -> Track:
     return attrs.evolve(track, times=times, position=position, areas=area, bend=track.late_bend[None])
 
 
-def _piece_gap(c: Ball, half: Ball, bend: Array, track: Track) -> list[Array]:
-    """Bound ε, η, ε̄ and ψ over one piece, each (m,)."""
+def _piece_gap(c: Ball, half: Ball, bend: Array, track: Track) -> Gap:
+    """Bound all that `Gap` holds, over one piece."""
     times, at = ball(track.times), track.position
     begin, end = times[:1], times[-1:]
     x_of = partial(_place, 0.5 * (begin + end), half)
     step = times[1:] - times[:-1]
     middle = 0.5 * (times[1:] + times[:-1])
     longest, curvature = step.most.max(), bend + track.bend.max(axis=0)
-    faster = ((at[1:] - at[:-1]) / step[:, None] - powers(c, x_of(middle), 1)[0] / half).most.max(axis=0)
+    faster = ((at[1:] - at[:-1]) / step[:, None] - powers(c, x_of(middle), 1)[0] / half).most
     faster = faster + curvature * longest / 2.0
-    apart = (at - powers(c, x_of(times), 0)[0]).most.max(axis=0) + curvature * longest**2 / 8.0
+    apart = _greater((at - powers(c, x_of(times), 0)[0]).most) + curvature * longest**2 / 8.0
     primitives = stack([0.0 * c[0], *(c[k] / (k + 1.0) for k in range(DEGREE + 1))])
     primitive = powers(primitives, x_of(times), 0)[0]
     gone = _running_sum(track.areas) - half * (primitive - primitive[:1])
     mean = gone[-1:] / (end - begin)
-    swung = (gone - mean * (times - begin)[:, None]).most.max(axis=0) + faster * longest**2 / 8.0
-    return [apart, faster, mean.most[0], swung]
+    swung = _greater((gone - mean * (times - begin)[:, None]).most) + faster * longest**2 / 8.0
+    share, both = step.most / (end - begin).mid, np.concatenate([apart, faster], axis=1)
+    return Gap(
+        position=apart.max(axis=0),
+        velocity=faster.max(axis=0),
+        mean=mean.most[0],
+        integral=swung.max(axis=0),
+        mean_position=share @ apart,
+        mean_integral=share @ swung,
+        mean_squares=np.einsum("k,ki,kj->ij", share, both, both),
+    )
+
+
+def _greater(values: Array) -> Array:
+    """Take the greater one of two neighbours."""
+    return np.maximum(values[1:], values[:-1])
 
 
 def _place(middle: Ball, half: Ball, times: Ball) -> Ball:
