@@ -416,3 +416,37 @@ def write_plain(folder):
     """A block without events, and its commands."""
     (folder / "plain.st").write_text(planner_block(SPEC).text)
     return folder / "plain.st", "--commands", folder / "commands.csv", "--out", folder / "plain.csv"
+
+
+def last_motion(driver):
+    """Cycles until it ends, and the time that was stated to be left in each of them."""
+    out = driver.parts[-1]
+    cycles = np.flatnonzero(out["fVelocity"])[-1] + 1
+    return cycles, out["fTimeToGo"][:cycles]
+
+
+def test_the_time_to_go_by_pulses_stays_when_a_stop_before_them_cannot_be_planned(text):
+    """It fell by 20 s for one slot, as if the axis came to rest far from its target."""
+    driver = Driver(text, fActPosition=7.039, fL1=5.324894, fm2=1781.942).hold(0.044)
+    driver.hold(45.545, bVelocity=1, fVelocityCommand=1.1, rOverride=0.9774525)
+    driver.hold(45.0, bVelocity=0, bExecute=1, fTarget=9.214942404508728, rOverride=1.0)
+    cycles, stated = last_motion(driver)
+    off = stated - (cycles - np.arange(cycles)) * CYCLE
+    assert np.abs(off[round(3.0 / CYCLE) :]).max() < 4.0
+
+
+def test_a_far_target_is_not_put_off_by_what_changes_of_mind_have_left(text):
+    """Four fifths of the allowed sway are left by them: a plan took 36 s, which makes up for it; pulses add little."""
+    changes = [  # s from one to the next, target, override, velocity limit
+        *((1.3284, 0.0, 0.312388, 0.0), (1.547, 19.819995, 1.0, 0.746346), (1.7439, 16.439711, 1.0, 0.0)),
+        *((3.2892, 50.0, 1.0, 0.0), (0.1631, 16.439711, 1.0, 0.0), (3.456, 5.3748, 1.0, 0.631241)),
+        *((31.3926, 9.747956, 1.0, 0.966283), (45.0, 26.392674, 1.0, 0.0)),
+    ]
+    driver = Driver(text, fActPosition=14.025363, fL1=5.874268, fm2=934.68).hold(0.2827)
+    for lasts, target, override, limit in changes:
+        driver.hold(CYCLE, bExecute=0, rOverride=override, fVelocityLimit=limit)
+        driver.hold(lasts - CYCLE, bExecute=1, fTarget=target)
+    cycles, _ = last_motion(driver)
+    assert driver.parts[-1]["fSwayLeft"][0] > 0.03
+    assert cycles * CYCLE < 30.0
+    assert last(driver, "bDone")
