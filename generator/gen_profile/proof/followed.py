@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.orders import DISABLED, POSITION, Ends, Flags, ReceivedOrders, TimedOrder
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
@@ -72,6 +73,8 @@ class Followed:
     steps, speeds : (axes, cycles) array
         How far axes are from the setpoints of the cycle before, in m, and how fast they go where they are not
         guided.
+    modes : GivenModes or None
+        Of the machine that the block is given, where its live parameters stay as they are.
     """
 
     cycle: float
@@ -89,6 +92,7 @@ class Followed:
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
+    modes: GivenModes | None = None
 
     @property
     def enabled(self) -> list[int]:

@@ -40,6 +40,9 @@ NOTICED = 0.2  # periods, in which the end of a motion is
 USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
+BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
+AS_STATED = 0.02  # share of what errors leave, and of the allowed sway, by which fSwayLeft may be wrong
+UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
 STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
@@ -284,3 +287,22 @@ def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         wrong = np.abs(v - np.where(known, followed.speeds[:, own], v))
         yield from greatest("taken over", wrong[:, :-1], EXACT, order.begin)
         yield from greatest("taken over", wrong[:, -1:] - allowed, EXACT, last)
+
+
+def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
+    unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
+    unknown += [*followed.rest_reports, *np.flatnonzero(followed.drifts)[:1].tolist()]
+    until = min(unknown, default=followed.cycles)
+    ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
+    if followed.modes is None or not ends:
+        return
+    as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
+    limit, stated = followed.sway_limit, followed.issued.get("fSwayLeft")
+    if not followed.modes.damped:
+        worst = int(np.argmax(as_given))
+        yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
+    if stated is not None and not followed.modes.damped:
+        wrong = np.abs(stated[ends] - BETWEEN * at_most) - AS_STATED * at_most
+        worst = int(np.argmax(wrong))
+        yield Allowance("sway left", ends[worst], float(wrong[worst]), AS_STATED * limit)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gen_profile.motion.profile import Array
 from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import faults
@@ -123,7 +124,13 @@ class BlockWatch:
         ]
 
     def faults(
-        self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
+        self,
+        period: float,
+        modes: GivenModes | None,
+        script: Script,
+        expected: Sequence[TimedOrder],
+        block: CalledBlock,
+        run: BlockRun,
     ) -> tuple[str, ...]:
         """Say what is wrong, each in words that end a sentence.
 
@@ -131,6 +138,8 @@ class BlockWatch:
         ----------
         period : float
             s, of the slowest swing that the block is given.
+        modes : GivenModes or None
+            Of the machine that it is given.
         script : Script
             Of a history.
         expected : sequence of TimedOrder
@@ -140,6 +149,7 @@ class BlockWatch:
             With its trace, and copies of the block before `marks`.
         """
         followed, reactions = self.followed(period, script, expected, block, run)
+        followed = attrs.evolve(followed, modes=modes)
         return (*faults(followed, reactions), *self._understated(run, followed))
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
