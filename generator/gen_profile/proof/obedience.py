@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from gen_profile.proof.followed import (
     IssuedMotion,
     arriving,
     calmed,
+    greatest,
     reaching,
     runs_of,
     slowing,
@@ -38,6 +40,7 @@ from gen_profile.proof.statements import (
     velocities,
 )
 
+BARELY_MORE = 1e-3  # share of the greatest velocity, by which a stick may be exceeded
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 WORDS = {
@@ -45,6 +48,8 @@ WORDS = {
     VELOCITY: "a stick's velocity is reached later than allowed by {over:.3g} s",
     STOP: "a stop ends later than allowed by {over:.3g} s",
     "left": "a target is left again by {needed:.3g} m",
+    "unasked": "an axis moves that was not commanded to by {needed:.3g} m/s",
+    "beyond": "a velocity is above the stick's by {over:.3g} m/s",
     "against": "an axis moves against its command longer than allowed by {over:.3g} s",
     "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
     "reaction": "a command is obeyed later than stated by {over:.3g} s",
@@ -108,6 +113,7 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         _arrivals,
         _directions,
         _velocity_limits,
+        _sticks,
         _quick_stops,
         truths,
         velocities,
@@ -157,6 +163,8 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             yield Allowance(order.kind, begin, (first - begin) * followed.cycle, allowed)
         elif end > latest:
             yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
+        if first < end and order.kind == VELOCITY:
+            yield from _beyond(followed, motion, order, first)
         if first < end and order.kind == POSITION:
             yield Allowance("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
 
@@ -221,6 +229,32 @@ def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allow
                 at = int(np.argmax(fastest))
                 slack = (EXACT + 1.5 * followed.reserve) * own.velocity
                 yield Allowance("fast", begin + at, float(fastest[at]), top + slack)
+
+
+def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge that from rest no axis is faster than its stick, and that one left alone stays where it is."""
+    for before, order in pairwise(followed.orders):
+        begin, end = order.begin, order.end
+        if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
+            continue
+        if before.kind == VELOCITY:
+            continue  # whose last tap still counts
+        for k, way in enumerate(motion.way[:, begin].tolist()):
+            velocity = motion.velocity[k, begin:end]
+            if not way:
+                yield from greatest("unasked", np.abs(velocity), 0.0, begin)
+        if order.kind == VELOCITY:
+            yield from _beyond(followed, motion, order, begin)
+
+
+def _beyond(
+    followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: int
+) -> Iterator[Allowance]:
+    """Judge that no axis goes faster than its stick, from a cycle on, but to calm."""
+    for k, (wanted, own) in enumerate(zip(order.values, followed.limits, strict=True)):
+        if wanted and not followed.reserve:
+            top = abs(wanted) + BARELY_MORE * own.velocity
+            yield from greatest("beyond", motion.velocity[k, begin : order.end] * np.sign(wanted), top, begin)
 
 
 def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

@@ -96,7 +96,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("distance", np.abs(wrong), max(EXACT, followed.wander))
     if followed.reserve:
         return  # calming goes on as long as it must
-    time, slot = followed.issued["fTimeToGo"], 0.1 * followed.period + 2.0 * followed.cycle
+    time, slot = followed.issued["fTimeToGo"], 2.0 * followed.cycle
     for order in followed.orders:
         moving = np.flatnonzero(~motion.stands[order.begin : order.end])
         if not len(moving):
@@ -158,7 +158,8 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
             at = order.end
             moving |= bool(motion.velocity[:, at - 1 : at].any())
             moved = followed.moved(order.begin, at) > 0.0
-            may_be[at:] |= moving or moved
+            begun = bool(followed.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
+            may_be[at:] |= moving or moved or begun
             must_be[at:] |= (moving or followed.moved(order.begin, at) > FAR_MOVED) and not followed.reserve
         elif order.kind == QUICK_STOP:
             may_be[at:] |= moving or bool(followed.issued["bBusy"][max(0, at - 1)])
@@ -181,7 +182,8 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
-        begin, own = order.begin, slice(order.begin, order.end)
+        begin = max(0, order.begin - (order.kind == STOP))  # the ends that an interlock saw as it stopped the axis
+        own = slice(begin, order.end)
         if order.kind == POSITION:
             targets.append(order.values)
         if order.kind not in (STOP, QUICK_STOP):
@@ -190,16 +192,20 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         lowest, highest = (
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
-        if not (followed.reserve and begin in followed.enabled):  # what swings as it is taken over is calmed
+        if not (followed.reserve and order.begin in followed.enabled):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in followed.limits)
             yield from greatest("ends", leaves, STATED + calms, begin)
+        if order.kind == QUICK_STOP:
+            wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own]
+            margin = max(limits.margin for limits in followed.limits)
+            yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
         takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
         rests = motion.stands[own] & (followed.issued["bBusy"][own] == 0.0)
         for k, limits in enumerate(followed.limits):
             leads = known[k] + limits.velocity * takes  # a stop that is not planned yet may end there
-            yield Allowance("loose", begin, max(up[k, begin], down[k, begin]), leads)
+            yield Allowance("loose", begin, max(up[k, order.begin], down[k, order.begin]), leads)
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
