@@ -17,11 +17,13 @@ from gen_profile.proof.habits import GENTLE, ROUGH
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import WORDS, faults, measured
 from gen_profile.proof.orders import (
+    BLOCKED,
     DISABLED,
     POSITION,
     QUICK_STOP,
     STOP,
     VELOCITY,
+    ZONES,
     Ends,
     Facts,
     Inputs,
@@ -205,6 +207,7 @@ FAULTS = {
     "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
     "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
     "sway left": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
+    "event": with_output("nEvents", 0, 0.0),
     "promise": with_output("bPromise", 300, 0.0),
     "lost": with_output("nPromise", slice(2000, 3000), 1.0),
     "kept": with_orders(REST, attrs.evolve(MOVE, end=300), order(300, CYCLES, QUICK_STOP)),
@@ -373,7 +376,7 @@ def test_what_commands_mean_depends_on_what_the_block_did():
     )
     none = np.zeros(1000, dtype=bool)
     far = np.zeros((1, 1000))
-    facts = {"done": none, "stands": none, "errors": 1.0 * none, "low": far, "high": far}
+    facts = {"done": none, "stands": none, "errors": 1.0 * none, "position": far, "low": far, "high": far}
     assert changes(read(*rows, facts=Facts(**facts)).holds) == {300: 0}
     done = none.copy()
     done[150:200] = True
@@ -386,6 +389,21 @@ def test_what_commands_mean_depends_on_what_the_block_did():
         STOP,
     ]  # deflected as it was enabled
     assert not received.aborted.any()
+
+
+@pytest.mark.parametrize(("low", "expected"), [(2.0, BLOCKED), (-2.0, 0), (6.0, 0)])
+def test_an_interval_is_in_the_way_where_it_lies_before_the_target(low, expected):
+    names = [*NAMES, *(f"aBlocked{end}[{k}]" for end in ("Low", "High") for k in range(ZONES))]
+    values = dict.fromkeys(names, 0.0)
+    values |= {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5, "fCycleTime": CYCLE}
+    values |= {"bExecute": 1.0, "fTarget": 5.0}
+    closed = values | {"aBlockedLow[0]": low, "aBlockedHigh[0]": low + 1.0}
+    errors, still, place = np.zeros(1000), np.zeros(1000, dtype=bool), np.zeros((1, 1000))
+    errors[101:] = BLOCKED
+    facts = Facts(done=still, stands=still, errors=errors, position=place, low=place, high=place)
+    inputs = attrs.evolve(INPUTS, names=names)
+    rows = np.array([list(values.values()), list(closed.values())])
+    assert read_orders([0, 100], rows, inputs, 1000, facts).error[200] == expected
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What a motion leaves swinging on the linear machine that a block is given, and on those of stated errors."""
+"""What a motion leaves swinging on the linear machine that a block is given, and with stated errors."""
 
 from __future__ import annotations
 
@@ -44,8 +44,9 @@ class GivenModes:
         rates, ratios = at.distinct_frequencies, at.distinct_damping_ratios
         errors, *gains = left_by_errors(spec, point).reshape(-1, len(rates))
         damped = rates * np.sqrt(1.0 - ratios**2)
+        poles = 1j * damped[:, None] * (1.0 + np.outer(errors, ERRORS)) - (ratios * rates)[:, None]
         return cls(
-            poles=1j * damped[:, None] * (1.0 + np.outer(errors, ERRORS)) - (ratios * rates)[:, None],
+            poles=np.asarray(poles, dtype=np.complex128),
             gains=np.array(gains),
             damped=bool(ratios.any()),
         )
@@ -75,7 +76,9 @@ class GivenModes:
             passed = acceleration[:, begin + 1 : end + 1][:, ::-1] @ wave[: end - begin].view(np.float64)
             left = left * wave[end - begin] + passed.view(np.complex128)
             found.append(left)
-        half = 0.5 * poles * cycle  # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
+        half = (
+            0.5 * poles * cycle
+        )  # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
         by_mode = np.abs(np.array(found) * cycle * (np.sinh(half) / half) ** 2 / poles)
         swings = self.gains[..., None] * by_mode.reshape(len(ends), *self.gains.shape, -1)
         return swings[..., 0].sum(axis=(1, 2)), swings.max(axis=-1).sum(axis=(1, 2))

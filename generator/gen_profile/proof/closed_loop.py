@@ -142,7 +142,7 @@ class ClosedLoop:
             return attrs.evolve(run, trace=None), own
         orders = self._watch.orders(script)
         run = self._followed(history, block, script, rows=orders[-1].end, marks=self._watch.marks(orders))
-        faults = () if run.fault else self._watch.faults(period, modes, script, orders, block, run)
+        faults = () if run.fault else self._watch.faults((period, modes), script, orders, block, run)
         return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:

@@ -70,6 +70,8 @@ class Followed:
     zones : sequence of Zone
     drifts : (cycles,) array of bool
         Whether a live parameter is other than at first.
+    live_changes : sequence of (int, int)
+        Cycles in which a live parameter changes for the first time, and from which the block must know of it.
     steps, speeds : (axes, cycles) array
         How far axes are from the setpoints of the cycle before, in m, and how fast they go where they are not
         guided.
@@ -90,6 +92,7 @@ class Followed:
     rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
+    live_changes: Sequence[tuple[int, int]] = ()
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     modes: GivenModes | None = None

@@ -30,6 +30,7 @@ from gen_profile.proof.followed import (
 from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
 from gen_profile.proof.statements import (
     blocked,
+    events,
     numbers,
     promises,
     remains,
@@ -79,6 +80,7 @@ WORDS = {
     "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
     "swings": "a motion leaves the machine as given swinging by {needed:.3g} m",
     "sway left": "fSwayLeft is wrong by {needed:.3g} m",
+    "event": "the events that are kept are not those that happened",
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
     "kept": "bPromise is set though it cannot be known",
@@ -121,6 +123,7 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         numbers,
         promises,
         remains,
+        events,
         blocked,
         slowed,
         taken_over,
@@ -163,8 +166,6 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             yield Allowance(order.kind, begin, (first - begin) * followed.cycle, allowed)
         elif end > latest:
             yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
-        if first < end and order.kind == VELOCITY:
-            yield from _beyond(followed, motion, order, first)
         if first < end and order.kind == POSITION:
             yield Allowance("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
 
@@ -247,9 +248,7 @@ def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             yield from _beyond(followed, motion, order, begin)
 
 
-def _beyond(
-    followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: int
-) -> Iterator[Allowance]:
+def _beyond(followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: int) -> Iterator[Allowance]:
     """Judge that no axis goes faster than its stick, from a cycle on, but to calm."""
     for k, (wanted, own) in enumerate(zip(order.values, followed.limits, strict=True)):
         if wanted and not followed.reserve:

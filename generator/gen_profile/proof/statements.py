@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from math import inf
 
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.planner.events import KEPT
 from gen_profile.proof.followed import (
     ENABLED,
     EXACT,
@@ -46,6 +48,8 @@ UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as gi
 STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
+TOLD = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs tell, too
+PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
 
 
 def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
@@ -147,6 +151,51 @@ def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from never("kept", promise & must_be)
     drifted = np.cumsum(followed.drifts) > 0
     yield from never("lost", (why == 1.0) & ~drifted)
+    for begin, known in followed.live_changes:
+        ends = [*followed.rest_reports, *followed.enabled[1:], followed.cycles]
+        until = min(end for end in ends if end >= begin)
+        if begin and known < until and (motion.guided & ~motion.stands)[begin - 1 : known].all():
+            yield from never("kept", promise[known:until])
+
+
+def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge the events that are kept by the other outputs: each in its cycle, and no others."""
+    issued = followed.issued
+    if "nEvents" not in issued:
+        return
+    found, expected = Counter[tuple[int, int]](), Counter(_told(followed))
+    for cycle in np.flatnonzero(np.diff(issued["nEvents"], prepend=0.0)).tolist():
+        count = int(issued["nEvents"][cycle])
+        for k in range(int(issued["nEvents"][cycle - 1]) if cycle else 0, count):
+            time, code, value = (
+                float(issued[f"aEvent{of}[{k % KEPT}]"][cycle]) for of in ("Time", "Code", "Value")
+            )
+            yield Allowance(
+                "event", cycle, abs(time - (cycle + 1) * followed.cycle), 1e-6 * followed.cycle * cycle
+            )
+            if code in PLANNED:
+                yield Allowance("event", cycle, abs(value - issued["fTimeToGo"][cycle]), EXACT)
+            found[cycle, int(code)] += 1
+    told = Counter({one: times for one, times in found.items() if one[1] in TOLD})
+    for cycle, _ in (told - expected) + (expected - told):
+        yield Allowance("event", cycle, 1.0, 0.0)
+
+
+def _told(followed: Followed) -> Iterator[tuple[int, int]]:
+    """Give cycles and codes of the events that other outputs and the commands tell of."""
+    for name, first, code in (("nErrorId", 0.0, 50), ("nPromise", 4.0, 60), ("bEnabled", 0.0, 0)):
+        values = followed.issued[name]
+        for cycle in np.flatnonzero(np.diff(values, prepend=first)).tolist():
+            if code or not values[cycle]:
+                yield cycle, int(values[cycle]) + code if code else 10
+    done = followed.issued["bDone"]
+    yield from ((cycle, 70) for cycle in np.flatnonzero(np.diff(done, prepend=0.0) > 0.0).tolist())
+    before, target = 20, 0.0
+    for order in followed.orders:
+        code = {POSITION: 21, VELOCITY: 22}.get(order.kind, 20)
+        if code != before or (code == 21 and order.values[0] != target):
+            yield order.begin, code
+        before, target = code, order.values[0] if code == 21 else target
 
 
 def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
@@ -182,7 +231,9 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
-        begin = max(0, order.begin - (order.kind == STOP))  # the ends that an interlock saw as it stopped the axis
+        begin = max(
+            0, order.begin - (order.kind == STOP)
+        )  # the ends that an interlock saw as it stopped the axis
         own = slice(begin, order.end)
         if order.kind == POSITION:
             targets.append(order.values)
@@ -192,7 +243,9 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         lowest, highest = (
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
-        if not (followed.reserve and order.begin in followed.enabled):  # what swings as it is taken over is calmed
+        if not (
+            followed.reserve and order.begin in followed.enabled
+        ):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in followed.limits)
             yield from greatest("ends", leaves, STATED + calms, begin)
