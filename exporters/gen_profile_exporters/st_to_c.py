@@ -449,11 +449,16 @@ def _checks(name: str) -> str:
 #define ROOT(value) root(fb, value)
 #define BOTH(one, other) ((one) & (other))
 #define EITHER(one, other) ((one) | (other))
+/* Out of line, since a thousand copies of it take seconds to compile. */
+static __attribute__((noinline, cold)) bool unsound({name} *fb, int32_t fault)
+{{
+    if (fb->fault_ == 0)
+        fb->fault_ = fault;
+    return false;
+}}
 static inline bool sound({name} *fb, bool holds, int32_t fault)
 {{
-    if (!holds && fb->fault_ == 0)
-        fb->fault_ = fault;
-    return holds;
+    return holds || unsound(fb, fault);
 }}
 static inline int32_t within({name} *fb, int32_t index, int32_t length)
 {{

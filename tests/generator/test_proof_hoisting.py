@@ -13,8 +13,9 @@ from gen_profile.planner.design import planner_block
 from gen_profile.planner.planner import Planner
 from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories, History
+from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import prove
-from gen_profile.spec.reading import parse_spec
+from gen_profile.spec.reading import parse_spec, preset_spec
 
 HOISTED = ((0.0, 6.0), (2.0, 6.0), (27.0, 8.5), (32.0, 8.0))  # s and m: at 0.1 m/s
 
@@ -214,3 +215,18 @@ def test_hoisting_too_fast_for_the_allowed_sway_is_refused_with_its_number():
 def test_a_rate_that_cannot_be_followed_is_refused(changes, words):
     with pytest.raises(SpecError, match=words):
         planner_block(parse_spec(BAY, changes))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spec", "seed", "number"),
+    [
+        (preset_spec("bay-crane", ["planner.live_rate={L1=0.1}", "check.uncertain={L1=0.01}"]), 1, 72),
+        (parse_spec(GANTRY, ["planner.live_rate={L=0.1}", "export.cycle_time=0.004"]), 2, 56),
+    ],
+)
+def test_plans_of_fewest_and_most_slots_stay_within_the_block(spec, seed, number):
+    histories = Histories.of(spec)
+    history = Numbering.of(histories, 100, seed).history(number)
+    with ClosedLoop(spec, planner_block(spec).text, histories) as loop:
+        assert loop.watched(history, *loop.known(history))[0].fault == 0  # a division by 0, an array's end

@@ -11,16 +11,19 @@ from generator.planned_machines import BAY
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.followed import Followed, Zone
 from gen_profile.proof.habits import GENTLE, ROUGH
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import WORDS, faults, measured
 from gen_profile.proof.orders import (
+    BLOCKED,
     DISABLED,
     POSITION,
     QUICK_STOP,
     STOP,
     VELOCITY,
+    ZONES,
     Ends,
     Facts,
     Inputs,
@@ -113,7 +116,7 @@ def kinds(followed, reactions=REACTIONS):
 def with_output(name, within, value):
     followed = obedient()
     for one in [name] if isinstance(name, str) else name:
-        followed.issued[one][within] = value
+        followed.issued.setdefault(one, np.zeros(CYCLES))[within] = value
     return followed
 
 
@@ -156,6 +159,7 @@ def test_a_block_that_obeys_has_no_fault():
 
 
 REST, MOVE, STICKS, STOPS = obedient().orders
+MODES = GivenModes(poles=1j * np.array([[2.0, 2.1]]), gains=np.array([[1.0]]), damped=False)
 FAULTS = {
     POSITION: with_orders(REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS),
     VELOCITY: with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.9,)), STOPS),
@@ -199,6 +203,11 @@ FAULTS = {
     "distance": with_output("fDistanceToGo", 300, 1.0),
     "time": with_output("fTimeToGo", slice(720, 820), 3.0),
     "stop distance": with_output("fStopDistance", 300, 1.0),
+    "beyond": with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.7,)), STOPS),
+    "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
+    "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
+    "sway left": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
+    "event": with_output("nEvents", 0, 0.0),
     "promise": with_output("bPromise", 300, 0.0),
     "lost": with_output("nPromise", slice(2000, 3000), 1.0),
     "kept": with_orders(REST, attrs.evolve(MOVE, end=300), order(300, CYCLES, QUICK_STOP)),
@@ -208,6 +217,23 @@ FAULTS = {
 @pytest.mark.parametrize("what", FAULTS)
 def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
+
+
+def test_what_is_left_swinging_is_an_integral_of_the_velocity():
+    random, poles, cycle, ends = np.random.default_rng(1), np.array([[-0.1 + 1.3j]]), 0.05, [150, 400]
+    acceleration = random.normal(size=(2, 401)) * (np.arange(401) % 50 != 0)
+    fine = np.arange(0, 400 * 200 + 1) / 200
+    modes = GivenModes(poles=poles, gains=np.array([[1.0], [2.0]]), damped=True)
+    as_given, at_most = modes.left(acceleration, ends, cycle)
+    for end, found in zip(ends, as_given, strict=True):
+        time, expected = fine[: end * 200 + 1], 0.0
+        for gain, knots in zip((1.0, 2.0), acceleration, strict=True):
+            rate = np.interp(time, np.arange(401), knots)
+            # of a velocity that goes on, what an oscillator at rest in it does not do
+            swing = np.trapezoid(rate * np.exp(poles * cycle * (end - time)), time * cycle) / poles
+            expected += gain * abs(swing.item())
+        assert found == pytest.approx(expected, rel=1e-5)
+    assert at_most == pytest.approx(as_given)
 
 
 def test_a_block_that_is_disabled_and_taken_over_has_no_fault():
@@ -350,7 +376,7 @@ def test_what_commands_mean_depends_on_what_the_block_did():
     )
     none = np.zeros(1000, dtype=bool)
     far = np.zeros((1, 1000))
-    facts = {"done": none, "stands": none, "errors": 1.0 * none, "low": far, "high": far}
+    facts = {"done": none, "stands": none, "errors": 1.0 * none, "position": far, "low": far, "high": far}
     assert changes(read(*rows, facts=Facts(**facts)).holds) == {300: 0}
     done = none.copy()
     done[150:200] = True
@@ -363,6 +389,21 @@ def test_what_commands_mean_depends_on_what_the_block_did():
         STOP,
     ]  # deflected as it was enabled
     assert not received.aborted.any()
+
+
+@pytest.mark.parametrize(("low", "expected"), [(2.0, BLOCKED), (-2.0, 0), (6.0, 0)])
+def test_an_interval_is_in_the_way_where_it_lies_before_the_target(low, expected):
+    names = [*NAMES, *(f"aBlocked{end}[{k}]" for end in ("Low", "High") for k in range(ZONES))]
+    values = dict.fromkeys(names, 0.0)
+    values |= {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5, "fCycleTime": CYCLE}
+    values |= {"bExecute": 1.0, "fTarget": 5.0}
+    closed = values | {"aBlockedLow[0]": low, "aBlockedHigh[0]": low + 1.0}
+    errors, still, place = np.zeros(1000), np.zeros(1000, dtype=bool), np.zeros((1, 1000))
+    errors[101:] = BLOCKED
+    facts = Facts(done=still, stands=still, errors=errors, position=place, low=place, high=place)
+    inputs = attrs.evolve(INPUTS, names=names)
+    rows = np.array([list(values.values()), list(closed.values())])
+    assert read_orders([0, 100], rows, inputs, 1000, facts).error[200] == expected
 
 
 @pytest.fixture(scope="module")

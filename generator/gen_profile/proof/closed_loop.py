@@ -20,6 +20,7 @@ from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import SLOWEST, Histories, History
 from gen_profile.proof.sensing import sensor_faults
@@ -99,12 +100,21 @@ class ClosedLoop:
         pool = ThreadPoolExecutor(self._workers)
         try:
             # linearised here, as that is not for several threads
-            known = [(one, self._histories.slowest(one)) for one in histories]
+            known = [(one, *self.known(one)) for one in histories]
             yield pool.map(self.watched, *zip(*known, strict=True)) if known else iter(())
         finally:
             pool.shutdown(cancel_futures=True)
 
-    def watched(self, history: History, period: float) -> tuple[BlockRun, tuple[str, ...]]:
+    def known(self, history: History) -> tuple[float, GivenModes | None]:
+        """Tell the slowest period in s and, where they stay the same, the modes of the machine as given."""
+        spec = self._spec
+        steady = not (history.hoisting or spec.planner.live_noise or spec.planner.live_rate)
+        modes = GivenModes.of(spec, history.live) if steady else None
+        return self._histories.slowest(history), modes
+
+    def watched(
+        self, history: History, period: float, modes: GivenModes | None = None
+    ) -> tuple[BlockRun, tuple[str, ...]]:
         """Let the machine of a history follow the block, and see whether the block obeys.
 
         Parameters
@@ -112,6 +122,8 @@ class ClosedLoop:
         history : History
         period : float
             s, of the slowest swing that the block is given.
+        modes : GivenModes, optional
+            Of the machine that it is given.
 
         Returns
         -------
@@ -130,7 +142,7 @@ class ClosedLoop:
             return attrs.evolve(run, trace=None), own
         orders = self._watch.orders(script)
         run = self._followed(history, block, script, rows=orders[-1].end, marks=self._watch.marks(orders))
-        faults = () if run.fault else self._watch.faults(period, script, orders, block, run)
+        faults = () if run.fault else self._watch.faults((period, modes), script, orders, block, run)
         return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:

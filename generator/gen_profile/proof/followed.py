@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.orders import DISABLED, POSITION, Ends, Flags, ReceivedOrders, TimedOrder
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
@@ -69,9 +70,13 @@ class Followed:
     zones : sequence of Zone
     drifts : (cycles,) array of bool
         Whether a live parameter is other than at first.
+    live_changes : sequence of (int, int)
+        Cycles in which a live parameter changes for the first time, and from which the block must know of it.
     steps, speeds : (axes, cycles) array
         How far axes are from the setpoints of the cycle before, in m, and how fast they go where they are not
         guided.
+    modes : GivenModes or None
+        Of the machine that the block is given, where its live parameters stay as they are.
     """
 
     cycle: float
@@ -87,8 +92,10 @@ class Followed:
     rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
+    live_changes: Sequence[tuple[int, int]] = ()
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
+    modes: GivenModes | None = None
 
     @property
     def enabled(self) -> list[int]:

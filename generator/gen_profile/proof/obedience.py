@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from gen_profile.proof.followed import (
     IssuedMotion,
     arriving,
     calmed,
+    greatest,
     reaching,
     runs_of,
     slowing,
@@ -28,8 +30,10 @@ from gen_profile.proof.followed import (
 from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
 from gen_profile.proof.statements import (
     blocked,
+    events,
     numbers,
     promises,
+    remains,
     slowed,
     stops,
     taken_over,
@@ -37,6 +41,7 @@ from gen_profile.proof.statements import (
     velocities,
 )
 
+BARELY_MORE = 1e-3  # share of the greatest velocity, by which a stick may be exceeded
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 WORDS = {
@@ -44,6 +49,8 @@ WORDS = {
     VELOCITY: "a stick's velocity is reached later than allowed by {over:.3g} s",
     STOP: "a stop ends later than allowed by {over:.3g} s",
     "left": "a target is left again by {needed:.3g} m",
+    "unasked": "an axis moves that was not commanded to by {needed:.3g} m/s",
+    "beyond": "a velocity is above the stick's by {over:.3g} m/s",
     "against": "an axis moves against its command longer than allowed by {over:.3g} s",
     "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
     "reaction": "a command is obeyed later than stated by {over:.3g} s",
@@ -71,6 +78,9 @@ WORDS = {
     "distance": "fDistanceToGo is wrong by {needed:.3g} m",
     "time": "fTimeToGo is wrong by {needed:.3g} s",
     "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
+    "swings": "a motion leaves the machine as given swinging by {needed:.3g} m",
+    "sway left": "fSwayLeft is wrong by {needed:.3g} m",
+    "event": "the events that are kept are not those that happened",
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
     "kept": "bPromise is set though it cannot be known",
@@ -105,12 +115,15 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         _arrivals,
         _directions,
         _velocity_limits,
+        _sticks,
         _quick_stops,
         truths,
         velocities,
         stops,
         numbers,
         promises,
+        remains,
+        events,
         blocked,
         slowed,
         taken_over,
@@ -217,6 +230,30 @@ def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allow
                 at = int(np.argmax(fastest))
                 slack = (EXACT + 1.5 * followed.reserve) * own.velocity
                 yield Allowance("fast", begin + at, float(fastest[at]), top + slack)
+
+
+def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge that from rest no axis is faster than its stick, and that one left alone stays where it is."""
+    for before, order in pairwise(followed.orders):
+        begin, end = order.begin, order.end
+        if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
+            continue
+        if before.kind == VELOCITY:
+            continue  # whose last tap still counts
+        for k, way in enumerate(motion.way[:, begin].tolist()):
+            velocity = motion.velocity[k, begin:end]
+            if not way:
+                yield from greatest("unasked", np.abs(velocity), 0.0, begin)
+        if order.kind == VELOCITY:
+            yield from _beyond(followed, motion, order, begin)
+
+
+def _beyond(followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: int) -> Iterator[Allowance]:
+    """Judge that no axis goes faster than its stick, from a cycle on, but to calm."""
+    for k, (wanted, own) in enumerate(zip(order.values, followed.limits, strict=True)):
+        if wanted and not followed.reserve:
+            top = abs(wanted) + BARELY_MORE * own.velocity
+            yield from greatest("beyond", motion.velocity[k, begin : order.end] * np.sign(wanted), top, begin)
 
 
 def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

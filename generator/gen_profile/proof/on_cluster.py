@@ -123,5 +123,5 @@ def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]
         return [
             judge_run(spec, run, history, disobeyed, cycle=loop.cycle, number=number, group=group)
             for number, group, history in made
-            for run, disobeyed in [loop.watched(history, histories.slowest(history))]
+            for run, disobeyed in [loop.watched(history, *loop.known(history))]
         ]

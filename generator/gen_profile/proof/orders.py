@@ -101,13 +101,14 @@ class Facts:
     ----------
     done, stands : (cycles,) array of bool
     errors : (cycles,) array
-    low, high : (axes, cycles) array
-        Where a stop would lead.
+    position, low, high : (axes, cycles) array
+        Setpoints, and where a stop would lead.
     """
 
     done: Flags
     stands: Flags
     errors: Array
+    position: Array
     low: Array
     high: Array
 
@@ -371,5 +372,17 @@ class _Reader:
             self._in_the_way = False
             return False
         starts = facts.errors[cycle - 1] != BLOCKED and not (row["bExecute"] and not self._execute)
-        self._in_the_way |= starts and (self._fenced or cycle == self._edge + 1)
+        is_cause = any(
+            self._leads_into(facts, k, cycle - 1, fence) for k, own in enumerate(fences) for fence in own
+        )
+        self._in_the_way |= starts and is_cause and (self._fenced or cycle == self._edge + 1)
         return self._in_the_way
+
+    def _leads_into(self, facts: Facts, axis: int, cycle: int, fence: Interval) -> bool:
+        """Whether the goal of an axis lies within or behind an interval, or a stop would lead there."""
+        (low, high), place = fence, facts.position[axis, cycle]
+        if facts.low[axis, cycle] < high - ROUNDING and facts.high[axis, cycle] > low + ROUNDING:
+            return True
+        goal = self._goal[axis] if self._kind == POSITION else place
+        ahead, behind = goal > low and place <= low + ROUNDING, goal < high and place >= high - ROUNDING
+        return bool(ahead or behind)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from math import inf
 
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.planner.events import KEPT
 from gen_profile.proof.followed import (
     ENABLED,
     EXACT,
@@ -40,9 +42,14 @@ NOTICED = 0.2  # periods, in which the end of a motion is
 USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
+BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
+AS_STATED = 0.02  # share of what errors leave, and of the allowed sway, by which fSwayLeft may be wrong
+UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
 STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
+TOLD = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs tell, too
+PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
 
 
 def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
@@ -93,7 +100,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("distance", np.abs(wrong), max(EXACT, followed.wander))
     if followed.reserve:
         return  # calming goes on as long as it must
-    time, slot = followed.issued["fTimeToGo"], 0.1 * followed.period + 2.0 * followed.cycle
+    time, slot = followed.issued["fTimeToGo"], 2.0 * followed.cycle
     for order in followed.orders:
         moving = np.flatnonzero(~motion.stands[order.begin : order.end])
         if not len(moving):
@@ -144,6 +151,51 @@ def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from never("kept", promise & must_be)
     drifted = np.cumsum(followed.drifts) > 0
     yield from never("lost", (why == 1.0) & ~drifted)
+    for begin, known in followed.live_changes:
+        ends = [*followed.rest_reports, *followed.enabled[1:], followed.cycles]
+        until = min(end for end in ends if end >= begin)
+        if begin and known < until and (motion.guided & ~motion.stands)[begin - 1 : known].all():
+            yield from never("kept", promise[known:until])
+
+
+def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge the events that are kept by the other outputs: each in its cycle, and no others."""
+    issued = followed.issued
+    if "nEvents" not in issued:
+        return
+    found, expected = Counter[tuple[int, int]](), Counter(_told(followed))
+    for cycle in np.flatnonzero(np.diff(issued["nEvents"], prepend=0.0)).tolist():
+        count = int(issued["nEvents"][cycle])
+        for k in range(int(issued["nEvents"][cycle - 1]) if cycle else 0, count):
+            time, code, value = (
+                float(issued[f"aEvent{of}[{k % KEPT}]"][cycle]) for of in ("Time", "Code", "Value")
+            )
+            yield Allowance(
+                "event", cycle, abs(time - (cycle + 1) * followed.cycle), 1e-6 * followed.cycle * cycle
+            )
+            if code in PLANNED:
+                yield Allowance("event", cycle, abs(value - issued["fTimeToGo"][cycle]), EXACT)
+            found[cycle, int(code)] += 1
+    told = Counter({one: times for one, times in found.items() if one[1] in TOLD})
+    for cycle, _ in (told - expected) + (expected - told):
+        yield Allowance("event", cycle, 1.0, 0.0)
+
+
+def _told(followed: Followed) -> Iterator[tuple[int, int]]:
+    """Give cycles and codes of the events that other outputs and the commands tell of."""
+    for name, first, code in (("nErrorId", 0.0, 50), ("nPromise", 4.0, 60), ("bEnabled", 0.0, 0)):
+        values = followed.issued[name]
+        for cycle in np.flatnonzero(np.diff(values, prepend=first)).tolist():
+            if code or not values[cycle]:
+                yield cycle, int(values[cycle]) + code if code else 10
+    done = followed.issued["bDone"]
+    yield from ((cycle, 70) for cycle in np.flatnonzero(np.diff(done, prepend=0.0) > 0.0).tolist())
+    before, target = 20, 0.0
+    for order in followed.orders:
+        code = {POSITION: 21, VELOCITY: 22}.get(order.kind, 20)
+        if code != before or (code == 21 and order.values[0] != target):
+            yield order.begin, code
+        before, target = code, order.values[0] if code == 21 else target
 
 
 def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
@@ -155,7 +207,8 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
             at = order.end
             moving |= bool(motion.velocity[:, at - 1 : at].any())
             moved = followed.moved(order.begin, at) > 0.0
-            may_be[at:] |= moving or moved
+            begun = bool(followed.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
+            may_be[at:] |= moving or moved or begun
             must_be[at:] |= (moving or followed.moved(order.begin, at) > FAR_MOVED) and not followed.reserve
         elif order.kind == QUICK_STOP:
             may_be[at:] |= moving or bool(followed.issued["bBusy"][max(0, at - 1)])
@@ -178,7 +231,10 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
-        begin, own = order.begin, slice(order.begin, order.end)
+        begin = max(
+            0, order.begin - (order.kind == STOP)
+        )  # the ends that an interlock saw as it stopped the axis
+        own = slice(begin, order.end)
         if order.kind == POSITION:
             targets.append(order.values)
         if order.kind not in (STOP, QUICK_STOP):
@@ -187,16 +243,22 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         lowest, highest = (
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
-        if not (followed.reserve and begin in followed.enabled):  # what swings as it is taken over is calmed
+        if not (
+            followed.reserve and order.begin in followed.enabled
+        ):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in followed.limits)
             yield from greatest("ends", leaves, STATED + calms, begin)
+        if order.kind == QUICK_STOP:
+            wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own]
+            margin = max(limits.margin for limits in followed.limits)
+            yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
         takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
         rests = motion.stands[own] & (followed.issued["bBusy"][own] == 0.0)
         for k, limits in enumerate(followed.limits):
             leads = known[k] + limits.velocity * takes  # a stop that is not planned yet may end there
-            yield Allowance("loose", begin, max(up[k, begin], down[k, begin]), leads)
+            yield Allowance("loose", begin, max(up[k, order.begin], down[k, order.begin]), leads)
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
@@ -284,3 +346,22 @@ def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         wrong = np.abs(v - np.where(known, followed.speeds[:, own], v))
         yield from greatest("taken over", wrong[:, :-1], EXACT, order.begin)
         yield from greatest("taken over", wrong[:, -1:] - allowed, EXACT, last)
+
+
+def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
+    unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
+    unknown += [*followed.rest_reports, *np.flatnonzero(followed.drifts)[:1].tolist()]
+    until = min(unknown, default=followed.cycles)
+    ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
+    if followed.modes is None or not ends:
+        return
+    as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
+    limit, stated = followed.sway_limit, followed.issued.get("fSwayLeft")
+    if not followed.modes.damped:
+        worst = int(np.argmax(as_given))
+        yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
+    if stated is not None and not followed.modes.damped:
+        wrong = np.abs(stated[ends] - BETWEEN * at_most) - AS_STATED * at_most
+        worst = int(np.argmax(wrong))
+        yield Allowance("sway left", ends[worst], float(wrong[worst]), AS_STATED * limit)

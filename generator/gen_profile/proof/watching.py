@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gen_profile.motion.profile import Array
 from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import faults
@@ -37,6 +38,7 @@ LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block d
 ADDED_UP = 5.0  # nPromise: errors left more than is allowed
 STATED = 1.05  # sway by what the block states: between the machines that it watches
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
+SURELY = 3  # times that the block needs to see a live parameter change
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
 _STATED = re.compile(r"\bcReaction\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
@@ -123,14 +125,19 @@ class BlockWatch:
         ]
 
     def faults(
-        self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
+        self,
+        given: tuple[float, GivenModes | None],
+        script: Script,
+        expected: Sequence[TimedOrder],
+        block: CalledBlock,
+        run: BlockRun,
     ) -> tuple[str, ...]:
         """Say what is wrong, each in words that end a sentence.
 
         Parameters
         ----------
-        period : float
-            s, of the slowest swing that the block is given.
+        given : (float, GivenModes or None)
+            Slowest period in s, and modes, of the machine that the block is given.
         script : Script
             Of a history.
         expected : sequence of TimedOrder
@@ -139,7 +146,8 @@ class BlockWatch:
         run : BlockRun
             With its trace, and copies of the block before `marks`.
         """
-        followed, reactions = self.followed(period, script, expected, block, run)
+        followed, reactions = self.followed(given[0], script, expected, block, run)
+        followed = attrs.evolve(followed, modes=given[1])
         return (*faults(followed, reactions), *self._understated(run, followed))
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
@@ -180,6 +188,7 @@ class BlockWatch:
             rest_reports=self._rest_reports(script, run.cycles),
             zones=list(self._zones(start_cycles, rows, run.cycles)),
             drifts=self._drifts(script, now),
+            live_changes=list(self._live_changes(script, run.cycles)),
             steps=steps,
             speeds=speeds,
         )
@@ -195,14 +204,15 @@ class BlockWatch:
         return followed, reactions
 
     def _facts(self, issued: Mapping[str, Array]) -> Facts:
-        velocity, acceleration, low, high = (
+        position, velocity, acceleration, low, high = (
             np.stack([issued[axis.of(name)] for axis in self.known.axes])
-            for name in ("fVelocity", "fAcceleration", "fStopLow", "fStopHigh")
+            for name in ("fPosition", "fVelocity", "fAcceleration", "fStopLow", "fStopHigh")
         )
         return Facts(
             done=issued["bDone"] != 0.0,
             stands=~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0),
             errors=issued["nErrorId"],
+            position=position,
             low=low,
             high=high,
         )
@@ -241,6 +251,20 @@ class BlockWatch:
             for begin, end in runs_of(apart):
                 drifts[begin + held // 2 : end] |= end - begin > held // 2
         return drifts
+
+    def _live_changes(self, script: Script, cycles: int) -> Iterator[tuple[int, int]]:
+        """Give cycles in which a live parameter changes, and from which that is certain."""
+        first, sure = np.asarray(script.start_cycles), SURELY * self.known.held
+        for name, (low, high) in self.known.live.items():
+            if name in self.spec.planner.live_rate or name in self.spec.planner.live_noise:
+                continue
+            value = script.inputs[:, self.inputs.index(f"f{name}")]
+            rows = (np.flatnonzero(np.diff(value) != 0.0) + 1).tolist()
+            ends = [*first[rows[1:]].tolist(), cycles]
+            for row, begin, end in zip(rows, first[rows].tolist(), ends, strict=False):
+                good = low <= value[row] <= high and abs(value[row] - value[0]) > SURELY * STEADY * high
+                if good and value[row - 1] == value[0] and begin + sure < min(end, cycles):
+                    yield begin, begin + sure
 
     def _rest_reports(self, script: Script, cycles: int) -> list[int]:
         """Tell when bLoadAtRest rises; blocks of earlier versions have none."""
