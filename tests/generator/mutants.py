@@ -6,7 +6,7 @@ change the block of one of the machines at least; `--seed` draws others.
 
 ``equivalent_mutants.toml`` lists those that a proof cannot kill, each with the reason why; they are counted
 apart. Of one that survives, it is printed whether any axis moves otherwise in any history, and how much later
-it rests on average. Blocks are compiled by ``cc -O0``, if there is one: that is what takes longest.
+it rests on average. Blocks are compiled by ``cc -Og``, if there is one: that takes longest.
 """
 
 from __future__ import annotations
@@ -326,7 +326,7 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
 
 
 def quick_compiler() -> Compiler:
-    """Find a compiler that does not optimise, as most blocks run for seconds."""
+    """Find a compiler that optimises little, as most blocks run for seconds."""
     if not shutil.which("cc"):
         return compiler.find_compiler()
     os.environ[compiler.ENVIRONMENT_VARIABLE] = "cc"
@@ -334,8 +334,8 @@ def quick_compiler() -> Compiler:
         found = compiler.find_compiler()
     finally:
         del os.environ[compiler.ENVIRONMENT_VARIABLE]
-    command = tuple("-O0" if part == "-O2" else part for part in found.command)
-    return attrs.evolve(found, command=command, identity=f"{found.identity} -O0")
+    command = tuple("-Og" if part == "-O2" else part for part in found.command)
+    return attrs.evolve(found, command=command, identity=f"{found.identity} -Og")
 
 
 _shared: list[Machine] = []  # of a worker, which has them from its parent
