@@ -1,11 +1,12 @@
 """Mutate the planner block's text in many ways, and see whether its proof fails: ``just mutants``.
 
 A mutant changes one place of one part of the text, or one constant. It is killed where a history shows a
-fault that the sound block does not show there, or leaves more sway than is allowed.
+fault that the sound block does not show there, or leaves more sway than is allowed. Drawn are mutants that
+change the block of one of the machines at least; `--seed` draws others.
 
-Left out are mutants of lines that no machine's block has, and those that `EQUIVALENT` names. Of one that
-survives, it is printed whether any axis moves otherwise in any history, and how much later it rests on
-average.
+``equivalent_mutants.toml`` lists those that a proof cannot kill, each with the reason why; they are counted
+apart. Of one that survives, it is printed whether any axis moves otherwise in any history, and how much later
+it rests on average. Blocks are compiled by ``cc -Og``, if there is one: that takes longest.
 """
 
 from __future__ import annotations
@@ -17,19 +18,23 @@ import re
 import shutil
 import sys
 import tempfile
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from hashlib import sha256
+from itertools import chain, zip_longest
+from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 
 import attrs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from planned_machines import GANTRY
+from planned_machines import GANTRY, HOIST
 
 from gen_profile.errors import GenProfileError
-from gen_profile.planner import design
+from gen_profile.planner import design, execution
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
@@ -38,6 +43,8 @@ from gen_profile.proof.verdict import JudgedHistory, kind_of
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.planner import block
+from gen_profile_fmu.building import compiler
+from gen_profile_fmu.building.compiler import Compiler
 
 AT_ONCE = 8  # histories between looks at whether a mutant is killed
 OPPOSITE = {"<": ">=", ">": "<=", "<=": ">", ">=": "<", "=": "<>", "<>": "="}
@@ -48,18 +55,11 @@ NUMBER = re.compile(r"(?<![\w.])(\d+\.\d+(?:E[+-]?\d+)?)")
 AXIS = re.compile(r"\[(n(?:Plan)?Axis)\]")
 CONSTANT = re.compile(r"(?m)^ *(c\w+) : (ARRAY \[[^]]*\] OF )?(LREAL|DINT) := \[?([^;\]]*)\]?;")
 ROUNDING, BEYOND = 1e-5, 1e6  # numbers that are as good half as great again: of rounding, and beyond all
-UNKNOWN = {"interface"}  # parts that hold no statements
-EQUIVALENT = {  # mutants, by part and the line that they make: why a block with it is as good
-    "inputs: aLiveOnce[nIndex] := aLiveOnce[nIndex];": "of the first three values two are alike all the same",
-    "inputs: IF NOT (ABS(aActual[cAxes - 1 - nAxis]) <= 1.0E+9)"
-    " OR NOT (ABS(aActualVelocity[nAxis]) <= 1.0E+9) THEN": "both axes are asked",
-    "programme: IF nKind = cBoundJerk THEN fSteepness := 0.0 - (1.0 / fCurve); END_IF;": "it is symmetric",
-    "programme: fInverseA := 0.5 * (1.0E+30);": "any number will do that is great enough",
-    "programme: fInverseB := 0.5 * (1.0E+30);": "any number will do that is great enough",
-}
+UNKNOWN = {"interface", "costs"}  # declarations; what a step may cost, which other tests count
+LISTED = Path(__file__).with_name("equivalent_mutants.toml")
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, order=True)
 class Mutant:
     """One change of the text.
 
@@ -82,6 +82,11 @@ class Mutant:
     now: str
     before: str
 
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What names it: its part, and the line before and now."""
+        return self.part, self.before.strip(), self.now.strip()
+
     def __str__(self) -> str:
         return f"{self.way:10} {self.part}:{self.line + 1}: {self.before.strip()}  ->  {self.now.strip()}"
 
@@ -92,8 +97,7 @@ def mutants(text: str) -> Iterator[Mutant]:
         if path.stem not in UNKNOWN:
             for number, line in enumerate(_code(path.read_text("ascii"))):
                 for way, now in _changed(line):
-                    if f"{path.stem}: {now.strip()}" not in EQUIVALENT:
-                        yield Mutant(way=way, part=path.stem, line=number, now=now, before=line)
+                    yield Mutant(way=way, part=path.stem, line=number, now=now, before=line)
     for name, _, kind, values in CONSTANT.findall(text):
         for place, value in enumerate(values.split(",")):
             if kind == "LREAL" and float(value):
@@ -180,7 +184,7 @@ def judged(
     spec: Spec, text: str, histories: Histories, drawn: list[History]
 ) -> Iterator[tuple[int, JudgedHistory]]:
     """Judge history by history."""
-    with ClosedLoop(spec, text, histories, workers=os.cpu_count() or 1) as loop:
+    with ClosedLoop(spec, text, histories) as loop:
         for first in range(0, len(drawn), AT_ONCE):
             part = drawn[first : first + AT_ONCE]
             with loop.runs(part) as runs:
@@ -238,33 +242,44 @@ def altered(text: str, mutant: Mutant) -> str:
     return CONSTANT.sub(changed, text)
 
 
-def chosen(machines: list[Machine], count: int, seed: str) -> list[Mutant]:
-    """Choose some that are in a machine's block, each way as often, and all parts."""
-    by_way: dict[str, list[Mutant]] = {}
-    for mutant in mutants(machines[0].text):
-        by_way.setdefault(mutant.way, []).append(mutant)
-    rng = random.Random(seed)
-    for those in by_way.values():
-        rng.shuffle(those)
-    found, ways = list[Mutant](), list(by_way)
-    while len(found) < count and any(by_way.values()):
-        way = ways[len(found) % len(ways)]
-        if by_way[way]:
-            mutant = by_way[way].pop()
-            if any(mutated(one, mutant) != one.text for one in machines):
-                found.append(mutant)
-        else:
-            ways.remove(way)
-    return found
+def listed() -> dict[tuple[str, str, str], str]:
+    """Read why some mutants are equivalent, by their keys."""
+    return {
+        (one["part"], one["before"], now): why["why"]
+        for why in tomllib.loads(LISTED.read_text("utf-8"))["reason"]
+        for one in why["mutants"]
+        for now in one["now"]
+    }
+
+
+def changes(one: Machine, mutant: Mutant) -> bool:
+    """Whether a mutant is in a machine's block."""
+    alone = len(one.constants.axes) == 1 and mutant.way == "axes"
+    return not alone and mutated(one, mutant) != one.text
+
+
+def chosen(machines: list[Machine], count: int, seed: str) -> Iterator[Mutant]:
+    """Choose mutants, each way as often, until as many are not listed; a list that grows moves no other."""
+    by_way: dict[str, list[tuple[str, Mutant]]] = {}
+    for mutant in {mutant for one in machines for mutant in mutants(one.text)}:
+        rank = sha256(f"{seed} {mutant}".encode()).hexdigest()
+        by_way.setdefault(mutant.way, []).append((rank, mutant))
+    known, unlisted = listed(), 0
+    for turn in chain.from_iterable(zip_longest(*(sorted(by_way[way]) for way in sorted(by_way)))):
+        if turn and any(changes(one, turn[1]) for one in machines):
+            yield turn[1]
+            unlisted += turn[1].key not in known
+            if unlisted == count:
+                return
 
 
 def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str | None, str]:
     """Say by which judge, on which machine and in which history it is killed; or what it does otherwise."""
     later, otherwise = [], 0
     for one in machines:
-        text = mutated(one, mutant)
-        if text == one.text:
+        if not changes(one, mutant):
             continue
+        text = mutated(one, mutant)
         try:
             for number, found in judged(one.spec, text, one.histories, one.drawn):
                 sound = one.shown[number]
@@ -280,54 +295,96 @@ def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str | None, str]:
     )
 
 
-MACHINES: Mapping[str, Spec] = {
-    "bay-crane": preset_spec("bay-crane", ["plant.c1=2000.0", "limits.travel=[-2.0, 41.0]"]),  # damped
-    "zones": preset_spec("bay-crane", ["planner.zones=true", "check.uncertain={L1=0.02}"]),
-    "gantry": parse_spec(
-        GANTRY,
+CYCLE = "export.cycle_time=0.01"
+MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the text
+    "zones": parse_spec(GANTRY, [CYCLE, "planner.zones=true", "planner.events=true"]),
+    "hoisted": preset_spec(
+        "bay-crane",
         [
-            "planner.live_rate={L=0.1}",
-            "export.cycle_time=0.004",
-            "limits.axis.x.travel=[-3.0, 37.0]",
-            "limits.axis.y.travel=[-1.0, 12.0]",
-            "limits.axis.y.jerk=1.6",
+            *(CYCLE, "planner.events=true", "planner.live_rate={L1=0.2}"),
+            *("check.uncertain={L1=0.01}", "check.residual_sway=0.02"),
+        ],
+    ),
+    "tight": preset_spec("bay-crane", [CYCLE, "check.residual_sway=0.025"]),
+    "slow": parse_spec(
+        HOIST,
+        [
+            *(CYCLE, "planner.live={hoist=[0.0, 4.0]}", "robustness.uncertain={L0=0.02}"),
+            *("limits.velocity=2.0", "limits.acceleration=0.2", "limits.travel=[0.0, 60.0]"),
+        ],
+    ),
+    "damped": preset_spec("bay-crane", [CYCLE, "plant.c1=200.0"]),
+    "measured": preset_spec(
+        "bay-crane",
+        [
+            *(CYCLE, "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}"),
+            'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}',
+            "planner.disturbance={swing={payload=0.5}, gust={acceleration=0.1, longest=5.0}, settle=12.0}",
         ],
     ),
 }
 
 
+def quick_compiler() -> Compiler:
+    """Find a compiler that optimises little, as most blocks run for seconds."""
+    if not shutil.which("cc"):
+        return compiler.find_compiler()
+    os.environ[compiler.ENVIRONMENT_VARIABLE] = "cc"
+    try:
+        found = compiler.find_compiler()
+    finally:
+        del os.environ[compiler.ENVIRONMENT_VARIABLE]
+    command = tuple("-Og" if part == "-O2" else part for part in found.command)
+    return attrs.evolve(found, command=command, identity=f"{found.identity} -Og")
+
+
+_shared: list[Machine] = []  # of a worker, which has them from its parent
+
+
+def tried(numbered: tuple[int, Mutant]) -> tuple[int, Mutant, str | None, str, float]:
+    """Try one, and time it."""
+    began = perf_counter()
+    return *numbered, *killed(numbered[1], _shared), perf_counter() - began
+
+
 def main() -> None:
     """Run them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--count", type=int, default=100, help="mutants that are not listed")
     parser.add_argument("--seed", default="mutants")
-    parser.add_argument("--histories", type=int, default=96)
-    parser.add_argument("--only", type=int, help="just the one of this number")
+    parser.add_argument("--histories", type=int, default=64)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only", type=int, nargs="*", help="just those of these numbers")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as cache:
         os.environ["GEN_PROFILE_CACHE"] = cache  # compiled mutants are of no use later
+        quick = quick_compiler()
+        execution.find_compiler = lambda: quick
         machines = [machine(name, spec, arguments.histories) for name, spec in MACHINES.items()]
         for one in machines:
-            print(
-                f"{one.name}, sound: {dict(Counter(k for h in one.shown for k in kinds_of(one.spec, h)))}",
-                flush=True,
-            )
-        those = list(enumerate(chosen(machines, arguments.count, arguments.seed)))
-        tally, survivors, ways = Counter[str](), list[str](), Counter[str]()
-        for number, mutant in those if arguments.only is None else [those[arguments.only]]:
-            began = perf_counter()
-            by, but = killed(mutant, machines)
+            sound = Counter(kind for history in one.shown for kind in kinds_of(one.spec, history))
+            print(f"{one.name}, sound: {dict(sound)}", flush=True)
+        report(machines, arguments)
+
+
+def report(machines: list[Machine], arguments: argparse.Namespace) -> None:
+    """Try mutants side by side, and print what became of each, and of all."""
+    known, tally, survivors, ways = listed(), Counter[str](), list[str](), Counter[str]()
+    those = list(enumerate(chosen(machines, arguments.count, arguments.seed)))
+    asked = those if arguments.only is None else [those[number] for number in arguments.only]
+    drawn = [one for one in asked if one[1].key not in known]
+    tally["listed"] = len(asked) - len(drawn)
+    _shared.extend(machines)
+    with get_context("fork").Pool(arguments.workers) as pool:
+        for number, mutant, by, but, took in pool.imap_unordered(tried, drawn):
             tally["survived" if by is None else "killed"] += 1
             if by is None:
                 survivors.append(f"{number}: {mutant} ({but})")
             else:
                 ways[by.partition(": ")[2].partition(";")[0]] += 1
-            print(
-                f"{number}: {mutant}\n    {by or f'SURVIVED, {but}'} ({perf_counter() - began:.1f} s)",
-                flush=True,
-            )
-        print(f"{dict(tally)}; by judge: {dict(ways.most_common())}")
-        print("survivors:", *survivors, sep="\n  ")
+            print(f"{number}: {mutant}\n    {by or f'SURVIVED, {but}'} ({took:.1f} s)", flush=True)
+    print(f"{dict(tally)}; by judge: {dict(ways.most_common())}")
+    print("survivors:", *survivors, sep="\n  ")
 
 
 if __name__ == "__main__":

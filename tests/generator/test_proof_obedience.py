@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import attrs
 import numpy as np
 import pytest
-from generator.mutants import judged, kinds_of
+from generator.mutants import judged, kinds_of, listed, mutants
 from generator.planned_machines import BAY
 
 from gen_profile.planner.design import planner_block
@@ -500,3 +500,15 @@ def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
         list(BlockWatch._understated(None, SimpleNamespace(residual=np.array([0.03]), stands=1), followed))
         == []
     )
+
+
+def test_mutants_that_are_listed_as_equivalent_are_those_of_the_text():
+    assert {*listed()} <= {mutant.key for mutant in mutants("")}
+    assert all(len(why) > 20 for why in listed().values())
+
+
+def test_a_live_parameter_that_changes_on_the_way_ends_the_promise():
+    changed = attrs.evolve(obedient(), live_changes=[(300, 350)])
+    assert kind_of(WORDS["kept"]) in kinds(changed)
+    standing = attrs.evolve(obedient(), live_changes=[(1000, 1050)])  # it is taken over
+    assert kinds(standing) == set()
