@@ -58,7 +58,7 @@ def end_load_is_a_body(plant: Plant) -> bool:
     p, n_u = SimpleNamespace(**plant.nominal()), len(plant.unactuated)
     q_a = list(plant.probe_places())
 
-    def differences(values: Callable[[list[float]], object]) -> Array:
+    def differences(values: Callable[[list[float]], Array]) -> Array:
         ways = [(values(step.tolist()), values((-step).tolist())) for step in NEARBY * np.eye(n_u)]
         return np.array([np.subtract(ahead, behind) / (2.0 * NEARBY) for ahead, behind in ways])
 
