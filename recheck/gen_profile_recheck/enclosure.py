@@ -30,7 +30,7 @@ from gen_profile_recheck.boxes import (
 from gen_profile_recheck.jets import SINGLE, Jet, along, moved
 
 TERMS, FEW_TERMS = 24, 14  # of power series in time: for the defect and sway, and for μ
-MORE, FEWER, FEWEST = 2, 1, 4  # nodes than terms in each parameter, likewise; and at least so many
+MORE, SOME_MORE = 4, 2  # nodes than terms in each parameter, likewise
 ATTEMPTS, WIDER = 12, 2
 INVERSE = 7  # terms of V in each parameter
 MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
@@ -68,7 +68,7 @@ class BoxProof:
         self.box, self.pieces, self.start = box, pieces, start
         self.scales = [ScaleMatrix(box, one) for one in scales]
         self.fine = tuple(count + MORE for count in box.terms)
-        self.coarse = tuple(max(FEWEST, count - FEWER) for count in box.terms)
+        self.coarse = tuple(count + SOME_MORE for count in box.terms)
 
     def require(self, watches: Sequence[SwayClaim]) -> None:
         """Prove the bounds of all sways.

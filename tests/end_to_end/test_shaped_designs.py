@@ -105,3 +105,17 @@ def test_several_axes_make_one_shaped_move():
     times = np.linspace(0.0, motion.duration, 11)
     position = motion(times).position
     assert position[:, 0] == pytest.approx(3.0 * position[:, 1], abs=1e-12)
+
+
+def test_a_move_in_little_more_than_the_delay_is_refused_with_a_duration_that_can_be_driven():
+    """Not with the delay itself, which would leave a jump; the axes need no implausible acceleration."""
+    stated = []
+    for duration in (0.9, 1.2981):
+        spec = preset_spec("slosh-tank", ["solver.method=zvd", f"move.duration={duration}"])
+        with pytest.raises(InfeasibleProblem, match="leaves no time to move; state at least") as caught:
+            plan(spec)
+        stated.append(caught.value.reasons[0].allowed)
+    assert stated[0] == stated[1] > 1.4
+    spec = preset_spec("slosh-tank", ["solver.method=zvd", f"move.duration={stated[0]}"])
+    times = np.linspace(0.0, stated[0], 1001)
+    assert np.abs(plan(spec).command(times).acceleration).max() <= 200.0

@@ -244,7 +244,7 @@ def test_several_parameters_make_one_box_together():
 def test_how_many_processors_there_are_changes_nothing(monkeypatch):
     monkeypatch.setattr(theorem, "BATCH", 1)
     spec, setpoints = planned(
-        "single-pendulum-crane", "robustness.uncertain={L0=0.2}", "export.cycle_time=0.02"
+        "single-pendulum-crane", "robustness.uncertain={L0=0.4}", "export.cycle_time=0.02"
     )
     found = []
     for count in (1, 3):

@@ -54,6 +54,16 @@ def test_every_machine_with_bodies_stands_somewhere_in_a_wind(preset):
     assert all(0.0 < aside < 0.1 for aside in loads.values())
 
 
+@pytest.mark.parametrize("preset", ["bay-crane", "flexible-joint", "mass-spring-chain", "tower-crane"])
+def test_a_wind_may_be_stated_where_the_end_load_is_a_body(preset):
+    assert preset_spec(preset, ["check.wind.force=5"]).check.wind.force == 5.0
+
+
+def test_a_wind_on_what_is_no_body_is_refused():
+    with pytest.raises(SpecError, match=r"check\.wind\.force: .*does not push the surface.*; remove it"):
+        preset_spec("slosh-tank", ["check.wind.force=5"])
+
+
 def test_the_machine_that_is_held_farthest_aside_is_named():
     spec = preset_spec("paper", ["check.wind.force=0.1", "check.uncertain={m2=0.3}"])
     found = in_wind(spec, scenarios(spec))

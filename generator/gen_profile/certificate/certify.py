@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from functools import partial
-from math import prod
+from math import ceil, log2, prod
 
 import attrs
 import numpy as np
@@ -25,8 +25,9 @@ from gen_profile.problem.parameter_box import Box
 from gen_profile.spec.model import Spec
 
 PHASE = 3.0  # rad of the fastest mode that a piece of time covers at most
-TURN = 2.5  # rad by which a mode's phase at the end varies over a box at first
-FEWEST_TERMS, LEAST_TERM = 4, 1e-7  # of series in parameters; what they leave out, relative
+TURN, WIDE_TURN = 2.5, 5.0  # rad by which a mode's phase at the end varies over a box at first
+FEW = 16  # boxes, up to which the first is taken
+FEWEST_TERMS, LEAST_TERM = 4, 1e-5  # of series in parameters; what they leave out, relative
 LEAST_POWER, WIDEST = 1e-6, 0.5  # likewise, where motions change little; how wide a range counts as, relative
 PLACES = 33  # along a range, at which phases are looked at
 CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
@@ -36,7 +37,7 @@ NEAR = 1e-5  # of what is allowed: a smooth motion that is as near to the axes' 
 MOST_NODES = 5 * 10**8  # at which equations are evaluated in all: some twenty minutes
 FRUITLESS = 4  # rounds in a row that bring no bound nearer, after which no more are tried
 FRUITFUL = 0.8  # of what the worst bound was too high by: how far it is to come down in a round
-DEEPEST = 6  # halvings beyond the first boxes, of all ranges in sum
+DEEPEST = 8  # halvings beyond the first boxes, of all ranges in sum
 
 Progress = Callable[[int, int], None]
 
@@ -112,7 +113,7 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
         fruitless, before = 0 if nearer else fruitless + 1, min(before, worst)
         if tried + 2 * len(coarse) > most or fruitless == FRUITLESS:
             break
-        waiting = [part for box in coarse for part in halves(box, _widest(box, spans))]
+        waiting = [part for box in coarse for part in halves(box, int(np.argmax(done[box].tails)))]
         for box in coarse:
             del done[box]
     return _attempt(theorem, done, largest_met)
@@ -126,8 +127,8 @@ def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[Dy
     CertificateError
         There are too many.
     """
-    levels = [_halvings(span) for span in spans]
-    if prod(2**level for level in levels) > most:
+    levels = _halvings(spans)
+    if 3 * 2 ** sum(levels) > most:  # with the halves of each
         raise CertificateError(
             f"The ranges of {', '.join(theorem.ranges.names)} are too wide for a certificate: it takes "
             f"more than {most} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
@@ -141,9 +142,15 @@ def _wanted(largest_met: Array, limits: Array) -> Array:
     return np.where(largest_met < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
 
 
-def _halvings(span: float) -> int:
-    """Tell how often a range is halved at first, over which phases turn so far."""
-    return max(0, int(np.ceil(np.log2(max(span / TURN, 1e-9)))))
+def _halvings(spans: Sequence[float]) -> list[int]:
+    """Tell how often each range is halved at first, over which phases turn so far.
+
+    Of many boxes most are wider, as loads swing little in most of them; the others are halved later.
+    """
+    narrow, wide = (
+        [max(0, ceil(log2(max(span / turn, 1e-9)))) for span in spans] for turn in (TURN, WIDE_TURN)
+    )
+    return narrow if 2 ** sum(narrow) <= FEW else wide
 
 
 def _terms(turn: float, width: float) -> int:
@@ -157,11 +164,12 @@ def _terms(turn: float, width: float) -> int:
 
 @attrs.frozen(kw_only=True, eq=False)
 class _Proof:
-    """Of one box: what it needs, and its bounds in m, or nan."""
+    """Of one box: what it needs, its bounds in m, or nan, and how much each parameter's series leaves out."""
 
-    motions: Motions
+    motions: Motions | None
     scales: Array
     bound: Array
+    tails: Array
 
 
 def _integrated(
@@ -169,7 +177,8 @@ def _integrated(
 ) -> Iterator[tuple[Sequence[DyadicBox], Array, Array]]:
     """Integrate machines of boxes: what a proof is to be of, and made of."""
     for batch in theorem.batches(boxes):
-        yield batch, approximation.approximate(theorem, batch), approximation.scales(theorem, batch)
+        motions = [approximation.approximate(theorem, [box]) for box in batch]
+        yield batch, np.concatenate(motions), approximation.scales(theorem, batch)
 
 
 def _prove(
@@ -179,7 +188,12 @@ def _prove(
     batch, coefficients, scales = made
     bounds = theorem.enclosure(batch, coefficients, scales).bounds(targets)
     proofs = [
-        _Proof(motions=Motions.of(motion), scales=scale, bound=bound)
+        _Proof(
+            motions=Motions.of(motion) if np.isfinite(bound).all() else None,
+            scales=scale,
+            bound=bound,
+            tails=_tails(motion, theorem.terms),
+        )
         for motion, scale, bound in zip(coefficients, scales, bounds.sway, strict=True)
     ]
     return batch, proofs, np.nanmax(bounds.largest_met, axis=0, initial=0.0)
@@ -192,7 +206,7 @@ def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array
     return Attempt(
         theorem=theorem,
         boxes=tuple(proved),
-        motions=tuple(proof.motions for proof in proved.values()),
+        motions=tuple(proof.motions for proof in proved.values() if proof.motions is not None),
         scales=np.array([proof.scales for proof in proved.values()]),
         bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(largest_met)),
         largest_met=largest_met,
@@ -200,9 +214,11 @@ def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array
     )
 
 
-def _widest(box: DyadicBox, spans: Sequence[float]) -> int:
-    """Choose the range to halve: over which phases vary most."""
-    return int(np.argmax([span / 2**level for span, (level, _) in zip(spans, box, strict=True)]))
+def _tails(motion: Array, terms: Sequence[int]) -> Array:
+    """Sum up coefficients of the highest two degrees in each parameter, as shares of their coordinate's."""
+    sizes = np.abs(motion).sum(axis=(0, 2))
+    sizes = (sizes / sizes.sum(axis=1, keepdims=True)).reshape(-1, *terms)
+    return np.array([sizes.take([-2, -1], axis=k).sum() for k in range(1, sizes.ndim)])
 
 
 def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[float]]:
@@ -231,7 +247,7 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
     axes = fitted(track, max(0.6 * float(setpoints.resolution.max()), near), longest, watch)
     middles, half = 0.5 * (ranges.upper + ranges.lower), 0.5 * (ranges.upper - ranges.lower)
     widths = np.minimum(half / np.maximum(np.abs(middles), half), WIDEST).tolist()
-    parts = [2 ** _halvings(span) for span in spans]
+    parts = [2**level for level in _halvings(spans)]
     terms = tuple(_terms(span / n, width / n) for span, width, n in zip(spans, widths, parts, strict=True))
     return Theorem(
         spec=spec, axes=axes, ranges=ranges, limits=limits_of(spec), setpoints=setpoints, terms=terms

@@ -22,6 +22,7 @@ from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.certificate.arithmetic import balls, chebyshev
 from gen_profile.certificate.arithmetic.affine import Affine
@@ -41,9 +42,10 @@ from gen_profile.certificate.arithmetic.matrices import (
 from gen_profile.certificate.axes.axis_motion import AxisMotion, Gap, powers, widened
 from gen_profile.certificate.equations import EnclosedEquations
 from gen_profile.certificate.scaling import Scaling
+from gen_profile.certificate.sway_limits import SwayBounds, WatchedSway
 
 TIME_NODES, FEW_TIME_NODES = 16, 8  # for the defect, and for what need not be as close
-MORE_NODES, FEWER_NODES, FEWEST_NODES = 2, 2, 5  # than terms, in each parameter, likewise
+MORE_NODES = 4  # than terms, in each parameter: what interpolation misses is bounded roughly
 ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
 PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
 FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
@@ -78,38 +80,6 @@ class Approximation:
     start: Array
 
 
-@attrs.frozen(kw_only=True)
-class WatchedSway:
-    """A sway whose greatest value is wanted.
-
-    Attributes
-    ----------
-    loads : slice
-        Of the machine's; of several directions the vector's length counts.
-    first : int
-        Piece from which on.
-    """
-
-    loads: slice
-    first: int
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class SwayBounds:
-    """What is proved, or nan.
-
-    Attributes
-    ----------
-    sway : (boxes, watches) array
-        Greatest sway in m.
-    largest_met : (boxes, watches) array
-        Greatest sway in m that the approximation has at some nodes; nothing is proved of it.
-    """
-
-    sway: Array
-    largest_met: Array
-
-
 @attrs.frozen(kw_only=True, eq=False)
 class Enclosure:
     """One batch of boxes.
@@ -142,9 +112,8 @@ class Enclosure:
 
     @property
     def coarse(self) -> tuple[int, ...]:
-        """Nodes where a per cent will do."""
-        terms = self.approximation.series.shape[4:]
-        return FEW_TIME_NODES, *(max(FEWEST_NODES, count - FEWER_NODES) for count in terms)
+        """Nodes where fewer in time will do."""
+        return FEW_TIME_NODES, *(terms + MORE_NODES for terms in self.approximation.series.shape[4:])
 
     def bounds(self, targets: Array) -> SwayBounds:
         """Carry the proof out.
@@ -162,17 +131,37 @@ class Enclosure:
         scaling = self.approximation.scaling
         source = norm(matmul_most(scaling.most, defect))
         size = norm(matmul_most(scaling.most, self._around.most))
-        reach = np.broadcast_to(FIRST_GUESS * size.max(axis=1, keepdims=True), size.shape)
+        most = size.max(axis=1, keepdims=True)
+        reach = WIDER * self._accumulated(self._still.max(axis=-1), source) + FIRST_GUESS * most
+        off = np.full((*size.shape, self.equations.sway.rows), np.nan)
+        waiting = np.flatnonzero((reach <= most).all(axis=1))
         for _ in range(ATTEMPTS):
-            tube = reach[..., None] * norm(scaling.inverse_most) * scaling.slack[..., None]
-            growth, disturbance, slopes, shift = self._tubes(tube * ROUND_UP)
-            error = self._accumulated(growth, source + disturbance)
-            closed = np.asarray((error <= reach).all(axis=1))
-            if (closed | ~np.isfinite(error).all(axis=1)).all():
+            if not waiting.size:
                 break
-            reach = np.where(closed[:, None], reach, WIDER * error)
-        error = np.where(closed[:, None], error, np.nan)
-        return self._sway((slopes * error[..., None] + shift) * ROUND_UP, targets)
+            some = self._of(waiting)
+            s = some.approximation.scaling
+            tube = reach[waiting, :, None] * norm(s.inverse_most) * s.slack[..., None]
+            growth, disturbance, slopes, shift = some._tubes(tube * ROUND_UP, self._still[waiting])
+            error = some._accumulated(growth, source[waiting] + disturbance)
+            closed = (error <= reach[waiting]).all(axis=1)
+            off[waiting[closed]] = ((slopes * error[..., None] + shift) * ROUND_UP)[closed]
+            reach[waiting] = WIDER * error
+            waiting = waiting[~closed & (reach[waiting] <= most[waiting]).all(axis=1)]
+        return self._sway(off, targets)
+
+    def _of(self, rows: NDArray[np.intp]) -> Enclosure:
+        """Take some of the boxes."""
+        a = self.approximation
+        if len(rows) == len(a.series):
+            return self
+        approximation = attrs.evolve(
+            a,
+            lower=a.lower[rows],
+            upper=a.upper[rows],
+            series=a.series[rows],
+            scaling=Scaling(series=a.scaling.series[rows]),
+        )
+        return attrs.evolve(self, approximation=approximation)
 
     # the approximation
 
@@ -303,8 +292,10 @@ class Enclosure:
 
     # the error
 
-    def _tubes(self, tube: Array) -> tuple[Array, Array, Array, Array]:
+    def _tubes(self, tube: Array, still: Array) -> tuple[Array, Array, Array, Array]:
         """Bound what depends on where the true motions are: within a tube around the approximate ones.
+
+        `still` is `_still` of these boxes.
 
         Returns
         -------
@@ -326,7 +317,7 @@ class Enclosure:
             "bpla,pa->bpl", array(eq.sway_by_position(*arguments), shape).most, self.gap.position
         )
         disturbance = self._disturbance(near, shifted)
-        growth = self._growth(near, tube)
+        growth = self._growth(near, tube, still)
         return growth, disturbance, slopes, shift * ROUND_UP
 
     def _state(self, near: Ball) -> tuple[list[Any], ...]:
@@ -414,14 +405,14 @@ class Enclosure:
         )
         return np.asarray(to @ jacobian @ back * ROUND_UP)
 
-    def _growth(self, near: Ball, tube: Array) -> Array:
+    def _growth(self, near: Ball, tube: Array, still: Array) -> Array:
         """Bound the logarithmic norm of S J S⁻¹ within a tube, (boxes, pieces)."""
         scaling = self.approximation.scaling
         jacobian = array(self.equations.jacobian(*self._state(near)), near.shape[:2]).most
         change = self._jacobian_change(near, Ball(0.0 * tube, tube)).most
         transformed, beside = (scaling.most @ one @ scaling.inverse_most for one in (jacobian, change))
         symmetric = 0.5 * (beside + np.swapaxes(beside, -1, -2))
-        rows = self._still + gershgorin(Ball(np.zeros_like(symmetric), symmetric))
+        rows = still + gershgorin(Ball(np.zeros_like(symmetric), symmetric))
         whole = np.sqrt(((transformed + beside) ** 2).sum(axis=(-1, -2)))
         return np.asarray((rows.max(axis=-1) + whole * (2.0 * scaling.slip + 1e-12)) * ROUND_UP)
 

@@ -119,7 +119,7 @@ class Enclosed:
                 f"The equations of {what} use {', '.join(unknown)}, for which no proof is written; "
                 "a certificate needs equations of smooth functions (sin, cos, exp, sqrt, tanh and alike)."
             )
-        self._rows, self._columns = function.shape
+        self.rows, self._columns = function.shape
 
     def __call__(self, *inputs: Sequence[AffineOperand]) -> list[list[Ball]]:
         """Evaluate on columns of balls, or of what knows its parameters; the result is nested rows."""
@@ -153,7 +153,7 @@ class Enclosed:
                 angle = arguments[0] if step.operation == "SINH" else None
             memory[step.results[0]], angles[step.results[0]] = value, angle
         entries = [one if isinstance(one, Ball) else one.ball for _, one in sorted(results.items())]
-        return [entries[row :: self._rows] for row in range(self._rows)]
+        return [entries[row :: self.rows] for row in range(self.rows)]
 
 
 @attrs.frozen(kw_only=True, eq=False)

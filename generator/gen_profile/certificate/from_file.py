@@ -19,9 +19,8 @@ from gen_profile.certificate.axes.setpoint_limits import Asked, asked_of_axes
 from gen_profile.certificate.boxes import covers
 from gen_profile.certificate.certify import SLACK, Attempt, Progress, attempt
 from gen_profile.certificate.document import Certificate, certificate_path, damaged, encode, parse
-from gen_profile.certificate.enclosure import SwayBounds
 from gen_profile.certificate.in_order import in_order
-from gen_profile.certificate.sway_limits import ProvedSway, limits_of
+from gen_profile.certificate.sway_limits import ProvedSway, SwayBounds, limits_of
 from gen_profile.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import SampledProfile

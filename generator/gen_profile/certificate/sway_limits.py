@@ -1,9 +1,10 @@
-"""Limits of sway, and what is proved of each."""
+"""Limits of sway, where each is watched, and what is proved of it."""
 
 from __future__ import annotations
 
 import attrs
 
+from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.spec.model import Spec
 
@@ -66,3 +67,35 @@ def limits_of(spec: Spec) -> tuple[SwayLimit, ...]:
         return after
     allowed = SWAY_TOLERANCE * spec.limits.sway
     return (*after, SwayLimit(load=spec.machine().end_load_name, allowed=allowed, on_the_way=True))
+
+
+@attrs.frozen(kw_only=True)
+class WatchedSway:
+    """A sway whose greatest value is wanted.
+
+    Attributes
+    ----------
+    loads : slice
+        Of the machine's; of several directions the vector's length counts.
+    first : int
+        Piece from which on.
+    """
+
+    loads: slice
+    first: int
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SwayBounds:
+    """What is proved, or nan.
+
+    Attributes
+    ----------
+    sway : (boxes, watches) array
+        Greatest sway in m.
+    largest_met : (boxes, watches) array
+        Greatest sway in m that the approximation has at some nodes; nothing is proved of it.
+    """
+
+    sway: Array
+    largest_met: Array

@@ -14,10 +14,10 @@ from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.axis_motion import AxisMotion, Gap, gap_between
 from gen_profile.certificate.axes.axis_track import Track, track_of
 from gen_profile.certificate.boxes import DyadicBox, Ranges
-from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure, WatchedSway
+from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure
 from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations
 from gen_profile.certificate.scaling import Scaling
-from gen_profile.certificate.sway_limits import SwayLimit
+from gen_profile.certificate.sway_limits import SwayLimit, WatchedSway
 from gen_profile.errors import CertificateError
 from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.motion.profile import SampledProfile
@@ -29,7 +29,7 @@ T = TypeVar("T")
 SCALE_TERMS = 3  # of S, in each parameter at most
 MOST_TERMS = 32  # of motions, likewise
 SAME_TIME = 1e-9  # relative: periods on computers whose linear algebra rounds otherwise
-BATCH = 400_000  # numbers in an array over all nodes of a batch
+BATCH = 2_000_000  # numbers in an array over all nodes of a batch
 
 
 @attrs.frozen(kw_only=True)

@@ -19,6 +19,7 @@ from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.shaped_move import ShapedMove, shaped_move, too_short
 from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
+from gen_profile.spec.plausibility import FAST
 
 # peaks of a shaped motion fall with the base move's duration, not quite evenly where delayed parts overlap
 SHORTEST = Search(precision=1e-4, close=0.0, stride=math.log(2.0), growth=1.0, downward=True)
@@ -66,6 +67,9 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
                 reasons=[Reason(code=Code.INFEASIBLE, place="move.duration")],
             )
         return shaped.profile(shortest)
+    quickest = shaped.shaper.delay + _plausible_stretch(spec, shaped)
+    if move.duration < quickest:
+        raise shaped.too_short(move.duration, quickest)
     motion = shaped.profile(move.duration)
     if broken := _breaches(spec, motion):
         sentences, reasons = [one.sentence() for one in broken], [one.reason() for one in broken]
@@ -81,12 +85,23 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
 def shortest_duration(spec: Spec, shaped: ShapedMove) -> float | None:
     """Find the shortest duration in s that keeps the limits and ends on a cycle of the controller, if any."""
     delay, in_cycles = shaped.shaper.delay, partial(grid_duration, cycle_time=spec.export.cycle_time)
+    quickest = delay + _plausible_stretch(spec, shaped)
 
     def excess(duration: float) -> float:
-        keeps = duration > in_cycles(delay) and not _breaches(spec, shaped.profile(duration))
+        keeps = duration > in_cycles(quickest) and not _breaches(spec, shaped.profile(duration))
         return -math.inf if keeps else math.inf
 
     return least(excess, 2.0 * delay, SHORTEST, LONGEST * delay, in_cycles)
+
+
+def _plausible_stretch(spec: Spec, shaped: ShapedMove) -> float:
+    """Find the shortest base move in s, of any limits, that asks the axes for nothing implausible."""
+    axes = zip(spec.machine().actuated, spec.move.distance, strict=True)
+    return max(
+        (shaped.base.peak(order) * abs(way) / FAST[axis.unit, kind][0]) ** (1.0 / order)
+        for axis, way in axes
+        for order, kind in ((1, "velocity"), (2, "acceleration"))
+    )
 
 
 def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:

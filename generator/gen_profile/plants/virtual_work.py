@@ -11,7 +11,7 @@ them, and takes energy. Both are examined by differences at some states; no alge
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,6 +47,33 @@ def equation_inconsistencies(plant: Plant) -> Iterator[str]:
         yield "its equations contradict its mechanics: masses, places and springs move otherwise"
     elif gaining:
         yield "its equations gain energy from nothing: the sign of a damping term is wrong"
+
+
+def end_load_is_a_body(plant: Plant) -> bool:
+    """Tell whether a body moves as the sway of the end load says, so that a force in N on it means something.
+
+    To first order about rest, each of its sways must be how far one of the bodies goes in some horizontal
+    direction. A liquid's surface rises as no mass moves.
+    """
+    p, n_u = SimpleNamespace(**plant.nominal()), len(plant.unactuated)
+    q_a = list(plant.probe_places())
+
+    def differences(values: Callable[[list[float]], Array]) -> Array:
+        ways = [(values(step.tolist()), values((-step).tolist())) for step in NEARBY * np.eye(n_u)]
+        return np.array([np.subtract(ahead, behind) / (2.0 * NEARBY) for ahead, behind in ways])
+
+    sways = differences(lambda q: np.array(plant.outputs(q, q_a, p).sway, dtype=np.float64))[
+        :, plant.end_load
+    ]
+    places = differences(lambda q: np.array(plant.mechanics(q, q_a, p).place, dtype=np.float64))
+
+    def is_of(body: int, sway: Array) -> bool:
+        along = places[:, body, :2]
+        direction = np.linalg.lstsq(along, sway, rcond=ROUGH)[0]
+        off = np.linalg.norm(along @ direction - sway)
+        return bool(off <= ROUGH * np.linalg.norm(sway) and abs(np.linalg.norm(direction) - 1.0) <= ROUGH)
+
+    return all(any(is_of(body, sway) for body in range(len(plant.bodies))) for sway in sways.T)
 
 
 def _imbalance(plant: Plant, p: SimpleNamespace, q: Array, dq: Array, ddq_a: Array) -> tuple[Array, Array]:

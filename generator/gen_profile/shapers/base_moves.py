@@ -7,11 +7,14 @@ from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
+from numpy.polynomial import polynomial
 
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.plugins import require_installed
 from gen_profile.spec.model import LimitsSpec
+
+PLACES = 65  # of a segment, at which peaks are looked for
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -28,6 +31,15 @@ class BaseMove:
 
     knots: Array = attrs.field(converter=read_only)
     coefficients: Array = attrs.field(converter=read_only)
+
+    def peak(self, order: int) -> float:
+        """Find the greatest absolute value of a derivative, in units of the distance and of time."""
+        powers = [polynomial.polyder(own, order) for own in self.coefficients]
+        lengths, places = np.diff(self.knots), np.linspace(0.0, 1.0, PLACES)
+        return max(
+            float(np.abs(polynomial.polyval(places * length, own)).max())
+            for own, length in zip(powers, lengths, strict=True)
+        )
 
 
 # the lowest polynomials with continuous acceleration, and with continuous jerk

@@ -59,20 +59,24 @@ class ShapedMove:
         delay = self.shaper.delay
         stretch = duration - delay
         if stretch < duration * SHORTEST_BASE:
-            least = float(rounded_up(delay, digits=4))
-            template = (
-                "move.duration: the {name} shaper's delay is {delay:.4g} s for this machine, so "
-                "{duration:g} s leaves no time to move; state at least {least:g} s, or choose another method."
-            )
-            raise InfeasibleProblem(
-                Phrase(template, name=self.name, delay=delay, duration=duration, least=least),
-                reasons=[too_short(duration, least)],
-            )
+            raise self.too_short(duration, delay)
         knots = _knots(self.shaper, self.base, stretch, duration)
         first, last = np.asarray(self.start, dtype=np.float64), np.asarray(self.target, dtype=np.float64)
         coefficients = _shaped(self.shaper, self.base, stretch, knots)[:, :, None] * (last - first)
         coefficients[:, 0] += first
         return Profile(knots=knots, coefficients=coefficients, target=last, method=self.name)
+
+    def too_short(self, duration: float, least: float) -> InfeasibleProblem:
+        """Say that a duration in s leaves no time to move in, and what the least is."""
+        least = float(rounded_up(least, digits=4))
+        template = (
+            "move.duration: the {name} shaper's delay is {delay:.4g} s for this machine, so "
+            "{duration:g} s leaves no time to move; state at least {least:g} s, or choose another method."
+        )
+        return InfeasibleProblem(
+            Phrase(template, name=self.name, delay=self.shaper.delay, duration=duration, least=least),
+            reasons=[too_short(duration, least)],
+        )
 
 
 def too_short(duration: float, least: float) -> Reason:

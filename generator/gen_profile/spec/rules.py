@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
+from gen_profile.plants.virtual_work import end_load_is_a_body
 from gen_profile.spec.model import RobustnessSpec, Spec
 from gen_profile.spec.structure import place
 from gen_profile.suggestion import suggestion
@@ -177,10 +178,18 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 
 def _wind(spec: Spec, plant: Plant) -> Iterator[Fault]:
-    """Refuse a wind where no energy is known that it works against."""
-    if spec.check.wind.force > 0.0 and not plant.bodies:
+    """Refuse a wind that pushes nothing, or where no energy is known that it works against."""
+    if spec.check.wind.force == 0.0:
+        return
+    if not plant.bodies:
         yield "check.wind.force", "the machine states no bodies (mechanics), so its deflection is not known"
-    if spec.check.wind.force > 0.0 and spec.check.foreign is not None:
+    elif not end_load_is_a_body(plant):
+        problem = Phrase(
+            "wind does not push the {load}, which is no body of the machine; remove it",
+            load=plant.end_load_name,
+        )
+        yield "check.wind.force", problem
+    if spec.check.foreign is not None:
         yield "check.wind.force", "a foreign FMU (check.fmu) has no input for wind; remove one of them"
 
 
