@@ -38,13 +38,16 @@ class BlockRefusedError(DeploymentError):
 
 
 class MailboxLink(Protocol):
-    """A way to the two arrays of a block."""
+    """A way to the three arrays of a block."""
 
     def write(self, request: Array) -> None:
         """Write the whole of ``aRequest``; raises `LinkLostError`, or `DeploymentError` if it is refused."""
 
     def read(self) -> Array:
         """Read the whole of ``aReply``; raises likewise."""
+
+    def state(self) -> Array:
+        """Read the whole of ``aState``, for which nothing is written; raises likewise."""
 
     def reopen(self) -> None:
         """Connect again; raises likewise."""
