@@ -134,7 +134,8 @@ class Judge:
         if state.checksum != self._checksum or state.buffer != first.buffer:
             raise CheckFailed(
                 f"The controller no longer uses {self._name}: it has gone over to its other buffer, with "
-                f"the checksum {state.checksum} and not {self._checksum}. Find out who switched (deployments.json)."
+                f"the checksum {state.checksum} and not {self._checksum}. Find out who switched "
+                "(deployments.json)."
             )
         if state.checked == WRONG:
             raise CheckFailed(
@@ -154,11 +155,11 @@ class Judge:
             at = tuple(np.argwhere(~near)[0])
             raise CheckFailed(
                 f"The {QUANTITIES[at[0]]} of {self._axes[at[1]]} is {float(found[at])!r} in cycle "
-                f"{state.place:.10g} of the motion, and {float(due[at])!r} by {self._name}: these are not the "
-                "setpoints that were proved."
+                f"{state.place:.10g} of the motion, and {float(due[at])!r} by {self._name}: these are not "
+                "the setpoints that were proved."
             )
         self.seen.moving += follows
-        self.seen.exact += follows and bool((found.view(np.uint64) == due.view(np.uint64)).all())
+        self.seen.exact += follows and bool((found == due).all())  # which for numbers are bits, zero apart
 
     def _due(self, state: BlockState) -> Array:
         """Give the setpoints of a state, not a number where any is right, shape (3, axes)."""
@@ -211,8 +212,9 @@ class Judge:
         if abs(seen.cycles * cycle_time - seen.seconds) > STANDSTILL + CLOCKS_DIFFER * seen.seconds:
             mean = 1e3 * seen.seconds / max(1, seen.cycles)
             raise CheckFailed(
-                f"The block is called every {mean:.3g} ms on average, and its table is for {1e3 * cycle_time:g} "
-                "ms: motions take another time than was proved. Call it in a task of that cycle."
+                f"The block is called every {mean:.3g} ms on average, and its table is for "
+                f"{1e3 * cycle_time:g} ms: motions take another time than was proved. Call it in a task "
+                "of that cycle."
             )
 
     def _events(self, before: BlockState, state: BlockState) -> str:
@@ -241,21 +243,14 @@ def _phase_words(state: BlockState) -> str:
 Report = Callable[[BlockState, float, str], None]
 
 
-@attrs.frozen(kw_only=True)
-class Clock:
-    """Time, and how to let it pass."""
-
-    now: Callable[[], float] = time.monotonic
-    pause: Callable[[float], None] = time.sleep
-
-
 def watch(
     table: BlockTable,
     link: MailboxLink,
     report: Report = lambda *_: None,
     *,
     seconds: float | None = None,
-    clock: Clock | None = None,
+    now: Callable[[], float] = time.monotonic,
+    pause: Callable[[float], None] = time.sleep,
 ) -> Watched:
     """Read a block's state over and over, until something is not as proved, or until Ctrl-C.
 
@@ -269,7 +264,8 @@ def watch(
         Is given each state, when it was read in s since the first look, and what happened.
     seconds : float, optional
         To watch for.
-    clock : Clock, optional
+    now, pause : callable
+        Give the time in s, and let so much of it pass.
 
     Returns
     -------
@@ -277,7 +273,7 @@ def watch(
         With what is not as proved as its `fault`.
     """
     judge = Judge(table)
-    course = _Course(table, link, judge, clock or Clock(), report)
+    course = _Course(table, link, judge, (now, pause), report)
     try:
         with interrupts_collected() as came:
             while not came and (seconds is None or course.elapsed() < seconds):
@@ -297,16 +293,21 @@ class _Course:
     """Looks at a block one after the other."""
 
     def __init__(
-        self, table: BlockTable, link: MailboxLink, judge: Judge, clock: Clock, report: Report
+        self,
+        table: BlockTable,
+        link: MailboxLink,
+        judge: Judge,
+        clock: tuple[Callable[[], float], Callable[[float], None]],
+        report: Report,
     ) -> None:
-        self._link, self._judge, self._clock, self._report = link, judge, clock, report
+        self._link, self._judge, (self._now, self._pause), self._report = link, judge, clock, report
         self._axes, self._cycle = table.constant("cAxes"), table.spec.export.cycle_time
-        self._began = self._changed = clock.now()
+        self._began = self._changed = self._now()
         self._calls = -1
 
     def elapsed(self) -> float:
         """Time since the first look, in s."""
-        return self._clock.now() - self._began
+        return self._now() - self._began
 
     def look(self) -> None:
         """Read a state, judge it if it is a new one, and wait until the next one is due."""
@@ -315,7 +316,7 @@ class _Course:
         except LinkLostError as error:
             lost = self._taken_up(error)
             state = self._read()
-        now = self._clock.now()
+        now = self._now()
         if state is not None and state.calls != self._calls:
             self._calls, self._changed = state.calls, now
             events = lost
@@ -331,7 +332,7 @@ class _Course:
                 f"The block is no longer called in the controller, since {now - self._changed:.1f} s: it was "
                 "stopped, or its task. What the axes do now is up to their drives."
             )
-        self._clock.pause(max(self._cycle, LEAST_INTERVAL))
+        self._pause(max(self._cycle, LEAST_INTERVAL))
 
     def _read(self) -> BlockState | None:
         for _ in range(TORN):
@@ -345,15 +346,15 @@ class _Course:
 
     def _taken_up(self, error: LinkLostError) -> str:
         """Connect again, or raise the error."""
-        began = self._clock.now()
+        began = self._now()
         while True:
             try:
-                self._clock.pause(RETRY)
+                self._pause(RETRY)
                 self._link.reopen()
             except LinkLostError:
-                if self._clock.now() - began > LOST_FOR:
+                if self._now() - began > LOST_FOR:
                     raise error from None
                 continue
             self._judge.seen.lost += 1
-            self._changed = self._clock.now()
+            self._changed = self._now()
             return f"connection lost for {self._changed - began:.1f} s"

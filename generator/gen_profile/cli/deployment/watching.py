@@ -33,10 +33,12 @@ SUFFIXES = {"position": "", "velocity": "_per_s", "acceleration": "_per_s2"}
 def words(watched: Watched, artefact: Path) -> str:
     """Say what was seen."""
     exact = watched.exact == watched.moving
-    rounding = "" if exact else f", {watched.exact} bit for bit and the others but for their last digits"
+    rounding = " bit for bit" if exact else f", {watched.exact} bit for bit, the others but for last digits"
     parts = [
         f"{artefact} watched for {watched.seconds:.1f} s: {watched.states} of {watched.cycles} cycles read",
-        f"{watched.moving} setpoints of motions are the table's{' bit for bit' if exact else rounding}",
+        f"in {watched.moving} of them a motion's setpoints, all the table's{rounding}"
+        if watched.moving
+        else "no motion in them",
         f"motions begun: {watched.runs}, arrived: {watched.completed}",
     ]
     notes = {
