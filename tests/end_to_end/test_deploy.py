@@ -8,7 +8,7 @@ import re
 import socket
 import threading
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -145,7 +145,7 @@ def test_the_controller_plays_what_was_deployed(files, plc, access):
     assert run_here("deploy", files / "new" / "paper.st", *access).code == 0
     table = read_table(files / "new" / "paper.st")
     own = files / "me.pem"
-    with OpcUaLink(OpcUaAccess(url=plc, certificate=own, fingerprint=access[-1])) as link:
+    with closing(OpcUaLink(OpcUaAccess(url=plc, certificate=own, fingerprint=access[-1]))) as link:
         runner, client = link._runner, link._client
         instance = runner.run(client.nodes.objects.get_child([f"{2}:FB_paper"]))
         execute = runner.run(instance.get_child("2:bExecute"))
@@ -207,7 +207,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
     where, own = ("--to", fresh, "--security", "none"), OpcUaAccess(url=fresh, security="none")
 
     def execute(value):
-        with OpcUaLink(own) as link:
+        with closing(OpcUaLink(own)) as link:
             runner, client = link._runner, link._client
             node = runner.run(client.nodes.objects.get_child(["2:FB_paper", "2:bExecute"]))
             runner.run(node.write_value(value))
@@ -223,7 +223,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
     execute(False)
 
     def rival():
-        with OpcUaLink(own) as link:
+        with closing(OpcUaLink(own)) as link:
             deploy(new, Mailbox(link))
 
     with once_watched(rival):
@@ -346,7 +346,9 @@ def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
 
 def test_broken_connections_are_taken_up(files, plc, access, monkeypatch):
     table = read_table(files / "new" / "paper.st")
-    with OpcUaLink(OpcUaAccess(url=plc, certificate=files / "me.pem", fingerprint=access[-1])) as link:
+    with closing(
+        OpcUaLink(OpcUaAccess(url=plc, certificate=files / "me.pem", fingerprint=access[-1]))
+    ) as link:
         write, cut = link.write, iter([False, True, False, True, True])
 
         def writing(request):

@@ -45,7 +45,7 @@ COLUMNS = {
     "samples": ("cPosition", "cVelocity", "cAcceleration"),
     "counts": ("cPosition", "cVelocity", "cAcceleration"),
 }
-STATE_HEAD = 12  # values of the state ahead of those of each axis
+STATE_HEAD = 13  # values of the state ahead of those of each axis
 AXIS_STATE = ("Position", "Velocity", "Acceleration", "Gain", "Shift")
 RESULTS = ("cAccepted", "cHeld", "cMoves", "cUnfit")
 TRIALS = ("cUntried", "cTried", "cPassed", "cRejected")

@@ -43,6 +43,8 @@ class BlockState:
         Along the path, 1 as planned; and its change, in 1/s.
     position, velocity, acceleration : (axes,) array
         Setpoints, in axis units and s.
+    kind : float
+        What blocks that take each other's tables have in common, as a number.
     gain, shift : (axes,) array
         Of the path's positions, to which the setpoints lead: 1, and 0 in axis units, as planned.
     """
@@ -59,6 +61,7 @@ class BlockState:
     fraction: float
     rate: float
     slope: float
+    kind: float
     position: Array
     velocity: Array
     acceleration: Array

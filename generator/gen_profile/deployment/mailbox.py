@@ -53,6 +53,15 @@ class MailboxLink(Protocol):
         """Connect again; raises likewise."""
 
 
+class ControllerLink(MailboxLink, Protocol):
+    """One that stands, and knows its other end: address, instance and security, for the record."""
+
+    server: dict[str, str]
+
+    def close(self) -> None:
+        """End the connection, if it stands."""
+
+
 def _whole() -> Any:
     """Take a whole number that came as a double."""
     return attrs.field(converter=int)

@@ -72,7 +72,7 @@ class OpcUaAccess:
 
 
 class OpcUaLink:
-    """A connection to one instance of a block; a context.
+    """A connection to one instance of a block.
 
     Parameters
     ----------
@@ -102,14 +102,6 @@ class OpcUaLink:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> OpcUaLink:
-        """Give itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End the connection."""
-        self.close()
 
     def close(self) -> None:
         """End the connection, if it stands."""

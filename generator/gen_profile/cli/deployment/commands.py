@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.deployment.access import MOST_PORT, Access, access_options, password, require_opcua
+from gen_profile.cli.deployment.access import (
+    MOST_BLOCKS,
+    MOST_PORT,
+    Access,
+    access_options,
+    password,
+    require_opcua,
+    require_s7,
+)
 from gen_profile.cli.options import Count, InputFile, OutputFile, PathType, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
@@ -19,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from gen_profile.artefacts.signature import Key
-    from gen_profile.deployment.opcua import OpcUaLink
+    from gen_profile.deployment.mailbox import ControllerLink
     from gen_profile.deployment.table import BlockTable
     from gen_profile.progress import Progress
 
@@ -28,7 +36,16 @@ if TYPE_CHECKING:
     epilog="Example: gen-profile deploy deploy/bay-3.st --to opc.tcp://10.0.0.5:4840 --certificate me.pem"
 )
 @click.argument("artefact", type=PathType())
-@click.option("--to", "url", metavar="URL", required=True, help="Controller, as opc.tcp://HOST:PORT.")
+@click.option(
+    "--to",
+    "url",
+    metavar="URL",
+    required=True,
+    help="Controller, as opc.tcp://HOST:PORT or s7://HOST/RACK/SLOT.",
+)
+@click.option(
+    "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
+)
 @click.option("--instance", default="", metavar="PATH", help="Which block, where the server shows several.")
 @click.option("--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared.")
 @access_options
@@ -108,7 +125,7 @@ def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[
         read_record(artefact.parent)
         require_place(artefact.parent / RECORD)
         tell("connecting")
-        with access.opened() as link:
+        with closing(access.opened(table)) as link:
             done = run(table, Mailbox(link), rollback=rollback, progress=tell)
             return append_record(artefact.parent, done.to_dict(), link.server, by)
 
@@ -126,7 +143,7 @@ def _verify(artefact: Path, access: Access, as_json: bool) -> None:
 
 def _verified(
     artefact: Path, access: Access, stack: ExitStack, tell: Progress
-) -> tuple[BlockTable, OpcUaLink]:
+) -> tuple[BlockTable, ControllerLink]:
     """Connect to a controller that uses the table."""
     from gen_profile.deployment.deploy import verify
     from gen_profile.deployment.mailbox import Mailbox
@@ -135,7 +152,7 @@ def _verified(
     tell("reading the artefact")
     table = read_table(artefact)
     tell("connecting")
-    link = stack.enter_context(access.opened())
+    link = stack.enter_context(closing(access.opened(table)))
     tell("reading the table")
     verify(table, Mailbox(link))
     return table, link
@@ -199,13 +216,34 @@ def _user() -> str:
 )
 @access_options
 @click.option("--no-security", is_flag=True, help="Let any program of this computer in.")
+@click.option(
+    "--db",
+    "data_block",
+    type=Count(1, MOST_BLOCKS),
+    help="Speak S7 in place of OPC UA, with the block's arrays in this data block, and bExecute in M0.0.",
+)
 @output_options
-def plc_sim(
-    artefact: Path, *, port: int, certificate: Path | None, user: str, no_security: bool, as_json: bool
-) -> None:
-    """Simulate a controller that runs a playback block, behind an OPC UA server."""
-    if no_security and (user or certificate is not None):
+def plc_sim(artefact: Path, *, data_block: int | None, as_json: bool, **options: Any) -> None:
+    """Simulate a controller that runs a playback block, behind an OPC UA or S7 server."""
+    given = options["user"] or options["certificate"] is not None
+    if options["no_security"] and given:
         raise SpecError("--no-security: lets everybody in; leave --user and --certificate out.")
+    if data_block is not None and not options["no_security"]:
+        raise SpecError(
+            "--db: S7 has no security; add --no-security, which lets any program of this computer in."
+        )
+    try:
+        if data_block is None:
+            _simulate_opcua(artefact, as_json, **options)
+        else:
+            _simulate_s7(artefact, data_block, options["port"], as_json)
+    except KeyboardInterrupt:
+        click.echo("The simulated controller is switched off.", err=True)
+
+
+def _simulate_opcua(
+    artefact: Path, as_json: bool, *, port: int, certificate: Path | None, user: str, no_security: bool
+) -> None:
     require_opcua()
     import asyncio
 
@@ -218,13 +256,22 @@ def plc_sim(
     with progress() as tell:
         tell("compiling the block")
         controller = SimulatedController(read_table(artefact), options)
+    name = controller.name
+    asyncio.run(controller.serve(lambda address, shown: _show_simulated(name, address, shown, as_json)))
 
-    def ready(address: str, fingerprint: str) -> None:
-        document = {"address": address, "instance": controller.name, "fingerprint": fingerprint}
-        shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
-        print_outcome(document, f"{controller.name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
 
-    try:
-        asyncio.run(controller.serve(ready))
-    except KeyboardInterrupt:
-        click.echo("The simulated controller is switched off.", err=True)
+def _simulate_s7(artefact: Path, data_block: int, port: int, as_json: bool) -> None:
+    require_s7()
+    from gen_profile.deployment.s7_sim import SimulatedS7Controller
+    from gen_profile.deployment.table import read_table
+
+    with progress() as tell:
+        tell("compiling the block")
+        controller = SimulatedS7Controller(read_table(artefact), data_block, port)
+    controller.serve(lambda address: _show_simulated(f"DB{data_block}", address, "", as_json))
+
+
+def _show_simulated(name: str, address: str, fingerprint: str, as_json: bool) -> None:
+    document = {"address": address, "instance": name, "fingerprint": fingerprint}
+    shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
+    print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
