@@ -8,7 +8,7 @@ import re
 import socket
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -19,10 +19,12 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
+from gen_profile.deployment.deploy import deploy
 from gen_profile.deployment.mailbox import Mailbox
 from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
 from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
 from gen_profile.deployment.table import read_table
+from gen_profile.deployment.watch import Judge
 from gen_profile.errors import DeploymentError
 
 SETTINGS = ("export.plc_tables=variables", "export.plc_layout=samples", "export.cycle_time=0.02")
@@ -143,7 +145,7 @@ def test_the_controller_plays_what_was_deployed(files, plc, access):
     assert run_here("deploy", files / "new" / "paper.st", *access).code == 0
     table = read_table(files / "new" / "paper.st")
     own = files / "me.pem"
-    with OpcUaLink(OpcUaAccess(url=plc, certificate=own, fingerprint=access[-1])) as link:
+    with closing(OpcUaLink(OpcUaAccess(url=plc, certificate=own, fingerprint=access[-1]))) as link:
         runner, client = link._runner, link._client
         instance = runner.run(client.nodes.objects.get_child([f"{2}:FB_paper"]))
         execute = runner.run(instance.get_child("2:bExecute"))
@@ -157,6 +159,102 @@ def test_the_controller_plays_what_was_deployed(files, plc, access):
         position = runner.run(instance.get_child("2:fPosition"))
         assert runner.run(position.read_value()) == table.values[table.start.size - 1 + 8 + 4] == 0.25
         runner.run(execute.write_value(False))
+
+
+@pytest.fixture
+def fresh(files):
+    """A controller that was just started, any program let in."""
+    with controller(files, secure=False) as url:
+        yield url
+
+
+def test_what_stands_is_watched(files, fresh, tmp_path):
+    old, log = files / "old" / "paper.st", tmp_path / "log.csv"
+    where = ("--to", fresh, "--security", "none")
+    done = run_here("deploy", old, *where, "--watch", "--for", "0.5", "--log", log, "--json")
+    assert done.code == 0, done.err
+    document = done.document
+    assert (document["action"], document["fault"], document["moving"]) == ("watched", None, 0)
+    assert 2 < document["states"] <= document["cycles"] + 1 < 60
+    head, first, *_ = log.read_text("utf-8").splitlines()
+    assert head.startswith("time_s,call,phase,error,off_nominal,place_cycles,rate,cart_position_m,")
+    assert re.fullmatch(r"0\.\d{3},\d+,idle,0,0,0\.0,0\.0,0\.0,0\.0,0\.0,began 20\S+\+00:00", first)
+    assert len({len(line.split(",")) for line in log.read_text("utf-8").splitlines()}) == 1
+    refused = run_here("deploy", files / "new" / "paper.st", *where, "--watch")
+    assert refused.code == 4 and "does not use" in refused.err
+
+
+@pytest.fixture
+def once_watched(monkeypatch):
+    """Give what does something in another thread once a watch has begun."""
+    begun, take = threading.Event(), Judge.take
+    monkeypatch.setattr(Judge, "take", lambda *arguments: begun.set() or take(*arguments))
+
+    @contextmanager
+    def later(action, *arguments):
+        begun.clear()
+        thread = threading.Thread(target=lambda: begun.wait(30) and action(*arguments))
+        thread.start()
+        yield
+        thread.join()
+
+    return later
+
+
+@pytest.mark.slow
+def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_path, once_watched):
+    old, new, log = files / "old" / "paper.st", read_table(files / "new" / "paper.st"), tmp_path / "log.csv"
+    where, own = ("--to", fresh, "--security", "none"), OpcUaAccess(url=fresh, security="none")
+
+    def execute(value):
+        with closing(OpcUaLink(own)) as link:
+            runner, client = link._runner, link._client
+            node = runner.run(client.nodes.objects.get_child(["2:FB_paper", "2:bExecute"]))
+            runner.run(node.write_value(value))
+
+    with once_watched(execute, True):
+        done = run_here("deploy", old, *where, "--watch", "--for", "5", "--log", log)
+    assert done.code == 0 and "a motion's setpoints, all the table's bit for bit" in done.out, done.err
+    assert "motions begun: 1, arrived: 1." in done.out and "motion 1 begins" in done.err
+    rows = [line.split(",") for line in log.read_text("utf-8").splitlines()]
+    moving = {float(row[5]): float(row[7]) for row in rows if row[2] == "moving"}
+    played = read_table(old).playback().played.position[:, 0]
+    assert len(moving) > 20 and all(played[int(place)] == at for place, at in moving.items())
+    execute(False)
+
+    def rival():
+        with closing(OpcUaLink(own)) as link:
+            deploy(new, Mailbox(link))
+
+    with once_watched(rival):
+        found = run_here("deploy", old, *where, "--watch", "--for", "20", "--json")
+    assert found.code == 4 and "has gone over to its other buffer" in found.document["fault"]
+    assert f"Error: {found.document['fault']}" in found.err
+
+
+@pytest.mark.slow
+def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, once_watched):
+    monkeypatch.setattr("gen_profile.deployment.watch.LOST_FOR", 1.0)
+    ending = ExitStack()
+    url = ending.enter_context(controller(files, secure=False))
+    where = ("--to", url, "--security", "none")
+    with once_watched(ending.close):
+        found = run_here("deploy", files / "old" / "paper.st", *where, "--watch")
+    assert found.code == 6 and "could not be taken up again" in found.err, found.err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--verify", "--watch"), "--watch begins with that"),
+        (("--watch", "--rollback"), "change and record nothing"),
+        (("--for", "3"), "are for --watch"),
+        (("--watch", "--log", "none/log.csv"), "there is no folder none"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(options, words, files, access):
+    found = run_here("deploy", files / "old" / "paper.st", *access, *options)
+    assert found.code == 2 and words in found.err
 
 
 @pytest.mark.parametrize(
@@ -248,7 +346,9 @@ def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
 
 def test_broken_connections_are_taken_up(files, plc, access, monkeypatch):
     table = read_table(files / "new" / "paper.st")
-    with OpcUaLink(OpcUaAccess(url=plc, certificate=files / "me.pem", fingerprint=access[-1])) as link:
+    with closing(
+        OpcUaLink(OpcUaAccess(url=plc, certificate=files / "me.pem", fingerprint=access[-1]))
+    ) as link:
         write, cut = link.write, iter([False, True, False, True, True])
 
         def writing(request):

@@ -2,29 +2,20 @@
 
 import random
 import struct
-from pathlib import Path
 
 import attrs
 import numpy as np
 import pytest
+from simulated_blocks import VARIABLES, DirectLink, box_of, exported, poked
 
 from gen_profile.deployment.deploy import deploy, require_fit, verify
-from gen_profile.deployment.mailbox import IN_USE, RIGHT, LinkLostError, Mailbox
+from gen_profile.deployment.mailbox import IN_USE, RIGHT, LinkLostError
 from gen_profile.deployment.simulated_block import SimulatedBlock
 from gen_profile.deployment.table import BlockTable, read_table
-from gen_profile.designs.design import design
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 from gen_profile.spec.reading import preset_spec
 
 FAULTS = 150
-VARIABLES = ("export.plc_tables=variables", "export.cycle_time=0.02", "move.duration=3.0")
-
-
-def exported(folder, *changes, preset="paper"):
-    """What is written is checked when it is deployed."""
-    spec = preset_spec(preset, [*VARIABLES, *changes])
-    outcome = design(spec, ["plc"], folder, check=False)
-    return Path(folder) / outcome.artefacts[0].path
 
 
 @pytest.fixture(scope="module")
@@ -40,25 +31,6 @@ def tables(tmp_path_factory):
 @pytest.fixture
 def block(tables):
     return fresh(tables)
-
-
-class DirectLink:
-    """A way to a simulated block without any network: every look is a cycle."""
-
-    def __init__(self, block):
-        self.block, self.operations = block, 0
-
-    def write(self, request):
-        self.operations += 1
-        self.block.request(request)
-
-    def read(self):
-        self.operations += 1
-        self.block.run(1)
-        return self.block.reply()
-
-    def reopen(self):
-        self.operations += 1
 
 
 class FaultyLink(DirectLink):
@@ -101,10 +73,6 @@ class FaultyLink(DirectLink):
             raise LinkLostError("connecting")
 
 
-def box_of(link):
-    return Mailbox(link, pause=lambda _: None)
-
-
 def fresh(tables):
     block = SimulatedBlock(tables["old"])
     block.run(60)  # until its checksum is known
@@ -132,15 +100,6 @@ def flip(values, choices):
     (whole,) = struct.unpack("<Q", struct.pack("<d", values[place]))
     values[place] = struct.unpack("<d", struct.pack("<Q", whole ^ 1 << bit))[0]
     return values
-
-
-def poked(block, values, choices):
-    """Flip a bit of a table where the block keeps it, as failing memory does."""
-    memory = block._instance._memory
-    place = memory.raw.rfind(values[-40:].tobytes())
-    if place >= 0:
-        at = place + choices.randrange(40 * 8)
-        memory[at] = memory.raw[at] ^ 1 << choices.randrange(8)
 
 
 def rounded(request):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
-from gen_profile_exporters.playback.buffers import REPLY, REQUEST
+from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE
 
 HEADER = """\
 (*
@@ -101,7 +101,7 @@ STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
 TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
 SETPOINTS = {"fPosition", "fVelocity", "fAcceleration", "nPosition"}  # what goes to them
-MAILBOX = {REQUEST, REPLY}  # reached from outside in the playback block itself
+MAILBOX = {REQUEST, REPLY, STATE}  # reached from outside in the playback block itself
 STATES = {"bBusy", "bDone", "bAborted", "bError", "nErrorId"}  # outputs that depend on the axes, too
 
 

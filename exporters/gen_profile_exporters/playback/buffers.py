@@ -1,8 +1,9 @@
 """The playback block with variables in place of constants: two buffers, of which one is in use.
 
 The block is that of constants (`structured_text`), with a handful of changes that can be undone: what is the
-motion's own stands in an array of LREAL, twice; the statements take it from the buffer in use; and ahead of
-them stand others (``buffers.st``) that answer requests. A buffer holds
+motion's own stands in an array of LREAL, twice; the statements take it from the buffer in use; ahead of
+them stand others (``buffers.st``) that answer requests, and behind them some (``state.st``) that show how the
+block stands. A buffer holds
 
     rows, checks, last segment, last, play on, checksum, slope, slope rate,
     room, inverse, stop jerk, start, target, least scale, mirrors, shifts of each axis,
@@ -33,7 +34,7 @@ INTERFACE = 1  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
 LEAST_CAPACITY, MOST_CAPACITY = 2048, 1 << 17
 PATIENCE = 30.0  # s that a client may be silent before another one may write
-REQUEST, REPLY, TABLE = "aRequest", "aReply", "aTable"
+REQUEST, REPLY, STATE, TABLE = "aRequest", "aReply", "aState", "aTable"
 
 SCALARS = ("Rows", "Checks", "LastSegment", "Last", "PlayOn", "Checksum", "Slope", "SlopeRate")
 PER_AXIS = ("Room", "Inverse", "StopJerk", "Start", "Target", "LeastScale", "Mirrors", "Shifts")
@@ -44,12 +45,14 @@ COLUMNS = {
     "samples": ("cPosition", "cVelocity", "cAcceleration"),
     "counts": ("cPosition", "cVelocity", "cAcceleration"),
 }
+STATE_HEAD = 13  # values of the state ahead of those of each axis
+AXIS_STATE = ("Position", "Velocity", "Acceleration", "Gain", "Shift")
 RESULTS = ("cAccepted", "cHeld", "cMoves", "cUnfit")
 TRIALS = ("cUntried", "cTried", "cPassed", "cRejected")
 VARIABLES = {
-    "LREAL": ("fHolder",),
-    "DINT": ("nBase", "nIdle", "nTable", "nPlace", "nCount", "nResult", "nTrial", "nQuiet"),
-    "BOOL": ("bLoaded", "bAsked", "bSwitch", "bTrial"),
+    "LREAL": ("fHolder", "fCalls"),
+    "DINT": ("nBase", "nIdle", "nTable", "nPlace", "nCount", "nResult", "nTrial", "nQuiet", "nRuns"),
+    "BOOL": ("bLoaded", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
 }
 NOTE = """\
     Its numbers are variables, in two buffers, which gen-profile deploy writes through aRequest and reads
@@ -59,6 +62,7 @@ NOTE = """\
 """
 
 _TEMPLATE = Path(__file__).with_name("buffers.st").read_text("ascii")
+_STATE = Path(__file__).with_name("state.st").read_text("ascii")
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _TAKEN = re.compile(rf"\bt({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(
@@ -121,6 +125,7 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
         *(_taken(one) for one in source.variables if one.name not in columns),
         BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
         BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
+        BlockVariable(section="VAR_OUTPUT", name=STATE, type=f"ARRAY [0..{state_length(axes) - 1}] OF LREAL"),
         BlockVariable(section="VAR", name=TABLE, type=both, initial=initialiser([*texts, *empty])),
         *(
             BlockVariable(section="VAR", name=name, type=kind)
@@ -138,8 +143,13 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
         header=source.header.replace("    nErrorId: 0 none", f"{NOTE}    nErrorId: 0 none"),
         name=source.name,
         variables=variables,
-        body=_prelude(layout, axes) + _from_buffer(source.body, layout),
+        body=_prelude(layout, axes) + _from_buffer(source.body, layout) + _shown_state(axes),
     )
+
+
+def state_length(axes: int) -> int:
+    """Count the values of ``aState``."""
+    return STATE_HEAD + axes * len(AXIS_STATE) + 1
 
 
 def buffer_texts(source: BlockSource) -> list[str]:
@@ -276,7 +286,8 @@ def _constants(source: BlockSource, texts: list[str], layout: str, axes: int) ->
         back.append(BlockVariable(section="VAR CONSTANT", name=name, type=declared, initial=initial))
     names = variable_names(layout, axes)
     back = [one for one in back if one.name in names]
-    body = _to_constants(source.body.removeprefix(_prelude(layout, axes)), layout)
+    body = source.body.removeprefix(_prelude(layout, axes)).removesuffix(_shown_state(axes))
+    body = _to_constants(body, layout)
     return ordered(attrs.evolve(source, variables=tuple(back), body=body), names)
 
 
@@ -312,3 +323,14 @@ def _prelude(layout: str, axes: int) -> str:
     lines += ["FOR nAxis := 1 TO cAxes DO", *own, "END_FOR;"] if axes > 1 else own
     loads = "\n".join(f"    {line}" for line in lines)
     return _TEMPLATE.replace("@columns", str(len(COLUMNS[layout]))).replace("@loads", loads)
+
+
+def _shown_state(axes: int) -> str:
+    step = len(AXIS_STATE)
+    at, index, indent = (f" + {step} * nAxis", "[nAxis]", "    ") if axes > 1 else ("", "", "")
+    first = STATE_HEAD - (step if axes > 1 else 0)
+    lines = [
+        f"{indent}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(AXIS_STATE)
+    ]
+    lines = ["FOR nAxis := 1 TO cAxes DO", *lines, "END_FOR;"] if axes > 1 else lines
+    return _STATE.replace("@axes", "\n".join(lines)).replace("@last", str(state_length(axes) - 1))

@@ -120,6 +120,41 @@ class PlaybackTable:
             jerk=None,
         )
 
+    def between(self, cycle: int, fraction: float) -> Array:
+        """Work out what the block issues between cycles, operation by operation.
+
+        Parameters
+        ----------
+        cycle : int
+            From 0 to before the last one.
+        fraction : float
+            Of the next cycle, from 0 to 1.
+
+        Returns
+        -------
+        (3, axes) array
+            Position, velocity and acceleration along the path, in axis units and s.
+        """
+        if self.first is not None:
+            segment = int(np.searchsorted(self.first, cycle, side="right")) - 1
+            time = (float(cycle - int(self.first[segment])) + fraction) * self.cycle_time
+            return np.array(horner(self.columns[:, segment], np.array(time)))
+        (position, velocity, acceleration), following = self.columns[:, cycle], self.columns[:, cycle + 1]
+        advance, rest = following[0] - position, 1.0 - fraction
+        return np.array(
+            (
+                position
+                + fraction
+                * (
+                    advance
+                    + rest * rest * (velocity * self.cycle_time - advance)
+                    - rest * fraction * (following[1] * self.cycle_time - advance)
+                ),
+                velocity + fraction * (following[1] - velocity),
+                acceleration + fraction * (following[2] - acceleration),
+            )
+        )
+
     def motion(self) -> SampledProfile:
         """Convert what the block issues to SI units."""
         motion = motion_of(self.played, self.axes)

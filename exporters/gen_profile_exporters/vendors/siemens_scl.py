@@ -21,6 +21,7 @@ from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import SIEMENS
 from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
 from gen_profile_exporters.playback.block import layout_of, variable_names
+from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, is_buffered
 from gen_profile_exporters.playback.structured_text import block_text, literal, read_block
 from gen_profile_exporters.setpoints import axis_table
 from gen_profile_exporters.vendors.cam_points import spline_cycles, spline_error
@@ -80,7 +81,10 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
             'take "segments", a longer export.cycle_time, or fewer motions in a library.'
         )
     wrappers = axis_wrappers(source, len(target.axes), SIEMENS)
-    text = "\n".join(map(_scl, (source, *wrappers)))
+    parts = [source, *wrappers]
+    if is_buffered(source):
+        parts = [source, *(_wired(wrapper, source) for wrapper in wrappers)]
+    text = "\n".join([*map(_scl, parts), *([_mailbox(source)] if is_buffered(source) else [])])
     return (File(filename=f"{target.name}.scl", content=text.encode("ascii")),)
 
 
@@ -109,6 +113,40 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     names = variable_names(layout_of(text), len(target.axes))
     plays = {name.lower() for name in names} <= {variable.name.lower() for variable in others + tables}
     return ordered(back, names) if plays else back
+
+
+def mailbox_name(block: str) -> str:
+    """Name the data block of a playback block's arrays."""
+    return block.replace("FB_", "DB_", 1) + "_Mailbox"
+
+
+def _wires(source: BlockSource) -> str:
+    """Lead a block's arrays to the data block, in a call."""
+    name = mailbox_name(source.name)
+    arrows = {REQUEST: ":=", REPLY: "=>", STATE: "=>"}
+    return ",\n    ".join(f'{key} {arrow} "{name}".{key}' for key, arrow in arrows.items())
+
+
+def _wired(wrapper: BlockSource, source: BlockSource) -> BlockSource:
+    """Do so in a wrapper's call of the block."""
+    return attrs.evolve(
+        wrapper, body=wrapper.body.replace("fbMotion(", f"fbMotion(\n    {_wires(source)},", 1)
+    )
+
+
+def _mailbox(source: BlockSource) -> str:
+    """Write the data block with a playback block's three arrays, at addresses that S7 reaches.
+
+    It is not optimised: ``aRequest`` stands at byte 0, ``aReply`` at 2048, ``aState`` at 4096.
+    """
+    arrays = [one for name in (REQUEST, REPLY, STATE) for one in source.variables if one.name == name]
+    lines = "\n".join(f"    {one.name} : {one.type.replace('ARRAY ', 'Array')};" for one in arrays)
+    return (
+        f"(* Of gen-profile deploy by S7, with this block's number as --db. Call {source.name} with\n"
+        f"    {_wires(source)}\n   as {source.name}_Axis does. Permit PUT/GET in the controller. *)\n"
+        f"DATA_BLOCK \"{mailbox_name(source.name)}\"\n{{ S7_Optimized_Access := 'FALSE' }}\nVERSION : 0.1\n"
+        f"NON_RETAIN\nSTRUCT\n{lines}\nEND_STRUCT;\nBEGIN\nEND_DATA_BLOCK\n"
+    )
 
 
 def _scl(source: BlockSource) -> str:

@@ -38,7 +38,7 @@ class BlockRefusedError(DeploymentError):
 
 
 class MailboxLink(Protocol):
-    """A way to the two arrays of a block."""
+    """A way to the three arrays of a block."""
 
     def write(self, request: Array) -> None:
         """Write the whole of ``aRequest``; raises `LinkLostError`, or `DeploymentError` if it is refused."""
@@ -46,8 +46,20 @@ class MailboxLink(Protocol):
     def read(self) -> Array:
         """Read the whole of ``aReply``; raises likewise."""
 
+    def state(self) -> Array:
+        """Read the whole of ``aState``, for which nothing is written; raises likewise."""
+
     def reopen(self) -> None:
         """Connect again; raises likewise."""
+
+
+class ControllerLink(MailboxLink, Protocol):
+    """One that stands, and knows its other end: address, instance and security, for the record."""
+
+    server: dict[str, str]
+
+    def close(self) -> None:
+        """End the connection, if it stands."""
 
 
 def _whole() -> Any:

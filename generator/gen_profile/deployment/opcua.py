@@ -1,4 +1,4 @@
-"""A playback block behind an OPC UA server: found by browsing, reached through its two arrays."""
+"""A playback block behind an OPC UA server: found by browsing, reached through its arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gen_profile.deployment.certificates import fingerprint, own_certificate, re
 from gen_profile.deployment.mailbox import LinkLostError
 from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
-from gen_profile_exporters.playback.buffers import LENGTH, REPLY, REQUEST
+from gen_profile_exporters.playback.buffers import LENGTH, REPLY, REQUEST, STATE
 
 Security = Literal["sign-and-encrypt", "sign", "none"]
 MODES = {"sign-and-encrypt": "SignAndEncrypt", "sign": "Sign", "none": "None_"}
@@ -72,7 +72,7 @@ class OpcUaAccess:
 
 
 class OpcUaLink:
-    """A connection to one instance of a block; a context.
+    """A connection to one instance of a block.
 
     Parameters
     ----------
@@ -89,6 +89,7 @@ class OpcUaLink:
         self._client: Any = None
         self._request: Any = None
         self._reply: Any = None
+        self._state: Any = None
         self.instance = ""
         self.server: dict[str, str] = {}
         try:
@@ -101,14 +102,6 @@ class OpcUaLink:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> OpcUaLink:
-        """Give itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End the connection."""
-        self.close()
 
     def close(self) -> None:
         """End the connection, if it stands."""
@@ -124,6 +117,15 @@ class OpcUaLink:
     def read(self) -> Array:
         """Read the whole reply."""
         return _doubles(self._run(self._reply.read_data_value()), REPLY)
+
+    def state(self) -> Array:
+        """Read the whole of what the block shows of itself."""
+        if self._state is None:
+            raise DeploymentError(
+                f"{self.instance} shows no {STATE}: let the server show it beside {REPLY}, or export the "
+                "block again and load it, if it has none."
+            )
+        return _doubles(self._run(self._state.read_data_value()), STATE)
 
     def reopen(self) -> None:
         """Connect again."""
@@ -148,9 +150,9 @@ class OpcUaLink:
             client.set_user(access.user)
             client.set_password(access.password)
         await client.connect()
-        path, self._request, self._reply = _chosen(
-            [found async for found in _instances(client)], access.instance, access.url
-        )
+        found = [one async for one in _instances(client)]
+        path, nodes = _chosen(found, access.instance, access.url)
+        self._request, self._reply, self._state = nodes
         self.instance = path
         for node, name in ((self._request, REQUEST), (self._reply, REPLY)):
             if (length := len(_doubles(await node.read_data_value(), name))) != LENGTH:
@@ -221,7 +223,7 @@ def _doubles(value: Any, name: str) -> Array:
 
 
 async def _instances(client: Any) -> Any:
-    """Browse for what has both arrays, level by level; give paths and the two nodes."""
+    """Browse for what has both arrays, level by level; give paths, the two nodes, and that of the state."""
     level: list[tuple[str, Any]] = [("", client.nodes.objects)]
     seen: set[Any] = {client.nodes.server.nodeid}
     for _ in range(DEPTH):
@@ -230,7 +232,8 @@ async def _instances(client: Any) -> Any:
             children = await node.get_children_descriptions()
             named = {one.BrowseName.Name: one.NodeId for one in children}
             if REQUEST in named and REPLY in named:
-                yield path, client.get_node(named[REQUEST]), client.get_node(named[REPLY])
+                state = client.get_node(named[STATE]) if STATE in named else None
+                yield path, (client.get_node(named[REQUEST]), client.get_node(named[REPLY]), state)
             for one in children:
                 if one.NodeId not in seen and one.NodeClass != ua.NodeClass.Method:
                     seen.add(one.NodeId)
@@ -239,7 +242,7 @@ async def _instances(client: Any) -> Any:
         level = below if len(seen) < MOST_NODES else []
 
 
-def _chosen(found: list[tuple[str, Any, Any]], instance: str, url: str) -> tuple[str, Any, Any]:
+def _chosen(found: list[tuple[str, Any]], instance: str, url: str) -> tuple[str, Any]:
     fitting = [one for one in found if f"/{one[0]}".endswith(f"/{instance}" if instance else "")]
     if len(fitting) == 1:
         return fitting[0]

@@ -16,12 +16,10 @@ from asyncua import Server, ua
 from asyncua.crypto.permission_rules import User, UserRole
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
-from gen_profile.deployment.simulated_block import SimulatedBlock
+from gen_profile.deployment.simulated_block import LONGEST, LOOPBACK, SimulatedBlock
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 
-LOOPBACK = "127.0.0.1"
-LONGEST = 0.02  # s between two looks at what clients wrote
 NAMESPACE = "urn:gen-profile:plc-sim"
 logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
 

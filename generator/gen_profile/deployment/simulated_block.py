@@ -11,6 +11,8 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.execution import BlockInstance
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST
 
+LOOPBACK = "127.0.0.1"  # of the servers that it runs behind
+LONGEST = 0.02  # s between two looks at what their clients wrote
 GUIDING = ("bBusy", "bDone", "bAborted")  # while one of them is set, the axes follow
 
 

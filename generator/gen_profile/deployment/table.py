@@ -33,6 +33,8 @@ from gen_profile_exporters.playback.buffers import (
     with_buffer,
 )
 from gen_profile_exporters.playback.structured_text import literal
+from gen_profile_exporters.playback.structured_text import read_table as read_playback
+from gen_profile_exporters.playback.table import PlaybackTable
 from gen_profile_exporters.registry import container_of, find_container
 
 
@@ -71,6 +73,10 @@ class BlockTable:
         return self.values[scalars : scalars + axes * len(PER_AXIS)].reshape(axes, -1)[
             :, PER_AXIS.index("Start")
         ]
+
+    def playback(self) -> PlaybackTable:
+        """Give the table as the block plays it."""
+        return read_playback(self.source.text(), target_of(self.spec))
 
     def constant(self, name: str) -> int:
         """Value of one of the block's whole constants."""

@@ -2,53 +2,53 @@
 
 from __future__ import annotations
 
-import os
-import re
-from collections.abc import Callable, Mapping
+from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import Count, InputFile, PathType, output_options
+from gen_profile.cli.deployment.access import (
+    MOST_BLOCKS,
+    MOST_PORT,
+    Access,
+    access_options,
+    password,
+    require_opcua,
+    require_s7,
+)
+from gen_profile.cli.options import Count, InputFile, OutputFile, PathType, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import require_signature, signed_by_option, signing_key
 from gen_profile.errors import SpecError
-from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-_URL = re.compile(r"opc\.tcp://[^\s/@]+:(\d{1,5})(/\S*)?", re.ASCII)
-MOST_PORT = 65535
-PASSWORD = "GEN_PROFILE_PASSWORD"  # of the environment: command lines are seen by all
-
-
-def _access_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for decorate in (
-        click.option(
-            "--user", default="", metavar="NAME", help=f"User there; password in {PASSWORD}, or asked."
-        ),
-        click.option(
-            "--certificate",
-            type=PathType(),
-            metavar="FILE",
-            help="PEM file with the certificate and key of this side; made if it is not there.",
-        ),
-    ):
-        command = decorate(command)
-    return command
+    from gen_profile.artefacts.signature import Key
+    from gen_profile.deployment.mailbox import ControllerLink
+    from gen_profile.deployment.table import BlockTable
+    from gen_profile.progress import Progress
 
 
 @cli.command(
     epilog="Example: gen-profile deploy deploy/bay-3.st --to opc.tcp://10.0.0.5:4840 --certificate me.pem"
 )
 @click.argument("artefact", type=PathType())
-@click.option("--to", "url", metavar="URL", required=True, help="Controller, as opc.tcp://HOST:PORT.")
+@click.option(
+    "--to",
+    "url",
+    metavar="URL",
+    required=True,
+    help="Controller, as opc.tcp://HOST:PORT or s7://HOST/RACK/SLOT.",
+)
+@click.option(
+    "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
+)
 @click.option("--instance", default="", metavar="PATH", help="Which block, where the server shows several.")
 @click.option("--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared.")
-@_access_options
+@access_options
 @click.option(
     "--security",
     type=click.Choice(["sign-and-encrypt", "sign", "none"]),
@@ -56,6 +56,11 @@ def _access_options(command: Callable[..., Any]) -> Callable[..., Any]:
     help="Of the connection; sign-and-encrypt by default.",
 )
 @click.option("--verify", is_flag=True, help="Only tell whether the controller uses this table.")
+@click.option("--watch", is_flag=True, help="Verify, then hold every setpoint to the table until Ctrl-C.")
+@click.option("--for", "seconds", type=click.FloatRange(min=0.1), metavar="SECONDS", help="Watch so long.")
+@click.option(
+    "--log", metavar="CSV", type=OutputFile(), help="Write what is watched, a row for each cycle seen."
+)
 @click.option("--rollback", is_flag=True, help="Go back to this table, which the idle buffer holds.")
 @click.option("--by", default="", metavar="NAME", help="Who deploys, for the record; the user by default.")
 @click.option(
@@ -67,67 +72,117 @@ def _access_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @signed_by_option
 @output_options
 def deploy(
-    artefact: Path, *, url: str, verify: bool, rollback: bool, by: str, key_path: Path | None, **options: Any
+    artefact: Path,
+    *,
+    verify: bool,
+    watch: bool,
+    seconds: float | None,
+    log: Path | None,
+    rollback: bool,
+    by: str,
+    key_path: Path | None,
+    public_path: Path | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """Put a playback block's table into a running controller.
 
     Read back and checked before the controller uses it.
     """
-    as_json, public_path = options.pop("as_json"), options.pop("public_path")
-    if verify and (rollback or key_path is not None or by):
-        raise SpecError("--verify: changes and records nothing; leave --rollback, --by and --sign out.")
-    _require_consistent(url, options)
-    require_installed("OPC UA needs the package asyncua", "opcua", "asyncua", "cryptography")
+    if verify and watch:
+        raise SpecError("--verify: --watch begins with that; leave one of the two out.")
+    if (verify or watch) and (rollback or key_path is not None or by):
+        raise SpecError(
+            "--verify, --watch: change and record nothing; leave --rollback, --by and --sign out."
+        )
+    if not watch and (seconds is not None or log is not None):
+        raise SpecError("--for, --log: are for --watch; add that, or leave them out.")
+    access = Access(**options)
     key = signing_key(key_path)
     require_signature(artefact, public_path)
+    if watch:
+        _watch(artefact, access, seconds, log, as_json)
+    elif verify:
+        _verify(artefact, access, as_json)
+    else:
+        document = _deploy(artefact, access, by or _user(), rollback=rollback)
+        print_outcome(document, _words(artefact, document), as_json)
+        if key is not None:
+            _sign(artefact, document, key)
+
+
+def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[str, Any]:
+    """Have the table used, and record it."""
     from gen_profile.artefacts.writing import require_place
+    from gen_profile.deployment.deploy import deploy as run
     from gen_profile.deployment.mailbox import Mailbox
-    from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
-    from gen_profile.deployment.record import RECORD, append_record, read_record, recorded
+    from gen_profile.deployment.record import RECORD, append_record, read_record
     from gen_profile.deployment.table import read_table
 
-    access = OpcUaAccess(url=url, password=_password(options["user"]), **options)
     with progress() as tell:
         tell("reading the artefact")
         table = read_table(artefact)
-        if not verify:
-            read_record(artefact.parent)
-            require_place(artefact.parent / RECORD)
+        read_record(artefact.parent)
+        require_place(artefact.parent / RECORD)
         tell("connecting")
-        with OpcUaLink(access) as link:
-            if verify:
-                from gen_profile.deployment.deploy import verify as run_verify
+        with closing(access.opened(table)) as link:
+            done = run(table, Mailbox(link), rollback=rollback, progress=tell)
+            return append_record(artefact.parent, done.to_dict(), link.server, by)
 
-                run_verify(table, Mailbox(link))
-                entry = recorded(artefact.parent, table.hashes["table_sha256"], link.server)
-                document = {"action": "verified", "controller": link.server, **table.hashes, "record": entry}
-            else:
-                from gen_profile.deployment.deploy import deploy as run
 
-                done = run(table, Mailbox(link), rollback=rollback, progress=tell)
-                document = append_record(artefact.parent, done.to_dict(), link.server, by or _user())
+def _verify(artefact: Path, access: Access, as_json: bool) -> None:
+    """Tell whether the controller uses the table."""
+    from gen_profile.deployment.record import recorded
+
+    with ExitStack() as stack, progress() as tell:
+        table, link = _verified(artefact, access, stack, tell)
+        entry = recorded(artefact.parent, table.hashes["table_sha256"], link.server)
+        document = {"action": "verified", "controller": link.server, **table.hashes, "record": entry}
     print_outcome(document, _words(artefact, document), as_json)
-    if key is not None:
-        from gen_profile.artefacts.signature import sign_file
-
-        comment = f"deployments of {table.spec.name}, the latest at {document['at']}"
-        click.echo(f"Signed by {key.identity}: {sign_file(artefact.parent / RECORD, comment, key)}", err=True)
 
 
-def _require_consistent(url: str, options: Mapping[str, Any]) -> None:
-    security, own = options["security"], options["certificate"]
-    found = _URL.fullmatch(url)
-    if found is None or int(found[1]) > MOST_PORT:
-        raise SpecError(f"--to {url}: is no address such as opc.tcp://10.0.0.5:4840.")
-    if security == "none" and (own is not None or options["fingerprint"]):
-        raise SpecError("--certificate, --fingerprint: mean nothing with --security none; leave them out.")
-    if security != "none" and own is None:
-        raise SpecError(
-            "--certificate: name the PEM file of this computer's certificate and key (it is made where it is "
-            "not there), or ask for --security none where any client may write to the controller."
-        )
-    if security != "sign-and-encrypt" and options["user"]:
-        raise SpecError(f"--user: its password would not be encrypted with --security {security}.")
+def _verified(
+    artefact: Path, access: Access, stack: ExitStack, tell: Progress
+) -> tuple[BlockTable, ControllerLink]:
+    """Connect to a controller that uses the table."""
+    from gen_profile.deployment.deploy import verify
+    from gen_profile.deployment.mailbox import Mailbox
+    from gen_profile.deployment.table import read_table
+
+    tell("reading the artefact")
+    table = read_table(artefact)
+    tell("connecting")
+    link = stack.enter_context(closing(access.opened(table)))
+    tell("reading the table")
+    verify(table, Mailbox(link))
+    return table, link
+
+
+def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None, as_json: bool) -> None:
+    """Hold what the block issues to the table, and end with what is not as proved."""
+    from gen_profile.cli.deployment.watching import reporting, words
+    from gen_profile.deployment.watch import watch
+
+    with ExitStack() as stack:
+        with progress() as tell:
+            table, link = _verified(artefact, access, stack, tell)
+        if seconds is None:
+            click.echo(f"{link.server['instance']} is watched. Ctrl-C ends it.", err=True)
+        with reporting(table, log) as report:
+            watched = watch(table, link, report, seconds=seconds)
+    document = {"action": "watched", "controller": link.server, **table.hashes, **watched.to_dict()}
+    print_outcome(document, words(watched, artefact), as_json)
+    if watched.fault is not None:
+        click.echo(f"Error: {watched.fault}", err=True)
+        raise SystemExit(watched.fault.exit_code)
+
+
+def _sign(artefact: Path, document: dict[str, Any], key: Key) -> None:
+    from gen_profile.artefacts.signature import sign_file
+    from gen_profile.deployment.record import RECORD
+
+    comment = f"deployments of {artefact.stem}, the latest at {document['at']}"
+    click.echo(f"Signed by {key.identity}: {sign_file(artefact.parent / RECORD, comment, key)}", err=True)
 
 
 def _words(artefact: Path, document: dict[str, Any]) -> str:
@@ -142,13 +197,6 @@ def _words(artefact: Path, document: dict[str, Any]) -> str:
         f"{where}: {artefact} {document['action']}, {document['values']} values read back bit for bit and "
         f"checked, checksum {document['checksum']} (before: {document['checksum_before']})."
     )
-
-
-def _password(user: str) -> str:
-    if not user:
-        return ""
-    given = os.environ.get(PASSWORD)
-    return click.prompt(f"Password of {user}", hide_input=True, err=True) if given is None else given
 
 
 def _user() -> str:
@@ -166,34 +214,64 @@ def _user() -> str:
 @click.option(
     "--port", type=Count(1, MOST_PORT), default=4840, help="Port on the loopback interface; 4840 by default."
 )
-@_access_options
+@access_options
 @click.option("--no-security", is_flag=True, help="Let any program of this computer in.")
+@click.option(
+    "--db",
+    "data_block",
+    type=Count(1, MOST_BLOCKS),
+    help="Speak S7 in place of OPC UA, with the block's arrays in this data block, and bExecute in M0.0.",
+)
 @output_options
-def plc_sim(
-    artefact: Path, *, port: int, certificate: Path | None, user: str, no_security: bool, as_json: bool
-) -> None:
-    """Simulate a controller that runs a playback block, behind an OPC UA server."""
-    if no_security and (user or certificate is not None):
+def plc_sim(artefact: Path, *, data_block: int | None, as_json: bool, **options: Any) -> None:
+    """Simulate a controller that runs a playback block, behind an OPC UA or S7 server."""
+    given = options["user"] or options["certificate"] is not None
+    if options["no_security"] and given:
         raise SpecError("--no-security: lets everybody in; leave --user and --certificate out.")
-    require_installed("OPC UA needs the package asyncua", "opcua", "asyncua", "cryptography")
+    if data_block is not None and not options["no_security"]:
+        raise SpecError(
+            "--db: S7 has no security; add --no-security, which lets any program of this computer in."
+        )
+    try:
+        if data_block is None:
+            _simulate_opcua(artefact, as_json, **options)
+        else:
+            _simulate_s7(artefact, data_block, options["port"], as_json)
+    except KeyboardInterrupt:
+        click.echo("The simulated controller is switched off.", err=True)
+
+
+def _simulate_opcua(
+    artefact: Path, as_json: bool, *, port: int, certificate: Path | None, user: str, no_security: bool
+) -> None:
+    require_opcua()
     import asyncio
 
     from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
     from gen_profile.deployment.table import read_table
 
     options = PlcSimOptions(
-        port=port, secure=not no_security, certificate=certificate, user=user, password=_password(user)
+        port=port, secure=not no_security, certificate=certificate, user=user, password=password(user)
     )
     with progress() as tell:
         tell("compiling the block")
         controller = SimulatedController(read_table(artefact), options)
+    name = controller.name
+    asyncio.run(controller.serve(lambda address, shown: _show_simulated(name, address, shown, as_json)))
 
-    def ready(address: str, fingerprint: str) -> None:
-        document = {"address": address, "instance": controller.name, "fingerprint": fingerprint}
-        shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
-        print_outcome(document, f"{controller.name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
 
-    try:
-        asyncio.run(controller.serve(ready))
-    except KeyboardInterrupt:
-        click.echo("The simulated controller is switched off.", err=True)
+def _simulate_s7(artefact: Path, data_block: int, port: int, as_json: bool) -> None:
+    require_s7()
+    from gen_profile.deployment.s7_sim import SimulatedS7Controller
+    from gen_profile.deployment.table import read_table
+
+    with progress() as tell:
+        tell("compiling the block")
+        controller = SimulatedS7Controller(read_table(artefact), data_block, port)
+    controller.serve(lambda address: _show_simulated(f"DB{data_block}", address, "", as_json))
+
+
+def _show_simulated(name: str, address: str, fingerprint: str, as_json: bool) -> None:
+    document = {"address": address, "instance": name, "fingerprint": fingerprint}
+    shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
+    print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)

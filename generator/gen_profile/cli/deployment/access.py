@@ -1,0 +1,143 @@
+"""How the command line names a controller, and what must be known to reach it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import click
+
+from gen_profile.cli.options import PathType
+from gen_profile.errors import SpecError
+from gen_profile.plugins import require_installed
+
+if TYPE_CHECKING:
+    from gen_profile.deployment.mailbox import ControllerLink
+    from gen_profile.deployment.table import BlockTable
+
+_OPC_UA = re.compile(r"opc\.tcp://[^\s/@]+:(\d{1,5})(/\S*)?", re.ASCII)
+_S7 = re.compile(r"s7://([^\s/@:]+)(?::(\d{1,5}))?/([0-7])/(\d{1,2})", re.ASCII)
+MOST_PORT, MOST_SLOT, MOST_BLOCKS = 65535, 31, 65535
+PASSWORD = "GEN_PROFILE_PASSWORD"  # of the environment: command lines are seen by all
+
+
+def access_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Take a user, and the certificate of this side."""
+    for decorate in (
+        click.option(
+            "--user", default="", metavar="NAME", help=f"User there; password in {PASSWORD}, or asked."
+        ),
+        click.option(
+            "--certificate",
+            type=PathType(),
+            metavar="FILE",
+            help="PEM file with the certificate and key of this side; made if it is not there.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+@attrs.frozen(kw_only=True)
+class Access:
+    """What was asked for of a connection; refused where it does not go together."""
+
+    url: str
+    instance: str
+    fingerprint: str
+    certificate: Path | None
+    user: str
+    security: str
+    data_block: int | None
+
+    def __attrs_post_init__(self) -> None:
+        if self.url.startswith("s7:"):
+            self._require_s7()
+        else:
+            self._require_opcua()
+
+    def opened(self, table: BlockTable) -> ControllerLink:
+        """Connect to a controller that is to hold a table.
+
+        Raises
+        ------
+        DeploymentError
+        """
+        if self.data_block is None:
+            from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
+
+            values = attrs.asdict(self, filter=attrs.filters.exclude("data_block"))
+            return OpcUaLink(OpcUaAccess(**values, password=password(self.user)))
+        from gen_profile.deployment.s7 import TCP_PORT, S7Access, S7Link
+
+        host, port, rack, slot = _matched(_S7, self.url)
+        place = {"port": int(port or TCP_PORT), "rack": int(rack), "slot": int(slot)}
+        return S7Link(S7Access(url=self.url, host=host, block=self.data_block, **place), table)
+
+    def _require_s7(self) -> None:
+        found = _S7.fullmatch(self.url)
+        if found is None or int(found[2] or 1) > MOST_PORT or int(found[4]) > MOST_SLOT:
+            raise SpecError(f"--to {self.url}: is no address such as s7://10.0.0.5/0/1 (rack 0, slot 1).")
+        if self.data_block is None:
+            raise SpecError(
+                "--db: S7 cannot be browsed; name the number of the data block that was exported with the "
+                "block."
+            )
+        if self.security != "none":
+            raise SpecError(
+                "--security: S7 has none, and any client may write to the controller; ask for --security "
+                "none if its network is kept apart, or use OPC UA."
+            )
+        if self.certificate is not None or self.fingerprint or self.user or self.instance:
+            raise SpecError(
+                "--certificate, --fingerprint, --user, --instance: mean nothing with S7; leave them out."
+            )
+        require_s7()
+
+    def _require_opcua(self) -> None:
+        found = _OPC_UA.fullmatch(self.url)
+        if found is None or int(found[1]) > MOST_PORT:
+            raise SpecError(
+                f"--to {self.url}: is no address such as opc.tcp://10.0.0.5:4840 or s7://10.0.0.5/0/1."
+            )
+        if self.data_block is not None:
+            raise SpecError("--db: is for S7; leave it out, since OPC UA finds the block by itself.")
+        if self.security == "none" and (self.certificate is not None or self.fingerprint):
+            raise SpecError(
+                "--certificate, --fingerprint: mean nothing with --security none; leave them out."
+            )
+        if self.security != "none" and self.certificate is None:
+            raise SpecError(
+                "--certificate: name the PEM file of this computer's certificate and key (it is made where "
+                "it is not there), or ask for --security none where any client may write to the controller."
+            )
+        if self.security != "sign-and-encrypt" and self.user:
+            raise SpecError(f"--user: its password would not be encrypted with --security {self.security}.")
+        require_opcua()
+
+
+def _matched(pattern: re.Pattern[str], text: str) -> tuple[str, ...]:
+    found = pattern.fullmatch(text)
+    return () if found is None else found.groups()
+
+
+def require_opcua() -> None:
+    """Refuse to begin without the packages."""
+    require_installed("OPC UA needs the package asyncua", "opcua", "asyncua", "cryptography")
+
+
+def require_s7() -> None:
+    """Refuse to begin without the package."""
+    require_installed("S7 needs the package python-snap7", "s7", "snap7")
+
+
+def password(user: str) -> str:
+    """Take it from the environment, or ask."""
+    if not user:
+        return ""
+    given = os.environ.get(PASSWORD)
+    return click.prompt(f"Password of {user}", hide_input=True, err=True) if given is None else given

@@ -1,0 +1,336 @@
+"""Deployment by S7, to python-snap7's own server with the exported block behind it, and under faults."""
+
+import random
+import threading
+from contextlib import closing, contextmanager
+from functools import partial
+
+import numpy as np
+import pytest
+from command_line import run_here
+from end_to_end.test_deploy import BARE, free_port
+from snap7.error import S7ConnectionError, S7TimeoutError
+from snap7.server import Server
+from snap7.type import SrvArea
+
+from gen_profile.deployment.block_state import read_state
+from gen_profile.deployment.deploy import deploy, verify
+from gen_profile.deployment.mailbox import RIGHT, Mailbox
+from gen_profile.deployment.s7 import S7Access, S7Link
+from gen_profile.deployment.s7_sim import SimulatedS7Controller
+from gen_profile.deployment.table import BlockTable, read_table
+from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+
+NUMBER, FAULTS = 7, 40
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("s7")
+    for name, distance in {"old": 0.3, "new": 0.25, "other": 0.2}.items():
+        words = (*BARE, "--export", "plc", "--export", "siemens-scl", "--set", f"move.distance={distance}")
+        assert run_here(*words, "--out", folder / name).code == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tables(files):
+    return {name: read_table(files / name / "paper.st") for name in ("old", "new", "other")}
+
+
+@contextmanager
+def controller(table):
+    """A simulated one that runs by itself."""
+    simulated, ready, addresses = SimulatedS7Controller(table, NUMBER, free_port()), threading.Event(), []
+
+    def tell(address):
+        addresses.append(address)
+        ready.set()
+
+    thread = threading.Thread(target=simulated.serve, args=(tell,))
+    thread.start()
+    try:
+        assert ready.wait(60)
+        yield simulated, addresses[0]
+    finally:
+        simulated.ended.set()
+        thread.join()
+
+
+@pytest.fixture
+def plc(tables):
+    with controller(tables["old"]) as (simulated, url):
+        yield simulated, ("--to", url, "--db", f"{NUMBER}", "--security", "none")
+
+
+def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
+    old, new = files / "old" / "paper.scl", files / "new" / "paper.scl"
+    simulated, where = plc
+    done = run_here("deploy", new, *where, "--json")
+    assert done.code == 0, done.err
+    at = done.document["controller"]
+    assert (at["instance"], at["security"], at["policy"]) == ("DB7", "none", "None")
+    assert done.document["held_sha256"] == done.document["table_sha256"]
+    assert run_here("deploy", new, *where, "--verify").code == 0
+    assert run_here("deploy", old, *where, "--verify").code == 4
+    assert "rolled back" in run_here("deploy", old, *where, "--rollback").out
+    simulated.memory[0] = 1
+    watched = run_here("deploy", old, *where, "--watch", "--for", "1.5", "--json")
+    assert watched.code == 0, watched.err
+    assert watched.document["moving"] == watched.document["exact"] > 10
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "error"),
+    [
+        ({"--to": "s7://127.0.0.1/8/1"}, 2, "is no address such as s7://"),
+        ({"--to": "s7://127.0.0.1:70000/0/1"}, 2, "is no address such as s7://"),
+        ({"--to": "opc.tcp://127.0.0.1:4840"}, 2, "--db: is for S7"),
+        ({"--db": None}, 2, "S7 cannot be browsed; name the number"),
+        ({"--security": None}, 2, "S7 has none, and any client may write"),
+        ({"--user": "me"}, 2, "mean nothing with S7"),
+        ({"--to": "s7://127.0.0.1:9/0/1"}, 6, "cannot be reached"),
+        ({"--db": "8"}, 6, "The controller refuses DB8"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else None,
+)
+def test_what_is_not_as_it_should_be_is_told_in_a_sentence(words, code, error, files, plc):
+    options = dict(zip(plc[1][::2], plc[1][1::2], strict=True)) | words
+    given = [word for option, value in options.items() if value is not None for word in (option, value)]
+    found = run_here("deploy", files / "old" / "paper.st", *given)
+    assert found.code == code and error in found.err, found.err
+
+
+def test_a_simulated_controller_needs_to_be_asked_for_no_security(files):
+    found = run_here("plc-sim", files / "old" / "paper.st", "--db", "7")
+    assert found.code == 2 and "--db: S7 has no security" in found.err
+
+
+class Bench:
+    """A server whose block is called whenever its reply or state is read."""
+
+    def __init__(self, tables):
+        self.tables = tables
+        self.controller = SimulatedS7Controller(tables["old"], NUMBER, free_port())
+        self.server = Server(log=False)
+        self.server.register_area(SrvArea.DB, NUMBER, self.controller.data)
+        self.server.start_to("127.0.0.1", self.controller._port)
+        self.reset()
+
+    def reset(self):
+        self.controller.data[:] = bytes(len(self.controller.data))
+        self.controller.memory[0] = 0
+        self.controller.block = type(self.controller.block)(self.tables["old"])
+        self.turn(60)
+
+    def turn(self, cycles=1):
+        self.controller.turn(self.server, cycles)
+
+    def link(self, pdu=480):
+        access = {"host": "127.0.0.1", "port": self.controller._port, "rack": 0, "slot": 1, "block": NUMBER}
+        link = BenchLink(S7Access(url="s7://127.0.0.1/0/1", **access), self.tables["new"], self)
+        link._client.pdu_length = pdu
+        return link
+
+    def box(self, link):
+        return Mailbox(link, pause=lambda _: None)
+
+    def used(self):
+        """Tell which table is used in the end, by a connection without faults."""
+        self.controller.memory[0] = 0
+        self.turn(400)
+        for name, table in self.tables.items():
+            with closing(self.link()) as link:
+                try:
+                    verify(table, self.box(link))
+                except CheckFailed:
+                    continue
+                return name
+        return None
+
+
+class BenchLink(S7Link):
+    def __init__(self, access, table, bench):
+        self.bench = bench
+        super().__init__(access, table)
+
+    def read(self):
+        self.bench.turn()
+        return super().read()
+
+
+@pytest.fixture(scope="module")
+def bench(tables):
+    bench = Bench(tables)
+    yield bench
+    bench.server.stop()
+
+
+@pytest.fixture
+def unchecked(tables, monkeypatch):
+    judgement = tables["new"].check(tables["new"].values, lambda *_: None)
+    checked = []
+
+    def note(_self, values, _progress):
+        checked.append(values)
+        return judgement
+
+    monkeypatch.setattr(BlockTable, "check", note)
+    return checked
+
+
+class Faults:
+    """What happens to a connection from one PDU on, for so many of them."""
+
+    def __init__(self, link, at, times, lose="", alter=None, happen=None):
+        self.link, self.span, self.count = link, range(at, at + times), 0
+        self.lose, self.alter, self.happen = lose, alter, happen
+        self.send = link._client._send_receive
+        link._client._send_receive = self
+
+    def __call__(self, request, *rest):
+        self.count += 1
+        due = self.count in self.span
+        if due and self.lose == "before":
+            self.cut()
+        if due and self.happen is not None:
+            happen, self.happen = self.happen, None
+            happen()
+        response = self.send(self.alter(bytearray(request)) if due and self.alter else request, *rest)
+        if due and self.lose == "after":
+            self.cut()
+        return response
+
+    def cut(self):
+        self.link._client.disconnect()
+        raise (S7ConnectionError if self.lose == "before" else S7TimeoutError)("cut")
+
+
+def flipped(choices, request):
+    """Flip a bit of what a PDU writes; PDUs that read carry no values."""
+    if len(request) > 60:
+        request[choices.randrange(40, len(request))] ^= 1 << choices.randrange(8)
+    return request
+
+
+def swapped(request):
+    if len(request) > 100:
+        request[-64:] = request[-60:] + request[-64:-60]
+    return request
+
+
+def drawn(bench, choices):
+    """Draw a fault."""
+
+    def started():
+        bench.controller.memory[0] = 1
+        bench.turn()
+
+    def rival():
+        with closing(bench.link(choices.choice([240, 480]))) as link:
+            try:
+                deploy(bench.tables["other"], bench.box(link))
+            except DeploymentError as error:
+                assert "Another deployment" in str(error) or "altered" in str(error)
+
+    def half_a_rival():
+        """A client that writes the first part of a request, or of values, and dies."""
+        at = choices.choice([0, 0, 220, 445, 1024])
+        size = choices.choice([8, 60, 205, 445])
+        block = bench.controller.data
+        block[at : at + size] = choices.randbytes(size)
+
+    return choices.choice(
+        [
+            {"lose": "before"},
+            {"lose": "after"},
+            {"alter": partial(flipped, choices)},
+            {"alter": swapped},
+            {"happen": started},
+            {"happen": rival},
+            {"happen": half_a_rival},
+            {"happen": half_a_rival},
+        ]
+    )
+
+
+@pytest.mark.slow
+def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(bench, tables, unchecked):
+    choices, ends = random.Random(7), []
+    for number in range(FAULTS):
+        bench.reset()
+        unchecked.clear()
+        fault, times = drawn(bench, choices), choices.choice([1, 1, 1, 2, 5, 40, 1000])
+        with closing(bench.link(choices.choice([240, 480]))) as link:
+            Faults(link, choices.randint(1, 150), times, **fault)
+            try:
+                deploy(tables["new"], bench.box(link))
+                done, error = True, None
+            except (DeploymentError, CheckFailed, ExportError) as raised:
+                done, error = False, str(raised)
+        found, case = bench.used(), (number, fault, times, error)
+        ends.append((done, found))
+        if done:
+            assert found == "new" or "happen" in fault, case
+            assert any(np.array_equal(one, tables["new"].values) for one in unchecked), case
+        else:
+            assert found == "old" or "happen" in fault or (unchecked and "verify which" in error), case
+        assert found is not None, case
+    assert {(True, "new"), (False, "old")} <= set(ends)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lose", ["before", "after"])
+def test_the_connection_may_break_at_every_pdu(lose, bench, tables, unchecked):
+    with closing(bench.link()) as link:
+        count = Faults(link, 0, 0)
+        bench.reset()
+        deploy(tables["new"], bench.box(link))
+    assert count.count > 100
+    for at in range(1, count.count + 1, 17):
+        bench.reset()
+        with closing(bench.link()) as link:
+            Faults(link, at, 1, lose=lose)
+            assert deploy(tables["new"], bench.box(link)).action == "deployed"
+        assert bench.used() == "new"
+
+
+def test_nothing_is_written_to_a_data_block_of_something_else(bench, tables):
+    bench.reset()
+    before = bytes(bench.controller.data)
+    bench.controller.data[4096 + 12 * 8] ^= 1  # the kind of the block
+    foreign = bytes(bench.controller.data)
+    with pytest.raises(DeploymentError, match=r"DB7 of .* is not of a running block that takes paper\.st"):
+        bench.link()
+    assert bytes(bench.controller.data) == foreign != before
+    bench.controller.data[:] = bytes(len(foreign))
+    with pytest.raises(DeploymentError, match="not of a running block"):
+        bench.link()
+    assert not any(bench.controller.data)
+
+
+def test_every_bit_of_a_number_arrives(bench, tables):
+    bench.reset()
+    odd = np.resize([-0.0, 5e-324, np.inf, np.nan, 1 / 3, -1e308], 256)
+    odd[[0, 255]] = [-1.0, -2.0]  # no request
+    with closing(bench.link(240)) as link:
+        link.write(odd)
+        found = link._doubles(0, 256)
+        assert (found.view(np.uint64) == odd.view(np.uint64)).all()
+        assert read_state(link.state(), 1).checked == RIGHT
+
+
+def test_the_exported_data_block_has_the_arrays_where_they_are_looked_for(files):
+    text = (files / "old" / "paper.scl").read_text("ascii")
+    block = text[text.index('DATA_BLOCK "DB_paper_Mailbox"') :]
+    assert "S7_Optimized_Access := 'FALSE'" in block
+    arrays = [line.strip() for line in block.splitlines() if "Array[" in line]
+    assert arrays == [
+        "aRequest : Array[0..255] OF LREAL;",
+        "aReply : Array[0..255] OF LREAL;",
+        "aState : Array[0..18] OF LREAL;",
+    ]
+    call = text[text.index("#fbMotion(") :].split(");")[0]
+    for name, arrow in {"aRequest": ":=", "aReply": "=>", "aState": "=>"}.items():
+        assert f'{name} {arrow} "DB_paper_Mailbox".{name},' in call
+    assert run_here("check", files / "old" / "paper.scl").code == 0
