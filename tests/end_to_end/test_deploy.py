@@ -232,6 +232,13 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
     assert f"Error: {found.document['fault']}" in found.err
 
 
+def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch):
+    monkeypatch.setattr("gen_profile.deployment.opcua.STATE", "aNothing")
+    where = ("--to", fresh, "--security", "none", "--watch")
+    found = run_here("deploy", files / "old" / "paper.st", *where)
+    assert found.code == 6 and "FB_paper shows no aNothing: let the server show it" in found.err
+
+
 @pytest.mark.slow
 def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, once_watched):
     monkeypatch.setattr("gen_profile.deployment.watch.LOST_FOR", 1.0)

@@ -287,7 +287,7 @@ def test_the_connection_may_break_at_every_pdu(lose, bench, tables, unchecked):
         bench.reset()
         deploy(tables["new"], bench.box(link))
     assert count.count > 100
-    for at in range(1, count.count + 1, 17):
+    for at in range(1, count.count + 1, 29):
         bench.reset()
         with closing(bench.link()) as link:
             Faults(link, at, 1, lose=lose)
