@@ -69,10 +69,10 @@ class GivenModes:
             Sum over axes and modes in m: of the machine as given, and of each mode at its worst error.
         """
         poles = self.poles.ravel()
-        begins = [0, *ends[:-1]]
-        wave = _wave(poles * cycle, 1 + max(end - begin for begin, end in zip(begins, ends, strict=True)))
+        starts = [0, *ends[:-1]]
+        wave = _wave(poles * cycle, 1 + max(end - begin for begin, end in zip(starts, ends, strict=True)))
         left, found = np.zeros((len(acceleration), len(poles)), dtype=np.complex128), []
-        for begin, end in zip(begins, ends, strict=True):
+        for begin, end in zip(starts, ends, strict=True):
             passed = acceleration[:, begin + 1 : end + 1][:, ::-1] @ wave[: end - begin].view(np.float64)
             left = left * wave[end - begin] + passed.view(np.complex128)
             found.append(left)

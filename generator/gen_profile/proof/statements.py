@@ -48,7 +48,7 @@ UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as gi
 STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
-TOLD = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs tell, too
+SHOWN = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs show, too
 PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
 
 
@@ -163,7 +163,7 @@ def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     issued = followed.issued
     if "nEvents" not in issued:
         return
-    found, expected = Counter[tuple[int, int]](), Counter(_told(followed))
+    found, expected = Counter[tuple[int, int]](), Counter(_shown(followed))
     for cycle in np.flatnonzero(np.diff(issued["nEvents"], prepend=0.0)).tolist():
         count = int(issued["nEvents"][cycle])
         for k in range(int(issued["nEvents"][cycle - 1]) if cycle else 0, count):
@@ -176,12 +176,12 @@ def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             if code in PLANNED:
                 yield Allowance("event", cycle, abs(value - issued["fTimeToGo"][cycle]), EXACT)
             found[cycle, int(code)] += 1
-    told = Counter({one: times for one, times in found.items() if one[1] in TOLD})
-    for cycle, _ in (told - expected) + (expected - told):
+    judged = Counter({one: times for one, times in found.items() if one[1] in SHOWN})
+    for cycle, _ in (judged - expected) + (expected - judged):
         yield Allowance("event", cycle, 1.0, 0.0)
 
 
-def _told(followed: Followed) -> Iterator[tuple[int, int]]:
+def _shown(followed: Followed) -> Iterator[tuple[int, int]]:
     """Give cycles and codes of the events that other outputs and the commands tell of."""
     for name, first, code in (("nErrorId", 0.0, 50), ("nPromise", 4.0, 60), ("bEnabled", 0.0, 0)):
         values = followed.issued[name]

@@ -1,0 +1,23 @@
+"""What a motion leaves swinging, against a quadrature of its own."""
+
+import numpy as np
+import pytest
+
+from gen_profile.planner.left_swinging import GivenModes
+
+
+def test_what_is_left_swinging_is_an_integral_of_the_velocity():
+    random, poles, cycle, ends = np.random.default_rng(1), np.array([[-0.1 + 1.3j]]), 0.05, [150, 400]
+    acceleration = random.normal(size=(2, 401)) * (np.arange(401) % 50 != 0)
+    fine = np.arange(0, 400 * 200 + 1) / 200
+    modes = GivenModes(poles=poles, gains=np.array([[1.0], [2.0]]), damped=True)
+    as_given, at_most = modes.left(acceleration, ends, cycle)
+    for end, found in zip(ends, as_given, strict=True):
+        time, expected = fine[: end * 200 + 1], 0.0
+        for gain, knots in zip((1.0, 2.0), acceleration, strict=True):
+            rate = np.interp(time, np.arange(401), knots)
+            # of a velocity that goes on, what an oscillator at rest in it does not do
+            swing = np.trapezoid(rate * np.exp(poles * cycle * (end - time)), time * cycle) / poles
+            expected += gain * abs(swing.item())
+        assert found == pytest.approx(expected, rel=1e-5)
+    assert at_most == pytest.approx(as_given)
