@@ -216,4 +216,4 @@ def test_where_counts_are_too_coarse_for_a_bound_that_is_said(tmp_path):
     proof = gp.certify_artefact(written.folder / written.artefacts[0].path)
     assert proof.fraction < 1.0
     assert "rounded to counts that are too coarse" in proof.reasons()[0]
-    assert "axis.counts_per_metre" in proof.reasons()[0]
+    assert "axis.counts_per_metre" in proof.reasons()[0] and "export.cycle_time" in proof.reasons()[0]

@@ -95,7 +95,12 @@ class Certificate(Summarised):
     def reasons(self) -> tuple[str, ...]:
         """Say what is not proved, a sentence each."""
         if self.fraction < 1.0:
-            coarse = ", or count positions more finely (axis.counts_per_metre)" if self.rounded else ""
+            coarse = (
+                ", or count positions more finely (axis.counts_per_metre), or issue them in a longer cycle "
+                "(export.cycle_time)"
+                if self.rounded
+                else ""
+            )
             others = "swing too far, or differ too much"
             if self.rounded:
                 others += ", or positions are rounded to counts that are too coarse for a bound"

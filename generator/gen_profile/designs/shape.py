@@ -97,11 +97,12 @@ def shortest_duration(spec: Spec, shaped: ShapedMove) -> float | None:
 def _plausible_stretch(spec: Spec, shaped: ShapedMove) -> float:
     """Find the shortest base move in s, of any limits, that asks the axes for nothing implausible."""
     axes = zip(spec.machine().actuated, spec.move.distance, strict=True)
-    return max(
+    stretches = (
         (shaped.base.peak(order) * abs(way) / FAST[axis.unit, kind][0]) ** (1.0 / order)
         for axis, way in axes
         for order, kind in ((1, "velocity"), (2, "acceleration"))
     )
+    return float(max(stretches))
 
 
 def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
