@@ -445,6 +445,7 @@ def _checks(name: str) -> str:
 #define DIFFERENCE(one, other) whole(fb, (int64_t)(one) - (other))
 #define PRODUCT(one, other) whole(fb, (int64_t)(one) * (other))
 #define QUOTIENT(one, other) whole(fb, (int64_t)(one) / (int64_t)nonzero(fb, other))
+#define RATIO(one, other) ((one) / nonzero(fb, other))
 #define ROUNDED(value) rounded(fb, value)
 #define ROOT(value) root(fb, value)
 #define BOTH(one, other) ((one) & (other))
@@ -452,9 +453,7 @@ def _checks(name: str) -> str:
 /* Out of line, since a thousand copies of it take seconds to compile. */
 static __attribute__((noinline, cold)) bool unsound({name} *fb, int32_t fault)
 {{
-    if (fb->fault_ == 0)
-        fb->fault_ = fault;
-    return false;
+    return (fb->fault_ = fb->fault_ ? fb->fault_ : fault) == 0;
 }}
 static inline bool sound({name} *fb, bool holds, int32_t fault)
 {{
@@ -493,13 +492,9 @@ static inline double root({name} *fb, double value)
 #define DIFFERENCE(one, other) ((one) - (other))
 #define PRODUCT(one, other) ((one) * (other))
 #define QUOTIENT(one, other) ((one) / (other))
+#define RATIO(one, other) ((one) / (other))
 #define ROUNDED(value) ((int32_t)nearbyint(value))
 #define ROOT(value) sqrt(value)
 #define BOTH(one, other) ((one) && (other))
 #define EITHER(one, other) ((one) || (other))
-#endif
-#ifdef CHECKED
-#define RATIO(one, other) ((one) / nonzero(fb, other))
-#else
-#define RATIO(one, other) ((one) / (other))
 #endif"""

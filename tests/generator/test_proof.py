@@ -122,7 +122,7 @@ def test_sway_on_the_way_is_told_where_it_is_limited(proof):
 def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypatch):
     begun = []
 
-    def watched(self, history, period):
+    def watched(self, history, period, modes):
         begun.append(history)
         sleep(0.01)
         return GOOD, ()
@@ -229,10 +229,10 @@ def test_a_block_with_altered_constants_fails(spec, text):
     altered = scaled(text, "cModel", 1.1**2, slice(0, row))
     altered = scaled(altered, "cModel", 1.1**4, slice(row, 2 * row))
     proof = prove(spec, scaled(altered, "cVelocity", 1.01), histories=20)
-    sway, velocity, *_ = proof.reasons()
+    sway, *others = proof.reasons()
     assert "sways by" in sway
     assert "are allowed (check.residual_sway)" in sway
-    assert "the velocity is above its limit by" in velocity
+    assert any("the velocity is above its limit by" in one for one in others)
 
 
 @pytest.mark.slow

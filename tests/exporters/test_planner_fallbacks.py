@@ -1,0 +1,61 @@
+"""What a planner block does where no plan is found in time: pulses, which are slower and always there."""
+
+import numpy as np
+import pytest
+from driven_block import CYCLE, Driver
+
+from gen_profile.planner.design import planner_block
+from gen_profile.spec.reading import preset_spec
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def text():
+    return planner_block(preset_spec("bay-crane")).text
+
+
+def last_motion(driver):
+    """Cycles until it ends, and the time that was stated to be left in each of them."""
+    out = driver.parts[-1]
+    cycles = np.flatnonzero(out["fVelocity"])[-1] + 1
+    return cycles, out["fTimeToGo"][:cycles]
+
+
+def test_the_time_to_go_by_pulses_stays_when_a_stop_before_them_cannot_be_planned(text):
+    """It fell by 20 s for one slot, as if the axis came to rest far from its target."""
+    driver = Driver(text, fActPosition=7.039, fL1=5.324894, fm2=1781.942).hold(0.044)
+    driver.hold(45.545, bVelocity=1, fVelocityCommand=1.1, rOverride=0.9774525)
+    driver.hold(45.0, bVelocity=0, bExecute=1, fTarget=9.214942404508728, rOverride=1.0)
+    cycles, stated = last_motion(driver)
+    off = stated - (cycles - np.arange(cycles)) * CYCLE
+    assert np.abs(off[round(3.0 / CYCLE) :]).max() < 4.0
+
+
+def test_a_far_target_is_not_put_off_by_what_changes_of_mind_have_left(text):
+    """A plan that makes up for it took 36 s; pulses add little to it."""
+    late = {"rOverride": 1.0, "fVelocityLimit": 0.6312414434101448, "bStop": 0}
+    changes = [  # s, and what is commanded until then
+        (1.6110779920588576, {"fTarget": 0.0, "rOverride": 0.31238805813635534, "fVelocityLimit": 0.0}),
+        (
+            3.158078421562987,
+            {"fTarget": 19.819994912833945, "rOverride": 1.0, "fVelocityLimit": 0.7463459959705742},
+        ),
+        (4.901992312914609, {"fTarget": 16.43971149936375, "fVelocityLimit": 0.0}),
+        (8.191219783043351, {"fTarget": 50.0}),
+        (8.354364007930203, {"fTarget": 16.43971149936375}),
+        (8.372084920538136, {"fTarget": 5.374800143621514, **late}),
+        (8.389805833146069, {"bStop": 1}),
+        (11.81031891066055, {"fTarget": 5.374800143621514, **late}),
+        (43.20294726069968, {"fTarget": 9.747955815891155, "fVelocityLimit": 0.9662829944619734}),
+        (90.0, {"fTarget": 26.392674259103607, "fVelocityLimit": 0.0}),
+    ]
+    driver = Driver(text, fActPosition=14.025363383213625, fL1=5.874267673779331, fm2=934.6799598612181)
+    start = 0.2826781745336678
+    driver.hold(start)
+    for ends, inputs in changes:
+        driver.hold(CYCLE, bExecute=0, **inputs).hold(ends - start - CYCLE, bExecute=1)
+        start = ends
+    cycles, _ = last_motion(driver)
+    assert cycles * CYCLE < 30.0
+    assert driver.parts[-1]["bDone"][-1]
