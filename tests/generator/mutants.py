@@ -297,7 +297,9 @@ def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str | None, str]:
 
 CYCLE = "export.cycle_time=0.01"
 MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the text
-    "zones": parse_spec(GANTRY, [CYCLE, "planner.zones=true", "planner.events=true"]),
+    "zones": parse_spec(
+        GANTRY, [CYCLE, "planner.zones=true", "planner.events=true", "check.residual_sway=0.02"]
+    ),
     "hoisted": preset_spec(
         "bay-crane",
         [
@@ -310,6 +312,7 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
         HOIST,
         [
             *(CYCLE, "planner.live={hoist=[0.0, 4.0]}", "robustness.uncertain={L0=0.02}"),
+            "planner.operations=3000",  # pulses are weighed in several cycles
             *("limits.velocity=2.0", "limits.acceleration=0.2", "limits.travel=[0.0, 60.0]"),
         ],
     ),

@@ -41,7 +41,9 @@ from gen_profile.proof.statements import (
     velocities,
 )
 
-BARELY_MORE = 1e-3  # share of the greatest velocity, by which a stick may be exceeded
+MORE = (
+    0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
+)
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 WORDS = {
@@ -252,7 +254,7 @@ def _beyond(followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: 
     """Judge that no axis goes faster than its stick, from a cycle on, but to calm."""
     for k, (wanted, own) in enumerate(zip(order.values, followed.limits, strict=True)):
         if wanted and not followed.reserve:
-            top = abs(wanted) + BARELY_MORE * own.velocity
+            top = abs(wanted) + MORE * own.velocity
             yield from greatest("beyond", motion.velocity[k, begin : order.end] * np.sign(wanted), top, begin)
 
 

@@ -43,9 +43,10 @@ USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
 BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
-AS_STATED = 0.02  # share of what errors leave, and of the allowed sway, by which fSwayLeft may be wrong
+AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
+BESIDE = 1e-4  # of the allowed sway, likewise
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
-STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
+STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
 SHOWN = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs show, too
@@ -364,4 +365,4 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     if stated is not None and not followed.modes.damped:
         wrong = np.abs(stated[ends] - BETWEEN * at_most) - AS_STATED * at_most
         worst = int(np.argmax(wrong))
-        yield Allowance("sway left", ends[worst], float(wrong[worst]), AS_STATED * limit)
+        yield Allowance("sway left", ends[worst], float(wrong[worst]), BESIDE * limit)
