@@ -31,6 +31,7 @@ from gen_profile_recheck.jets import SINGLE, Jet, along, moved
 
 TERMS, FEW_TERMS = 24, 14  # of power series in time: for the defect and sway, and for μ
 MORE, SOME_MORE = 4, 2  # nodes than terms in each parameter, likewise
+MANY_MORE = 4  # beyond these, where that is not enough
 ATTEMPTS, WIDER = 12, 2
 INVERSE = 7  # terms of V in each parameter
 MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
@@ -63,12 +64,17 @@ class BoxProof:
     """The proof for one box: pieces one after another."""
 
     def __init__(
-        self, box: MachineBox, pieces: Sequence[MotionPiece], scales: Sequence[Any], start: Sequence[float]
+        self,
+        box: MachineBox,
+        pieces: Sequence[MotionPiece],
+        scales: Sequence[Any],
+        start: Sequence[float],
+        beyond: int = 0,
     ) -> None:
         self.box, self.pieces, self.start = box, pieces, start
         self.scales = [ScaleMatrix(box, one) for one in scales]
-        self.fine = tuple(count + MORE for count in box.terms)
-        self.coarse = tuple(count + SOME_MORE for count in box.terms)
+        self.fine = tuple(count + MORE + beyond for count in box.terms)
+        self.coarse = tuple(count + SOME_MORE + beyond // 2 for count in box.terms)
 
     def require(self, watches: Sequence[SwayClaim]) -> None:
         """Prove the bounds of all sways.
@@ -126,8 +132,10 @@ class BoxProof:
         reach = ((error + source * time + fed) * 5 / 4 + arb(10) ** -14).abs_upper()
         for _ in range(ATTEMPTS):
             tube = [(reach * row).abs_upper() for row in scale.rows]
-            growth = self._growth(piece, scale, tube)
-            disturbance = Disturbance(piece, tube)
+            try:
+                growth, disturbance = self._growth(piece, scale, tube), Disturbance(piece, tube)
+            except ValueError:  # so wide that a series cannot be divided by
+                break
             added = sum((norm(scale.sizes_of(term)) for term in disturbance.terms), start=arb(0))
             factor = (growth * time).exp()
             most = factor.max(arb(1))
