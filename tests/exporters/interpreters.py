@@ -25,7 +25,8 @@ TOGETHER = 15  # in a function block
 CYCLES = 3
 REFUSED = "refused"
 DOUBLES = ctypes.POINTER(ctypes.c_double)
-NAMES = (*"cwe", "sound", "unsound", "within", "turn", "nonzero", "whole", "rounded", "root")  # of each program
+# of each program
+NAMES = (*"cwe", "sound", "unsound", "within", "turn", "nonzero", "whole", "rounded", "root")
 
 
 def runner(translation):
