@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -57,6 +58,21 @@ def test_an_interruption_leaves_everything_as_it_was(tmp_path, interruption):
         staging.write("one.txt", b"new")
         raise interruption
     assert tree(tmp_path) == {"one.txt": b"old"}
+
+
+def test_an_interruption_between_two_files_waits_for_the_second(tmp_path, monkeypatch):
+    replace = Path.replace
+
+    def interrupted(path, target):
+        signal.raise_signal(signal.SIGINT)
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt), staged(tmp_path) as staging:
+        staging.write("one.txt", b"1")
+        staging.write("two.txt", b"2")
+        staging.deliver()
+    assert tree(tmp_path) == {"one.txt": b"1", "two.txt": b"2"}
 
 
 def test_a_full_disk_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ from typing import Protocol
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import OutputError
+from gen_profile.interrupts import interrupts_collected
 from gen_profile.private_folder import temporary_folder
 
 
@@ -67,9 +68,13 @@ class StagingFolder:
         return read_artefact(path, DOCUMENT) if path.is_file() else None
 
     def deliver(self) -> None:
-        """Move the files to their destination, in the order in which they were written."""
-        for name in self._names:
-            (self._folder / name).replace(self._destination / name)
+        """Move the files to their destination, in the order in which they were written.
+
+        An interruption comes before all of them are moved, or after.
+        """
+        with interrupts_collected():
+            for name in self._names:
+                (self._folder / name).replace(self._destination / name)
 
 
 @contextmanager
