@@ -387,7 +387,7 @@ def _header(name: str, variables: list[StVariable]) -> str:
 typedef struct {{
 {members}
 #ifdef CHECKED
-    int32_t turns_, fault_;
+    int32_t fault_;
 #endif
 }} {name};
 
@@ -417,7 +417,7 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "#else",
             "#define OPERATIONS(number) ((void)0)",
             "#endif",
-            *_checks(name).splitlines(),
+            *_CHECKS.splitlines(),
             "",
             *constants,
             "",
@@ -429,63 +429,62 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             f"static void {name}_step({name} *fb) {{",
             "    BEGIN();",
             *_indented(body),
+            "    END();",
             "}",
             "",
         ]
     )
 
 
-def _checks(name: str) -> str:
-    return f"""\
+_CHECKS = f"""\
 #ifdef CHECKED
-#define BEGIN() (fb->turns_ = 0)
-#define AT(index, length) within(fb, index, length)
-#define TURN() turn(fb)
-#define SUM(one, other) whole(fb, (int64_t)(one) + (other))
-#define DIFFERENCE(one, other) whole(fb, (int64_t)(one) - (other))
-#define PRODUCT(one, other) whole(fb, (int64_t)(one) * (other))
-#define QUOTIENT(one, other) whole(fb, (int64_t)(one) / (int64_t)nonzero(fb, other))
-#define RATIO(one, other) ((one) / nonzero(fb, other))
-#define ROUNDED(value) rounded(fb, value)
-#define ROOT(value) root(fb, value)
+/* Without branches, of which thousands take seconds to compile. */
+#define BEGIN() int32_t turns_ = 0, fault_ = fb->fault_
+#define END() (fb->fault_ = fault_)
+#define AT(index, length) within(&fault_, index, length)
+#define TURN() turn(&fault_, &turns_)
+#define SUM(one, other) whole(&fault_, (int64_t)(one) + (other))
+#define DIFFERENCE(one, other) whole(&fault_, (int64_t)(one) - (other))
+#define PRODUCT(one, other) whole(&fault_, (int64_t)(one) * (other))
+#define QUOTIENT(one, other) whole(&fault_, (int64_t)(one) / (int64_t)nonzero(&fault_, other))
+#define RATIO(one, other) ((one) / nonzero(&fault_, other))
+#define ROUNDED(value) rounded(&fault_, value)
+#define ROOT(value) root(&fault_, value)
 #define BOTH(one, other) ((one) & (other))
 #define EITHER(one, other) ((one) | (other))
-/* Out of line, since a thousand copies of it take seconds to compile. */
-static __attribute__((noinline, cold)) bool unsound({name} *fb, int32_t fault)
+static inline bool sound(int32_t *fault, bool holds, int32_t kind)
 {{
-    return (fb->fault_ = fb->fault_ ? fb->fault_ : fault) == 0;
+    *fault = *fault ? *fault : holds ? 0 : kind;
+    return holds;
 }}
-static inline bool sound({name} *fb, bool holds, int32_t fault)
+static inline int32_t within(int32_t *fault, int32_t index, int32_t length)
 {{
-    return holds || unsound(fb, fault);
+    return sound(fault, (uint32_t)index < (uint32_t)length, 1) ? index : 0;
 }}
-static inline int32_t within({name} *fb, int32_t index, int32_t length)
+static inline bool turn(int32_t *fault, int32_t *turns)
 {{
-    return sound(fb, index >= 0 && index < length, 1) ? index : 0;
+    return sound(fault, ++*turns <= {MOST_TURNS}, 2) & (*fault == 0);
 }}
-static inline bool turn({name} *fb)
+static inline double nonzero(int32_t *fault, double divisor)
 {{
-    return sound(fb, ++fb->turns_ <= {MOST_TURNS}, 2) && fb->fault_ == 0;
+    return sound(fault, divisor != 0.0, 3) ? divisor : 1.0;
 }}
-static inline double nonzero({name} *fb, double divisor)
+static inline int32_t whole(int32_t *fault, int64_t value)
 {{
-    return sound(fb, divisor != 0.0, 3) ? divisor : 1.0;
+    return sound(fault, value == (int32_t)value, 4) ? (int32_t)value : 0;
 }}
-static inline int32_t whole({name} *fb, int64_t value)
-{{
-    return sound(fb, value == (int32_t)value, 4) ? (int32_t)value : 0;
-}}
-static inline int32_t rounded({name} *fb, double value)
+static inline int32_t rounded(int32_t *fault, double value)
 {{
     const double found = nearbyint(value);
-    return sound(fb, found >= -2147483648.0 && found <= 2147483647.0, 4) ? (int32_t)found : 0;
+    return sound(fault, (found >= -2147483648.0) & (found <= 2147483647.0), 4) ? (int32_t)found : 0;
 }}
-static inline double root({name} *fb, double value)
+static inline double root(int32_t *fault, double value)
 {{
-    return sqrt(sound(fb, !(value < 0.0), 5) ? value : 0.0);
+    return sqrt(sound(fault, !(value < 0.0), 5) ? value : 0.0);
 }}
 #else
 #define BEGIN() ((void)0)
+#define END() ((void)0)
 #define AT(index, length) (index)
 #define TURN() true
 #define SUM(one, other) ((one) + (other))
