@@ -161,6 +161,7 @@ def test_what_a_target_cannot_take_is_refused_with_the_cure(tmp_path, monkeypatc
     assert run_here(*bus, "--set", f"can.sync_period={period}").code in (0, 4)
 
 
+@pytest.mark.slow
 def test_an_impossible_move_is_refused_with_the_cure(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     refused = run_here("--set", "move.duration=0.2")

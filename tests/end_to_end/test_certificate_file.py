@@ -73,6 +73,7 @@ def test_setpoints_that_break_a_limit_are_not_certified(copied):
         gp.certify_artefact(copied[0], spec)
 
 
+@pytest.mark.slow
 def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
     artefact, beside = copied
     beside.unlink()
@@ -172,6 +173,7 @@ def test_options_that_do_not_go_together_are_refused(copied):
     assert issubclass(SpecError, gp.GenProfileError)
 
 
+@pytest.mark.slow
 def test_the_main_job_certifies_the_file_of_each_format_as_the_check_does(tmp_path):
     made = run_here(*BARE, "--export", "csv", "--export", "plc", "--certify", "--out", tmp_path, "--json")
     assert made.code == 0, made.err
@@ -188,6 +190,7 @@ def test_the_main_job_certifies_the_file_of_each_format_as_the_check_does(tmp_pa
     assert text.out.count("certificate.json") == 1 and "payload" in text.out.split("proved", 1)[1]
 
 
+@pytest.mark.slow
 def test_the_main_job_says_what_is_not_proved_and_writes_no_certificate(tmp_path, certified):
     check = certified[1].document["check"]
     limit = max(row["residual_peaks_m"]["payload"] for row in check["scenarios"]) * 1.004
@@ -209,6 +212,7 @@ def test_a_proof_without_a_check_is_refused_before_anything_is_designed(tmp_path
     assert refused.code == 2 and "--no-check" in refused.errors[0] and not (tmp_path / "none").exists()
 
 
+@pytest.mark.slow
 def test_where_counts_are_too_coarse_for_a_bound_that_is_said(tmp_path):
     coarse = ("axis.unit=counts", "axis.counts_per_metre=3000", "robustness.uncertain={L1=0.01}")
     spec = gp.preset_spec("double-pendulum-crane", [*coarse, "export.cycle_time=0.02"])

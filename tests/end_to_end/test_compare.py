@@ -67,6 +67,7 @@ def in_table_units(figure, value):
     return 1e3 * value if "sway" in figure else value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "figure", "text"), cells(FOUND))
 def test_reproduces_what_was_found_independently(figures, method, figure, text):
     share = 0.01 if "jerk" in figure and not method.startswith("optimal") else 0.005

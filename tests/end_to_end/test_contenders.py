@@ -110,6 +110,7 @@ def test_the_spec_s_own_motion_is_designed_once(monkeypatch):
     )
 
 
+@pytest.mark.slow
 def test_variants_take_no_more_acceleration_than_the_spec_s_own_motion():
     spec = preset_spec("slosh-tank")
     methods = designs(spec)

@@ -102,6 +102,7 @@ def recorded(folder):
     return json.loads((folder / "deployments.json").read_text("utf-8"))["deployments"]
 
 
+@pytest.mark.slow
 def test_a_table_gets_into_a_controller_and_back(files, access):
     new, old = files / "new" / "paper.st", files / "old" / "FB_paper.TcPOU"
     assert run_here("deploy", old, *access, "--verify").code == 0
@@ -141,6 +142,7 @@ def test_the_record_is_signed(files, access, tmp_path):
     key.public_key().verify(base64.b64decode(lines[1])[10:], hashlib.blake2b(record).digest())
 
 
+@pytest.mark.slow
 def test_the_controller_plays_what_was_deployed(files, plc, access):
     assert run_here("deploy", files / "new" / "paper.st", *access).code == 0
     table = read_table(files / "new" / "paper.st")
@@ -232,6 +234,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
     assert f"Error: {found.document['fault']}" in found.err
 
 
+@pytest.mark.slow
 def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch):
     monkeypatch.setattr("gen_profile.deployment.opcua.STATE", "aNothing")
     where = ("--to", fresh, "--security", "none", "--watch")
@@ -327,6 +330,7 @@ def odd():
         yield f"opc.tcp://127.0.0.1:{port}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("instance", "words"),
     [

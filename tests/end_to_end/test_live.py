@@ -93,6 +93,7 @@ def die(view, look, over):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("show", [hang, fail, die])
 def test_nobody_waits_for_a_viewer(log, show, monkeypatch):
     monkeypatch.setattr(live, "LAST_LOOK", 0.1)

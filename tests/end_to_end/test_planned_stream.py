@@ -38,6 +38,7 @@ def deployed(folder, check, text=None):
     return ("--planner", folder / "paper.st", "--commands", folder / "commands.csv")
 
 
+@pytest.mark.slow
 def test_a_script_drives_simulated_drives(tmp_path, monkeypatch):
     monkeypatch.setattr(workflow, "SharedClock", HastyClock)
     table = tmp_path / "driven.csv"

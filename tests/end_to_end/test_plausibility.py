@@ -127,6 +127,7 @@ def quintic(distance, duration):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(
     distance=st.floats(1e-3, 50.0),

@@ -98,6 +98,7 @@ print(matplotlib.get_backend(), pyplot.get_fignums())
 """
 
 
+@pytest.mark.slow
 def test_a_picture_leaves_what_the_caller_draws_with_as_it_is(tmp_path):
     words = [sys.executable, "-c", DRAWING]
     run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)

@@ -286,6 +286,7 @@ def test_of_many_uncertain_parameters_those_that_matter_have_curves_and_the_wors
     assert int(drawn) == 1 + 2 + 2 * 5 - 8  # the other corners are tried without being followed
 
 
+@pytest.mark.slow
 def test_a_judge_and_a_machine_of_one_s_own_are_told_by_their_hashes(tmp_path, request):
     """The FMU that judges is ours, written as another's."""
     machine = request.config.rootpath / "examples/inclined_crane.py"

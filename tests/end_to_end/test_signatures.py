@@ -103,6 +103,7 @@ def test_another_key_a_file_beside_and_no_key_are_refused(copied, keys):
     assert none.code == 2 and "no secret key" in none.errors[0] and not (copied / "new").exists()
 
 
+@pytest.mark.slow
 def test_an_encrypted_key_is_left_to_minisign(keys, tmp_path):
     code, printed = minisign("-G", "-p", tmp_path / "p", "-s", tmp_path / "s", entered="a\na\n")
     assert code == 0, printed

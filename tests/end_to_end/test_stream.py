@@ -87,6 +87,7 @@ def test_simulated_drives_end_without_sway(deployed, tmp_path):
     assert float(rows[-1][1]) == pytest.approx(0.3, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_drives_that_take_only_speed(tmp_path, hasty):
     """Velocities (60FFh) from the design over the check to the simulated load."""
     spec = ("can.mode=csv", "can.following_error=0.01", "can.timeout=0.5", "can.sync_period=0.02")
@@ -144,6 +145,7 @@ def test_a_busy_machine_delays_a_simulation_as_a_whole(deployed, monkeypatch):
     assert int(stall[1]) >= 3 * (100 - 5)
 
 
+@pytest.mark.slow
 def test_turning_axes_are_told_in_radians(tmp_path, hasty):
     spec = ("--preset", "flexible-joint", "--set", "can.sync_period=0.02")
     words = run_here("stream", *spec, "--dry-run").out
@@ -160,6 +162,7 @@ def test_a_log_that_cannot_be_written_is_refused_before_anything_moves(deployed,
     assert "configure" not in outcome.err
 
 
+@pytest.mark.slow
 def test_a_silent_bus_is_told_once(deployed):
     bus = ("--interface", "virtual", "--channel", "empty")
     done = run_process("stream", deployed / "paper.log", *bus, cwd=deployed)
@@ -283,6 +286,7 @@ class TestArtefact:
         assert "solving" not in outcome.err
 
 
+@pytest.mark.slow
 def test_nobody_on_the_bus(deployed, tmp_path, full_disk):
     bus = ("--interface", "virtual", "--channel", "empty")
     outcome = run_here("stream", deployed / "paper.log", *bus, "--log", tmp_path / "driven.csv", "--json")
@@ -308,6 +312,7 @@ def test_a_full_disk_is_seen_before_anything_moves(deployed, tmp_path, monkeypat
     assert "configure" not in outcome.err
 
 
+@pytest.mark.slow
 def test_nobody_who_takes_the_outcome(deployed):
     """As with `2>&1 | head -n 4`, on a full disk besides."""
     reader, writer = os.pipe()
@@ -480,6 +485,7 @@ class TestSeveralBuses:
         *("--set", "can.sync_period=0.05", "--set", "can.timeout=0.5"),
     )
 
+    @pytest.mark.slow
     def test_a_simulation(self, hasty):
         outcome = run_here("stream", *self.SPEC, "--simulate-drive", "--json")
         assert (outcome.code, outcome.document["state"], outcome.document["reason"]) == (0, "done", "")

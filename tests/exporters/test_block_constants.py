@@ -69,6 +69,7 @@ def test_the_block_refuses_to_start_with_any_altered_constant(layout, profile):
         assert refuses(fb, begin), (name, index, value)
 
 
+@pytest.mark.slow
 def test_a_library_refuses_to_start_with_any_altered_constant_of_the_motion_that_it_plays():
     texts = [structured_text.block_text(bang_bang(a), goal_of(ONE, "segments")) for a in (1.2, 0.6)]
     text = together(texts, goal_of(ONE, "segments"))

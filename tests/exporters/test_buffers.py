@@ -251,6 +251,7 @@ def test_a_table_beyond_a_buffer_and_a_library_of_such_blocks_are_refused():
         structured_text.block_text(quintic((0.0, 1.0), duration=3000.0), long)
 
 
+@pytest.mark.slow
 def test_the_compiled_block_issues_the_same():
     """Arrays that begin with 1, and INT, which no planner block has."""
     text = text_of(TWO)

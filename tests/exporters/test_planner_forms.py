@@ -48,6 +48,7 @@ def program(block):
     return translate(block.text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format_", containers())
 def test_every_container_reads_back_as_the_same_program(block, program, format_, tmp_path):
     """Compared as C, which leaves nothing of the text's layout, but variables in their order."""
@@ -252,6 +253,7 @@ def test_the_example_of_a_command_has_a_value_for_each_axis():
         read_commands("time_s,command,value_x,value_y\n", axes, ())
 
 
+@pytest.mark.slow
 def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
     """And writes none where one is refused."""
     monkeypatch.chdir(tmp_path)

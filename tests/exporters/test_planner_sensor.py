@@ -50,6 +50,7 @@ def require_limits(issued, room=0.0):
         assert np.abs(issued["fPosition"] - STANDS).max() <= room + ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rope", "phase"), [(3.0, 0.4), (6.0, 3.5), (9.0, 1.9)])
 def test_a_swing_that_nobody_computed_is_damped_in_time(spec, compiled, rope, phase):
     swung = crane(compiled, rope, swing=(0.5, phase))

@@ -101,6 +101,7 @@ def test_each_part_has_a_heading_and_numbers_of_equations_that_the_documentation
         assert {*parts.split(", ")} >= {*known[number].split(", ")}, number
 
 
+@pytest.mark.slow
 def test_every_code_of_an_event_is_one_that_is_said_in_words():
     texts = [
         planner_block(preset_spec("bay-crane", VARIANTS[name])).text

@@ -170,6 +170,7 @@ class TestOneAxis:
         for _ in range(10):
             assert not bench.cycle(**left)["berror"]
 
+    @pytest.mark.slow
     def test_a_disable_with_a_quick_stop_takes_less_time_and_one_taken_back_goes_on(self, bench):
         under_way(bench)
         for _ in range(50):

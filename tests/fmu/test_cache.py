@@ -89,6 +89,7 @@ class TestPlantFmu:
         assert first.archive.is_relative_to(new_cache)
         assert first.archive.is_file()
 
+    @pytest.mark.slow
     @pytest.mark.usefixtures("compiled_once")
     def test_is_compiled_again_for_other_equations(self, new_cache, builds, crane):
         first = builds.get()
@@ -129,6 +130,7 @@ class TestPlantFmu:
         builds.get()
         assert builds.count == 2
 
+    @pytest.mark.slow
     def test_is_the_same_in_every_folder(self, new_cache, cache, builds, monkeypatch):
         archives = [builds.get().archive]
         share_zig(cache, new_cache / "deeper")

@@ -82,6 +82,7 @@ def test_same_spec_same_archive(tmp_path):
     assert (tmp_path / "a.fmu").read_bytes() == (tmp_path / "b.fmu").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_velocity_of_ideal_drives_has_no_lag(tmp_path):
     """The motion's own velocity, held in steps of 4 ms at its mean, calms the loads as its setpoints do."""
     motion, plant = tmp_path / "motion.fmu", tmp_path / "plant.fmu"

@@ -283,6 +283,7 @@ class TestCosimulation:
             exact = motion(1).derivative(times - 0.1, order)[:, 0]
             np.testing.assert_allclose(rows_out[:, order], exact, rtol=0.0, atol=1e-13)
 
+    @pytest.mark.slow
     def test_begins_with_a_swing_and_goes_on_at_speed(self, version):
         """What a spec's `move.initial` and `move.final_velocity` ask for."""
         given = np.array([[0.1], [0.0], [0.15]])[None]

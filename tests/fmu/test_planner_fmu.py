@@ -83,6 +83,7 @@ def issued(instance, advance):
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_each_step_of_a_cycle_issues_the_blocks_setpoint(instance):
     due = expected()
     assert shown(instance) == [-0.1, 0.0, 0.0, 0.0, 0, 0]  # where the axis stands

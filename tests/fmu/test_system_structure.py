@@ -157,6 +157,7 @@ def planned(version, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_planner_leads_the_plant(planned):
     with zipfile.ZipFile(planned) as opened:
         names, structure = opened.namelist(), etree.fromstring(opened.read("SystemStructure.ssd"))

@@ -83,6 +83,7 @@ def sum_in_arb(coefficients, *places):
     return found.tolist()
 
 
+@pytest.mark.slow
 def test_the_defect_is_bounded_as_arb_finds_it_from_the_machines_text():
     found = crane()
     theorem, plant = found.theorem, found.theorem.spec.machine()

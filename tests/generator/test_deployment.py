@@ -160,6 +160,7 @@ def used(block, tables):
     return None
 
 
+@pytest.mark.slow
 def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tables, unchecked):
     choices, ends = random.Random(31), []
     count = DirectLink(fresh(tables))
@@ -186,6 +187,7 @@ def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tab
     assert {(True, "new"), (False, "old")} <= set(ends)
 
 
+@pytest.mark.slow
 def test_the_connection_may_break_at_every_step(tables, unchecked):
     """One break, before or after what was sent had its effect, is taken up; none is too many."""
     steps = DirectLink(fresh(tables))

@@ -125,6 +125,7 @@ def test_programs_that_overshoot_back_and_forth_settle(weight):
     assert one.cost == pytest.approx(other.cost, rel=1e-6 if weight == 0.0 else 3e-5)
 
 
+@pytest.mark.slow
 def test_a_bisected_mesh_holds_the_same_motion():
     (setup, _), cost = set_up.set_up(limited(acceleration=0.3)), SwayCost(beta=50.0, gamma=50.0)
     goal = direct.Goal(setup=setup, sway_cost=cost, sway_limit=None)

@@ -264,6 +264,7 @@ def test_degrees_that_are_taken_for_radians(tmp_path):
     assert "the log's angle goes over 20 rad, more than half a turn; is it in deg?" in outcome.err
 
 
+@pytest.mark.slow
 def test_a_log_that_begins_before_the_stop(tmp_path):
     """The cart brakes for 2.5 s; the range found holds the rope all the same."""
     lagrange, true = Lagrange("single-pendulum-crane"), preset_spec("single-pendulum-crane").plant.parameters

@@ -118,6 +118,7 @@ print(optimal_profile(solve(crane_problem(desensitized=("L1", "L2")))).payload_h
 """
 
 
+@pytest.mark.slow
 def test_the_same_problem_has_the_same_bits():
     tests = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
     hashes = [

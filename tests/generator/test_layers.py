@@ -139,6 +139,7 @@ def words_of(module):
     }
 
 
+@pytest.mark.slow
 def test_every_name_that_tests_and_benchmarks_import_exists():
     """Benchmarks and the programs of other kernels run seldom, and would not show it."""
     missing = [
@@ -161,6 +162,7 @@ def test_the_picture_in_the_documentation_is_drawn_from_the_layers():
     assert all(f"<b>{layer.removeprefix('gen_profile.')}</b>" in drawn for layer in layers())
 
 
+@pytest.mark.slow
 def test_no_name_of_a_class_has_two_meanings():
     homes = defaultdict(set)
     for package, root in PACKAGES.items():
@@ -171,6 +173,7 @@ def test_no_name_of_a_class_has_two_meanings():
     assert {name: files for name, files in homes.items() if len(files) > 1} == {}
 
 
+@pytest.mark.slow
 def test_only_the_command_line_names_flags_in_errors():
     for package, root in PACKAGES.items():
         for file in set((root / package).rglob("*.py")) - set((root / package / "cli").rglob("*.py")):

@@ -90,6 +90,7 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
     assert (run.residual < 1e-3 * run.on_the_way).all()
 
 
+@pytest.mark.slow
 def test_a_sound_block_is_proved(spec, proof):
     assert proof.passed
     assert {one.group for one in proof.judged} == {CORNERS, DRAWS, SEARCH}
@@ -360,6 +361,7 @@ def test_the_command_line_delivers_what_is_proved(deployed, text):
     assert manifest["artefacts"][1]["path"] == "bay 3_velocity.st"
 
 
+@pytest.mark.slow
 def test_check_repeats_the_proof_from_the_file(deployed):
     folder, document = deployed
     again = run_here("check", folder / "bay 3.st", "--json").document
@@ -377,6 +379,7 @@ def test_check_replays_one_history(deployed):
     assert "passed" in run_here("check", folder / "bay 3.st", "--history", 0).out
 
 
+@pytest.mark.slow
 def test_a_page_tells_of_the_proof(deployed, tmp_path):
     """Its charts, its data and its words hold what the proof found."""
     folder = deployed[0]
@@ -427,6 +430,7 @@ def test_what_only_a_design_has_is_refused_in_a_report(deployed):
     assert "--no-compare: is for a design" in refused.err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("designed")
 def test_a_block_that_sways_too_much_is_not_written(tmp_path, monkeypatch):
     monkeypatch.setattr("gen_profile.designs.planner.planner_suggestions", lambda *_: ())
@@ -444,6 +448,7 @@ def test_a_block_that_sways_too_much_is_not_written(tmp_path, monkeypatch):
     assert not json.loads((tmp_path / "out" / "manifest.json").read_text())["check"]["passed"]
 
 
+@pytest.mark.slow
 def test_an_altered_file_is_told(deployed, tmp_path):
     for name in ("bay 3.st", "manifest.json"):
         (tmp_path / name).write_bytes((deployed[0] / name).read_bytes())

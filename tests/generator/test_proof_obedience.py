@@ -415,6 +415,7 @@ def disobedient(text, before="", after=""):
     return head.replace("\nVAR\n", f"\nVAR\n    {declared}\n", 1) + f"END_VAR\n{copied}{before}\n{body}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "after", "what"),
     [
@@ -436,6 +437,7 @@ def test_a_block_that_disobeys_fails(bay, before, after, what):
     assert any(kind_of(WORDS[what]) in one - known for one, known in zip(found, sound, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", ["1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200"])
 def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
     spec, text, histories, drawn, _ = bay

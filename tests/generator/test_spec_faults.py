@@ -304,6 +304,7 @@ PLACES = [
 ]
 
 
+@pytest.mark.slow
 @given(
     st.dictionaries(
         st.sampled_from([*PAPER, *PLACES, "axis.cart.unit", "check.residual_sway.hook"]), VALUES, max_size=4

@@ -239,6 +239,7 @@ OVERRIDES = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @given(OVERRIDES)
 def test_a_spec_survives_being_written_down(overrides):
     spec = preset_spec("paper", [f"{key}={value}" for key, value in overrides.items()])

@@ -203,6 +203,7 @@ def test_two_uncertain_parameters_make_a_map():
     assert np.all(np.array(middle) >= 0.9 * along) and max(middle) > 0.0
 
 
+@pytest.mark.slow
 def test_what_cannot_be_says_why_and_what_would_help():
     edits = {"move.duration": 1.5, "limits.velocity": 0.15}
     by_part = parts(picture(of("paper", edits)))

@@ -80,6 +80,7 @@ def seen(table, machine, seconds=6.0):
     return found, [one for one in events if one]
 
 
+@pytest.mark.slow
 def test_a_motion_is_the_tables_in_every_cycle(table):
     found, events = seen(table, Machine(table, [START]))
     assert found.fault is None and found.moving == found.exact > 250

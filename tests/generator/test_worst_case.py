@@ -155,6 +155,7 @@ def test_a_problem_without_a_worst_case_is_a_mistake():
         worst_case.solve(crane_problem())
 
 
+@pytest.mark.slow
 def test_where_programs_for_the_least_worst_case_fail_it_is_bisected(monkeypatch):
     problem = ranged(duration=1.6)
     best = worst_case.solve(problem)

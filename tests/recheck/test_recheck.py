@@ -155,6 +155,7 @@ def copied(genuine, tmp_path):
     return tuple(tmp_path / one.name for one in genuine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forge", forgeries.FORGERIES)
 def test_forgeries_are_refused_by_both(copied, forge):
     artefact, certificate = copied

@@ -53,6 +53,7 @@ def played(commands=COMMANDS, calls=1):
     return {name: np.array([float(row[name]) for row in rows])[::calls] for name in rows[0]}
 
 
+@pytest.mark.slow
 def test_targets_of_cycles_one_after_the_other_are_all_taken():
     commands = f"time_s,command,value\n0.1,position,0.1\n{0.1 + CYCLE},position,0.2\n"
     with bench_of(source_of(spec_of(), commands)) as bench:

@@ -87,6 +87,7 @@ def test_one_that_runs_off_while_another_drive_still_starts_up():
     assert went < 0.15
 
 
+@pytest.mark.slow
 def test_an_axis_that_lags_as_the_spec_says_is_no_runaway():
     """A first-order lag; the drive of another make that lags more is stopped."""
     for lag, stated in ((0.02, 0.03), (0.1, 0.1), (0.1, 0.03)):
