@@ -7,7 +7,8 @@ import numpy as np
 
 
 def stated_lower(document):
-    document["bounds_m"]["payload"] *= 0.99
+    bounds = document["bounds_m"]
+    bounds[next(iter(bounds))] *= 0.99
 
 
 def stated_lower_on_the_way(document):
@@ -15,7 +16,8 @@ def stated_lower_on_the_way(document):
 
 
 def asked_less(document):
-    document["setpoints"]["hoist"]["acceleration"]["bound"] *= 0.99
+    *_, axis = document["setpoints"].values()
+    axis["acceleration"]["bound"] *= 0.99
 
 
 def limit_on_the_way_raised(document):
@@ -23,7 +25,7 @@ def limit_on_the_way_raised(document):
 
 
 def stated_more(document):
-    document["largest_met_m"] = {"payload": 0.0}
+    document["largest_met_m"] = dict.fromkeys(document["bounds_m"], 0.0)
 
 
 def limits_of_axes_left_out(document):
@@ -63,11 +65,13 @@ def a_part_of_the_box(document):
 
 
 def limits_raised(document):
-    document["limits_m"]["payload"] *= 2.0
+    limits = document["limits_m"]
+    limits[next(iter(limits))] *= 2.0
 
 
 def narrower(document):
-    document["ranges"]["L0"][1] *= 0.99
+    (ends,) = document["ranges"].values()
+    ends[1] *= 0.99
 
 
 def knots_moved(document):
