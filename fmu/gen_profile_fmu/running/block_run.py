@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
 from typing import Any, Self
 
@@ -15,8 +15,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
 from gen_profile_fmu.running.instances import instance
 
 NO_NUMBER = -1  # a block's fault: a setpoint is none, or beyond all that a machine can follow
@@ -242,7 +241,7 @@ class BlockFollower:
     """
 
     def __init__(self, fmu: PlantFmu) -> None:
-        self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
+        self._variables = fmu.variables
         self._loads = [v.name for v in fmu.variables.blocks["SWAY"]]
         self._setpoints = [v.name for v in fmu.variables.blocks["INPUTS"]]
         self._loop = _loop()
@@ -301,7 +300,7 @@ class BlockFollower:
         copies = np.empty((len(marks), size), dtype=np.uint8)
         shown = np.zeros(0 if script.measured is None else len(script.measured.cycles))
         found = _Found(
-            **{name: _doubles(array) for name, array in kept.items() if array.size},
+            **{name: doubles(array) for name, array in kept.items() if array.size},
             copies=copies.ctypes.data,
             n_rows=rows,
         )
@@ -310,7 +309,7 @@ class BlockFollower:
             byref(self._fmu),
             byref(_called(block, script)),
             byref(self._history(script, values, led, hoists, marks=marks, shown=shown)),
-            _doubles(room),
+            doubles(room),
             byref(found),
         )
         if found.status:
@@ -343,7 +342,7 @@ class BlockFollower:
             cycle=script.cycle,
             n_rows=len(start_cycles),
             start_cycles=start_cycles,
-            inputs=_doubles(script.inputs),
+            inputs=doubles(script.inputs),
             actual=(c_size_t * len(script.actual))(*script.actual),
             longest=script.longest,
             settle=script.settle,
@@ -371,18 +370,15 @@ class BlockFollower:
             return {"n_measured": 0}
         return {
             "n_measured": len(measured.cycles),
-            "measured": _doubles(measured.cycles),
+            "measured": doubles(measured.cycles),
             "quantity": self._numbers([measured.quantity])[0],
             "shows": measured.shows,
             "valid": measured.valid,
-            "shown": _doubles(shown),
+            "shown": doubles(shown),
         }
 
-    def _numbers(self, names: Mapping[str, float] | Sequence[str]) -> Any:
-        unknown = [name for name in names if variable_name(name) not in self._references]
-        if unknown:
-            raise CosimulationError(f"The FMU has no variable {unknown[0]!r}.")
-        return (c_uint * len(names))(*(self._references[variable_name(name)] for name in names))
+    def _numbers(self, names: Collection[str]) -> Any:
+        return unsigned(self._variables.named(names))
 
 
 _EXTREMES = [field.name for field in attrs.fields(AxisExtremes)]
@@ -405,10 +401,6 @@ def _called(block: CalledBlock, script: Script) -> _Block:
         enabled=enabled,
         size=ctypes.sizeof(block.memory),
     )
-
-
-def _doubles(array: Array) -> Any:
-    return array.ctypes.data_as(POINTER(c_double))
 
 
 def _loop() -> Any:

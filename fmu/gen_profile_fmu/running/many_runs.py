@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
 from typing import Any, Self
@@ -14,8 +14,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
 from gen_profile_fmu.running.instances import instance
 
 
@@ -56,7 +55,7 @@ class ManyRuns:
     """
 
     def __init__(self, fmu: PlantFmu, version: Version, *, workers: int = 1) -> None:
-        self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
+        self._variables = fmu.variables
         self._workers = [_Worker(fmu, version) for _ in range(workers)]
         self._threads = ThreadPoolExecutor(workers)  # which start when they are needed
 
@@ -113,9 +112,9 @@ class ManyRuns:
             n_inputs=len(inputs),
             n_parameters=len(parameters),
             n_outputs=len(outputs),
-            input_references=self._numbers(inputs),
-            parameter_references=self._numbers(parameters),
-            output_references=self._numbers(outputs),
+            input_references=unsigned(self._variables.named(inputs)),
+            parameter_references=unsigned(self._variables.named(parameters)),
+            output_references=unsigned(self._variables.named(outputs)),
             n_components=components,
             since=since * (1.0 - 1e-12),
         )
@@ -135,15 +134,6 @@ class ManyRuns:
                 raise CosimulationError(f"The FMU could not go on in run {run}, counted from 0: {reason}")
         return found
 
-    def _numbers(self, names: Iterable[str]) -> Any:
-        references = []
-        for name in names:
-            reference = self._references.get(variable_name(name))
-            if reference is None:
-                raise CosimulationError(f"The FMU has no variable {name!r}.")
-            references.append(reference)
-        return (c_uint * len(references))(*references)
-
 
 class _Worker:
     """An instance with the loop over its functions."""
@@ -158,7 +148,7 @@ class _Worker:
         """Fill rows of what is to be found; the first bad run, or `end`."""
         self.messages.clear()
         room = np.empty(plan.n_outputs)
-        return int(self._loop(byref(self._fmu), byref(plan), first, end, _doubles(room), _doubles(found)))
+        return int(self._loop(byref(self._fmu), byref(plan), first, end, doubles(room), doubles(found)))
 
     def close(self) -> None:
         """Give the instance back."""
@@ -203,11 +193,7 @@ def _stacked(what: str, arrays: Mapping[str, Array], length: int) -> Array:
 
 
 def _per_run(rows: Array) -> _PerRun:
-    return _PerRun(values=_doubles(rows), size=rows[0].size if len(rows) > 1 else 0)
-
-
-def _doubles(array: Array) -> Any:
-    return array.ctypes.data_as(POINTER(c_double))
+    return _PerRun(values=doubles(rows), size=rows[0].size if len(rows) > 1 else 0)
 
 
 def _loop() -> Any:

@@ -20,6 +20,7 @@ from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import digest
 from gen_profile_fmu.running.block_run import CalledBlock
+from gen_profile_fmu.running.called_fmu import doubles
 
 
 class BlockInstance:
@@ -91,7 +92,7 @@ class BlockInstance:
         given = np.ascontiguousarray(inputs, dtype=np.float64)
         issued = np.empty((len(given), len(self._translation.outputs)))
         play = self._library.instance_play
-        require_sound(play(self._memory, _doubles(given), len(given), _doubles(issued)))
+        require_sound(play(self._memory, doubles(given), len(given), doubles(issued)))
         return issued
 
 
@@ -109,10 +110,6 @@ def require_sound(fault: int) -> None:
     """
     if fault:
         raise ExportError(f"The function block {FAULTS[fault]}; its text was altered.")
-
-
-def _doubles(array: Array) -> ctypes._Pointer[c_double]:
-    return array.ctypes.data_as(POINTER(c_double))
 
 
 @lru_cache(maxsize=4)

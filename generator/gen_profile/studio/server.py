@@ -40,29 +40,12 @@ KINDS = {
     ".js": "text/javascript; charset=utf-8",
     ".json": "application/json",
 }
+OWN = resources.files("gen_profile.studio") / "assets"
 ASSETS = {
-    **{
-        name: ("gen_profile.studio", name)
-        for name in (
-            "studio.html",
-            "studio.css",
-            "studio.js",
-            "knobs.js",
-            "cards.js",
-            "words.js",
-            "numbers.js",
-            "views.js",
-            "curves.js",
-            "designs.js",
-            "logs.js",
-            "maps.js",
-            "drive.js",
-            "words.json",
-        )
-    },
-    "uPlot.js": ("gen_profile.studio", "uPlot/uPlot.iife.min.js"),
-    "uPlot.css": ("gen_profile.studio", "uPlot/uPlot.min.css"),
-    "animation.js": ("gen_profile.report", "animation.js"),
+    **{file.name: file for file in OWN.iterdir() if Path(file.name).suffix in KINDS},
+    "uPlot.js": OWN / "uPlot" / "uPlot.iife.min.js",
+    "uPlot.css": OWN / "uPlot" / "uPlot.min.css",
+    "animation.js": resources.files("gen_profile.report") / "assets" / "animation.js",
 }
 
 
@@ -159,9 +142,8 @@ class Asset(Guarded):
         """Send it."""
         if name not in ASSETS:
             raise tornado.web.HTTPError(404)
-        package, file = ASSETS[name]
-        self.set_header("Content-Type", KINDS[Path(file).suffix])
-        self.finish((resources.files(package) / "assets" / file).read_bytes())
+        self.set_header("Content-Type", KINDS[Path(name).suffix])
+        self.finish(ASSETS[name].read_bytes())
 
 
 class FrontPage(Entering, Asset):
