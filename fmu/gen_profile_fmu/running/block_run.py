@@ -216,7 +216,7 @@ class _History(Structure):
     ]
 
 
-class _Found(Structure):
+class _Outcome(Structure):
     _fields_ = [
         *((name, POINTER(c_double)) for name in ("axes", "on_the_way", "residual", "trace")),
         ("copies", c_void_p),
@@ -299,7 +299,7 @@ class BlockFollower:
         size = ctypes.sizeof(block.memory)
         copies = np.empty((len(marks), size), dtype=np.uint8)
         shown = np.zeros(0 if script.measured is None else len(script.measured.cycles))
-        found = _Found(
+        outcome = _Outcome(
             **{name: doubles(array) for name, array in kept.items() if array.size},
             copies=copies.ctypes.data,
             n_rows=rows,
@@ -310,20 +310,20 @@ class BlockFollower:
             byref(_called(block, script)),
             byref(self._history(script, values, led, hoists, marks=marks, shown=shown)),
             doubles(room),
-            byref(found),
+            byref(outcome),
         )
-        if found.status:
+        if outcome.status:
             reason = " ".join(self._messages)
-            raise CosimulationError(f"The FMU could not go on after cycle {found.cycles}: {reason}")
+            raise CosimulationError(f"The FMU could not go on after cycle {outcome.cycles}: {reason}")
         return BlockRun(
             axes=tuple(
                 AxisExtremes(**dict(zip(_EXTREMES, row, strict=True))) for row in kept["axes"].tolist()
             ),
             on_the_way=kept["on_the_way"],
             residual=kept["residual"],
-            trace=kept["trace"][:, : found.cycles].T if rows else None,
+            trace=kept["trace"][:, : outcome.cycles].T if rows else None,
             copies=copies if marks else None,
-            **{name: getattr(found, name) for name in _SIMPLE},
+            **{name: getattr(outcome, name) for name in _SIMPLE},
         )
 
     def _history(
@@ -406,7 +406,7 @@ def _called(block: CalledBlock, script: Script) -> _Block:
 def _loop() -> Any:
     function = compiled_loops().block_run
     function.argtypes = [
-        *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Found)),
+        *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Outcome)),
     ]
     function.restype = None
     return function

@@ -120,19 +120,19 @@ class ManyRuns:
         )
         return self._run(plan, np.empty((given.runs, len(outputs) + (components > 0))))
 
-    def _run(self, plan: _Plan, found: Array) -> Array:
+    def _run(self, plan: _Plan, rows: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""
-        edges = [len(found) * number // len(self._workers) for number in range(len(self._workers) + 1)]
+        edges = [len(rows) * number // len(self._workers) for number in range(len(self._workers) + 1)]
         shares = list(zip(self._workers, edges, edges[1:], strict=False))
         if len(shares) == 1:
-            reached = [self._workers[0].run(plan, 0, len(found), found)]
+            reached = [self._workers[0].run(plan, 0, len(rows), rows)]
         else:
-            reached = list(self._threads.map(lambda part: part[0].run(plan, *part[1:], found), shares))
+            reached = list(self._threads.map(lambda part: part[0].run(plan, *part[1:], rows), shares))
         for run, (worker, _, end) in zip(reached, shares, strict=True):
             if run < end:
                 reason = " ".join(worker.messages)
                 raise CosimulationError(f"The FMU could not go on in run {run}, counted from 0: {reason}")
-        return found
+        return rows
 
 
 class _Worker:
@@ -144,11 +144,11 @@ class _Worker:
         self.messages = self._instance.messages
         self._fmu = called(self._instance.slave, version)
 
-    def run(self, plan: _Plan, first: int, end: int, found: Array) -> int:
+    def run(self, plan: _Plan, first: int, end: int, rows: Array) -> int:
         """Fill rows of what is to be found; the first bad run, or `end`."""
         self.messages.clear()
         room = np.empty(plan.n_outputs)
-        return int(self._loop(byref(self._fmu), byref(plan), first, end, doubles(room), doubles(found)))
+        return int(self._loop(byref(self._fmu), byref(plan), first, end, doubles(room), doubles(rows)))
 
     def close(self) -> None:
         """Give the instance back."""

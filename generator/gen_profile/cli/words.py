@@ -282,7 +282,7 @@ def identification(identified: Identification, path: Path) -> str:
         taken = f" ({row['averages']} averages over {row['lasts_s']:.4g} s)" if row["averages"] else ""
         samples = f"{row['samples']} samples of its {row['quantity']}{taken}"
         rows.append((f"log of {row['load']}", f"{samples}, {sizes}"))
-    rows += [("BEWARE", sentence) for sentence in identified.warnings()]
+    rows += [("WARNING", sentence) for sentence in identified.warnings()]
     rows += [*_stated_ranges(identified), *_rests(identified)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
     return _block(identified.spec.name, rows)

@@ -106,7 +106,7 @@ def _verdict(proof: Proof, path: Path) -> Verdict:
             f"{mm(proof.limit[load])} are allowed.",
             "Every history kept velocity, acceleration, jerk and travel in every cycle, and came to rest.",
             again,
-            *(f"Beware: {sentence}" for sentence in proof.warnings()),
+            *(f"Warning: {sentence}" for sentence in proof.warnings()),
         ],
     )
 

@@ -62,7 +62,7 @@ def verdict(check: Check) -> Verdict:
             f"({machine(finding.scenario.name)}), and {mm(check.limit[load])} are allowed.",
             f"Co-simulated from the written file in {tried} scenario{'s' if tried > 1 else ''}; "
             f"integration error below {bound(check.error_bound)}, counted against the margin.",
-            *(f"Beware: {sentence}" for sentence in check.warnings()),
+            *(f"Warning: {sentence}" for sentence in check.warnings()),
         ),
     )
 

@@ -286,7 +286,7 @@ def _written(value: Any) -> str:
 def _inline(value: Any) -> str:
     """Write TOML on one line."""
     if not isinstance(value, Mapping):
-        return tomlkit.item(value).as_string()
+        return str(tomlkit.item(value).as_string())
     table = tomlkit.inline_table()
     table.update(value)
-    return str(table.as_string())
+    return table.as_string()

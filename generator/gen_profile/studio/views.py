@@ -91,7 +91,7 @@ def _setting(question: Question, spec: Spec) -> Part:
         "command": command_of(start, state.edits),
         "text": text_of(start, state.edits),
         "address": state.address,
-        "doubts": [fault(sentence) for sentence in plausibility_warnings(spec)],
+        "warnings": [fault(sentence) for sentence in plausibility_warnings(spec)],
     }
 
 
