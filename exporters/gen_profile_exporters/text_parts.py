@@ -13,6 +13,9 @@ _PART = re.compile(r"(?m)^@part (\w+)\n")
 
 @cache
 def text_parts(path: str) -> dict[str, Any]:
-    """Read the parts of a file of this package, each below a line ``@part NAME``; no part ends its last line."""
+    """Read the parts of a file of this package, each below a line ``@part NAME``.
+
+    The last line of a part has no end.
+    """
     _, *pieces = _PART.split((FOLDER / path).read_text("ascii"))
     return {name: text.removesuffix("\n") for name, text in zip(pieces[::2], pieces[1::2], strict=True)}

@@ -22,6 +22,8 @@ from gen_profile_fmu.description.fmu_files import digest
 from gen_profile_fmu.running.block_run import CalledBlock
 from gen_profile_fmu.running.called_fmu import doubles
 
+LOOP = Path(__file__).with_name("block_loop.c").read_text("ascii")  # over cycles
+
 
 class BlockInstance:
     """An instance of a function block.
@@ -123,23 +125,7 @@ def _compiled(translation: Translation) -> ctypes.CDLL:
     block, library = translation.name, f"block{fmpy.sharedLibraryExtension}"
     taken = "".join(f"        fb->{v.name} = *inputs++;\n" for v in translation.inputs)
     given = "".join(f"        *outputs++ = fb->{v.name};\n" for v in translation.outputs)
-    loop = f"""\
-#define CHECKED
-#include "{block}.c"
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-EXPORT long instance_size(void) {{ return sizeof({block}); }}
-EXPORT void instance_init({block} *fb) {{ {block}_init(fb); }}
-EXPORT int instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
-    for (long cycle = 0; cycle < cycles && fb->fault_ == 0; ++cycle) {{
-{taken}        {block}_step(fb);
-{given}    }}
-    return fb->fault_;
-}}
-"""
+    loop = LOOP.replace("BLOCK", block).replace("TAKEN", taken).replace("GIVEN", given)
     texts = {f"{block}.h": translation.header, f"{block}.c": translation.source, "loop.c": loop}
     compiler = find_compiler()
 
