@@ -205,12 +205,12 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
                 "show": self._show,
                 "agree": self._agree,
                 "make": self._make,
-                "stop": lambda _: self._session.cancel(),
+                "stop": lambda _: self._session.stop("files"),
                 "drop": lambda said: self._drop(said, content),
                 "read": self._read,
                 "forget": lambda _: self._forget(),
                 "drive": self._drive,
-                "park": lambda _: self._session.leave_drive(),
+                "park": lambda _: self._session.stop("drive"),
             }
             act[said["say"]](said)
         except GenProfileError as error:
@@ -307,7 +307,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             at=at,
             free=tuple(map(str, said["free"])),
         )
-        self._session.read(int(said["number"]), asked)
+        self._session.ask("log", int(said["number"]), asked)
 
     def _drive(self, said: dict[str, Any]) -> None:
         """Let a planner block go on for a moment, once its spec may run what it wants to run."""
@@ -321,12 +321,12 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             values=tuple(map(float, said["values"])),
             live={str(name): float(value) for name, value in said["live"].items()},
         )
-        self._session.drive(int(said["number"]), asked)
+        self._session.ask("drive", int(said["number"]), asked)
 
     def _forget(self) -> None:
         """Read no log any more."""
         self._dropped = None
-        self._session.leave_log()
+        self._session.stop("log")
 
     def _tell(self, part: Part) -> None:
         self._write(json.dumps({**part, "serial": self._serial}))
