@@ -13,7 +13,7 @@ from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE
 from gen_profile_exporters.text_parts import text_parts
 
-TEXTS = text_parts("playback/axis_wrapper.st")
+TEXTS = text_parts("playback/text/axis_wrapper.st")
 STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
 TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes

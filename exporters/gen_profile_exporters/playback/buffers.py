@@ -2,7 +2,7 @@
 
 The block is that of constants (`structured_text`), with a handful of changes that can be undone: what is the
 motion's own stands in an array of LREAL, twice; the statements take it from the buffer in use; ahead of
-them stand others (``buffers.st``) that answer requests, and behind them some (``state.st``) that show how the
+them stand others (``text/buffers.st``) that answer requests, and behind them some (``state.st``) that show how the
 block stands. A buffer holds
 
     rows, checks, last segment, last, play on, checksum, slope, slope rate,
@@ -61,8 +61,8 @@ NOTE = """\
 
 """
 
-_TEMPLATE = Path(__file__).with_name("buffers.st").read_text("ascii")
-_STATE = Path(__file__).with_name("state.st").read_text("ascii")
+TEXT = Path(__file__).with_name("text")
+_TEMPLATE, _STATE = ((TEXT / f"{name}.st").read_text("ascii") for name in ("buffers", "state"))
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _TAKEN = re.compile(rf"\bt({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(

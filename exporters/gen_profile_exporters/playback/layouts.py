@@ -37,7 +37,7 @@ NO_PARTS = dict.fromkeys(("start", "segment", "counts_declaration", "counts_outp
 
 def _parts(layout: str) -> dict[str, Any]:
     """Read the statements that are a layout's own, whole lines each."""
-    return {name: f"{text}\n" for name, text in text_parts(f"playback/layout_{layout}.st").items()}
+    return {name: f"{text}\n" for name, text in text_parts(f"playback/text/layout_{layout}.st").items()}
 
 
 # Between cycles, samples: position by the cubic that has the tabulated velocities, these and accelerations

@@ -14,7 +14,7 @@ from gen_profile.units import RATES
 
 
 @attrs.frozen(kw_only=True)
-class Demand:
+class AxisDemand:
     """The greatest magnitude of a derivative of one axis's command.
 
     Attributes
@@ -39,12 +39,12 @@ class Demand:
     allowed: float | None
 
 
-def demands(spec: Spec, command: Profile) -> Iterator[Demand]:
+def demands(spec: Spec, command: Profile) -> Iterator[AxisDemand]:
     """List what a command asks of every axis, in the order of axes and of derivatives."""
     for column, axis in enumerate(spec.machine().actuated):
         limits = spec.limits.of(column)
         for order, (quantity, per) in enumerate(RATES.items(), start=1):
-            yield Demand(
+            yield AxisDemand(
                 axis=axis,
                 column=column,
                 quantity=quantity,
