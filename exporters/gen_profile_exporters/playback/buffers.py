@@ -2,8 +2,8 @@
 
 The block is that of constants (`structured_text`), with a handful of changes that can be undone: what is the
 motion's own stands in an array of LREAL, twice; the statements take it from the buffer in use; ahead of
-them stand others (``text/buffers.st``) that answer requests, and behind them some (``state.st``) that show how the
-block stands. A buffer holds
+them stand others (``text/buffers.st``) that answer requests, and behind them some (``text/state.st``) that
+show how the block stands. A buffer holds
 
     rows, checks, last segment, last, play on, checksum, slope, slope rate,
     room, inverse, stop jerk, start, target, least scale, mirrors, shifts of each axis,
