@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from gen_profile_exporters.block_source import BlockVariable
+from gen_profile_exporters.text_parts import text_parts
 
 # What follows a vendor's statements: an axis that failed is commanded no more.
 LET_GO = """\
@@ -105,30 +106,8 @@ TWINCAT = MotionLibrary(
     setpoint="Axis{n}.NcToPlc.SetPos",
     speed="Axis{n}.NcToPlc.SetVelo",
     actual="Axis{n}.NcToPlc.ActPos",
-    power="""\
-fbPower{n}(Axis := Axis{n}, Enable := bOn, Enable_Positive := bOn, Enable_Negative := bOn);
-fbReset{n}(Axis := Axis{n}, Execute := bAcknowledge);
-IF fbReset{n}.Busy THEN bResets := TRUE; END_IF;""",
     homed="(Axis{n}.NcToPlc.StateDWord AND 16#00000002) <> 16#00000000",
-    prepare="""\
-fbEnable{n}(Axis := Axis{n}, Execute := bTaken{n} AND NOT fbDisable{n}.Busy,
-    Position := Axis{n}.NcToPlc.SetPos, PositionType := POSITIONTYPE_ABSOLUTE);
-IF bTaken{n} THEN bExternal{n} := fbEnable{n}.Enabled; END_IF;
-IF NOT fbEnable{n}.Enabled OR fbEnable{n}.Busy OR fbDisable{n}.Busy THEN bReady := FALSE; END_IF;
-IF NOT fbEnable{n}.Enabled AND (nStage <> cTaking) THEN nCause := 23; END_IF;
-IF fbEnable{n}.Error THEN nCause := 22; END_IF;
-(* Bit 0: operational; bit 31: in error. *)
-IF (Axis{n}.NcToPlc.StateDWord AND 16#00000001) = 16#00000000 THEN nCause := 21; END_IF;
-IF (Axis{n}.NcToPlc.StateDWord AND 16#80000000) <> 16#00000000 THEN nCause := 20; END_IF;""",
-    feed="""\
-nDirection{n} := 0;
-IF fVelocity > 0.0 THEN nDirection{n} := 1; END_IF;
-IF fVelocity < 0.0 THEN nDirection{n} := -1; END_IF;
-IF bFeed THEN
-    MC_ExtSetPointGenFeed(Position := fPosition, Velocity := fVelocity, Acceleration := fAcceleration,
-        Direction := nDirection{n}, Axis := Axis{n});
-END_IF;
-fbDisable{n}(Axis := Axis{n}, Execute := bExternal{n} AND NOT bTaken{n});""",
+    **text_parts("libraries/twincat.st"),
 )
 CODESYS = MotionLibrary(
     axis_type="AXIS_REF_SM3",
@@ -138,23 +117,9 @@ CODESYS = MotionLibrary(
     setpoint="Axis{n}.fSetPosition",
     speed="Axis{n}.fSetVelocity",
     actual="Axis{n}.fActPosition",
-    power="""\
-fbPower{n}(Axis := Axis{n}, Enable := TRUE, bRegulatorOn := bOn, bDriveStart := bOn);
-fbReset{n}(Axis := Axis{n}, Execute := bAcknowledge);
-IF fbReset{n}.Busy THEN bResets := TRUE; END_IF;""",
     homed="bHomed{n}",
     variables=(HOMED,),
-    prepare="""\
-IF NOT fbFollow{n}.bBusy THEN bReady := FALSE; END_IF;
-(* SMC_AXIS_STATE: 0 power_off, 1 errorstop. *)
-IF Axis{n}.nAxisState = 0 THEN nCause := 21; END_IF;
-IF Axis{n}.nAxisState = 1 THEN nCause := 20; END_IF;""",
-    feed="""\
-fbFollow{n}(Axis := Axis{n}, bExecute := bFeed, bAbort := NOT bFeed, dwValueMask := 16#00000007,
-    fSetPosition := fPosition, fSetVelocity := fVelocity, fSetAcceleration := fAcceleration);
-IF bFeed AND (nStage <> cTaking) AND NOT fbFollow{n}.bBusy THEN nCause := 22; END_IF;
-IF bFeed AND fbFollow{n}.bError THEN nCause := 22; END_IF;
-IF bFeed AND fbFollow{n}.bCommandAborted THEN nCause := 23; END_IF;""",
+    **text_parts("libraries/codesys.st"),
 )
 SIEMENS = MotionLibrary(
     axis_type="TO_PositioningAxis",
@@ -164,22 +129,8 @@ SIEMENS = MotionLibrary(
     setpoint="Axis{n}.Position",
     speed="Axis{n}.Velocity",
     actual="Axis{n}.ActualPosition",
-    power="""\
-fbPower{n}(Axis := Axis{n}, Enable := bOn, StartMode := 1, StopMode := 0);
-fbReset{n}(Axis := Axis{n}, Execute := bAcknowledge);
-IF fbReset{n}.Busy THEN bResets := TRUE; END_IF;""",
     homed="Axis{n}.StatusWord.%X5",
-    prepare="""\
-IF NOT fbInPosition{n}.Busy THEN bReady := FALSE; END_IF;
-(* Bit 0: enabled; bit 1: in error. *)
-IF NOT Axis{n}.StatusWord.%X0 THEN nCause := 21; END_IF;
-IF Axis{n}.StatusWord.%X1 THEN nCause := 20; END_IF;""",
-    feed="""\
-fbInPosition{n}(Axis := Axis{n}, Enable := bFeed, Position := fPosition, Velocity := fVelocity,
-    Acceleration := fAcceleration);
-IF bFeed AND (nStage <> cTaking) AND NOT fbInPosition{n}.Busy THEN nCause := 22; END_IF;
-IF bFeed AND fbInPosition{n}.Error THEN nCause := 22; END_IF;
-IF bFeed AND fbInPosition{n}.CommandAborted THEN nCause := 23; END_IF;""",
+    **text_parts("libraries/siemens.st"),
 )
 # Velocity setpoints with a position control of our own; no library: the converter is inputs and outputs.
 VELOCITY = MotionLibrary(
@@ -190,27 +141,7 @@ VELOCITY = MotionLibrary(
     setpoint="fActPosition{n}",
     speed="fActVelocity{n}",
     actual="fActPosition{n}",
-    power="""\
-bRun{n} := bOn;
-bResetDrive{n} := bAcknowledge;""",
     homed="bHomed{n}",
-    prepare="""\
-IF (nStage = cTaking)
-    AND (NOT (fGain{n} > 0.0) OR NOT (fCorrection{n} > 0.0) OR NOT (fFollowingLimit{n} > 0.0)) THEN
-    nCause := 22;
-END_IF;
-IF NOT bRunning{n} THEN nCause := 21; END_IF;
-IF bDriveError{n} THEN nCause := 20; END_IF;""",
-    feed="""\
-fSpeed{n} := 0.0;
-IF bFeed THEN
-    fSpeed{n} := fGain{n} * (fPosition - fActPosition{n});
-    IF fSpeed{n} > fCorrection{n} THEN fSpeed{n} := fCorrection{n}; END_IF;
-    IF fSpeed{n} < -fCorrection{n} THEN fSpeed{n} := -fCorrection{n}; END_IF;
-    (* What was measured may be the fault: then brake without it. *)
-    IF (nFault <> 0) OR NOT (ABS(fSpeed{n}) <= fCorrection{n}) THEN fSpeed{n} := 0.0; END_IF;
-    fSpeed{n} := fSpeed{n} + fVelocity;
-END_IF;""",
     variables=(
         HOMED,
         _variable("VAR_INPUT", "bRunning{n}", "BOOL", "the converter is on and follows fSpeed"),
@@ -221,4 +152,5 @@ END_IF;""",
         _variable("VAR_OUTPUT", "bResetDrive{n}", "BOOL", "acknowledges its error"),
         _variable("VAR_OUTPUT", "fSpeed{n}", "LREAL", "velocity setpoint"),
     ),
+    **text_parts("libraries/velocity.st"),
 )

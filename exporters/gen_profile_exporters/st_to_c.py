@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
@@ -88,6 +89,7 @@ FAULTS = (
     "takes the square root of a negative number",
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
+CHECKS = Path(__file__).with_name("checks.c").read_text("ascii")  # of what a block does, where it is CHECKED
 _NUMBERS = ("LREAL", "DINT")
 _PLAIN: dict[tuple[str, ...], str] = {  # C of an operator or a function, and the types that it takes
     **{(o, t, t): f"{{}} {o} {{}}" for o in ("+", "-", "*", "/", "<", "<=", ">", ">=") for t in _NUMBERS},
@@ -417,7 +419,7 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "#else",
             "#define OPERATIONS(number) ((void)0)",
             "#endif",
-            *_CHECKS.splitlines(),
+            *CHECKS.replace("MOST_TURNS", str(MOST_TURNS)).splitlines(),
             "",
             *constants,
             "",
@@ -434,66 +436,3 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "",
         ]
     )
-
-
-_CHECKS = f"""\
-#ifdef CHECKED
-/* Without branches, of which thousands take seconds to compile. */
-#define BEGIN() int32_t turns_ = 0, fault_ = fb->fault_
-#define END() (fb->fault_ = fault_)
-#define AT(index, length) within(&fault_, index, length)
-#define TURN() turn(&fault_, &turns_)
-#define SUM(one, other) whole(&fault_, (int64_t)(one) + (other))
-#define DIFFERENCE(one, other) whole(&fault_, (int64_t)(one) - (other))
-#define PRODUCT(one, other) whole(&fault_, (int64_t)(one) * (other))
-#define QUOTIENT(one, other) whole(&fault_, (int64_t)(one) / (int64_t)nonzero(&fault_, other))
-#define RATIO(one, other) ((one) / nonzero(&fault_, other))
-#define ROUNDED(value) rounded(&fault_, value)
-#define ROOT(value) root(&fault_, value)
-#define BOTH(one, other) ((one) & (other))
-#define EITHER(one, other) ((one) | (other))
-static inline bool sound(int32_t *fault, bool holds, int32_t kind)
-{{
-    *fault = *fault ? *fault : holds ? 0 : kind;
-    return holds;
-}}
-static inline int32_t within(int32_t *fault, int32_t index, int32_t length)
-{{
-    return sound(fault, (uint32_t)index < (uint32_t)length, 1) ? index : 0;
-}}
-static inline bool turn(int32_t *fault, int32_t *turns)
-{{
-    return sound(fault, ++*turns <= {MOST_TURNS}, 2) & (*fault == 0);
-}}
-static inline double nonzero(int32_t *fault, double divisor)
-{{
-    return sound(fault, divisor != 0.0, 3) ? divisor : 1.0;
-}}
-static inline int32_t whole(int32_t *fault, int64_t value)
-{{
-    return sound(fault, value == (int32_t)value, 4) ? (int32_t)value : 0;
-}}
-static inline int32_t rounded(int32_t *fault, double value)
-{{
-    const double found = nearbyint(value);
-    return sound(fault, (found >= -2147483648.0) & (found <= 2147483647.0), 4) ? (int32_t)found : 0;
-}}
-static inline double root(int32_t *fault, double value)
-{{
-    return sqrt(sound(fault, !(value < 0.0), 5) ? value : 0.0);
-}}
-#else
-#define BEGIN() ((void)0)
-#define END() ((void)0)
-#define AT(index, length) (index)
-#define TURN() true
-#define SUM(one, other) ((one) + (other))
-#define DIFFERENCE(one, other) ((one) - (other))
-#define PRODUCT(one, other) ((one) * (other))
-#define QUOTIENT(one, other) ((one) / (other))
-#define RATIO(one, other) ((one) / (other))
-#define ROUNDED(value) ((int32_t)nearbyint(value))
-#define ROOT(value) sqrt(value)
-#define BOTH(one, other) ((one) && (other))
-#define EITHER(one, other) ((one) || (other))
-#endif"""

@@ -15,6 +15,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "deg": ("rad", 180.0 / math.pi),
 }
 COUNTS = "counts"
+RATES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}  # of an axis, behind its unit
 AXIS_UNITS = (*UNITS, COUNTS)
 
 

@@ -247,11 +247,11 @@ def test_a_worker_of_a_cluster_that_is_killed_costs_nothing_that_is_finished(swe
         store = prepared(tmp_path / "out", *AXES[1::2])
         seen, victims = {}, []
 
-        def progress(at):
+        def progress(_stage, cases_done, _total, _remark=""):
             now = stamps(store.folder)
             assert seen.items() <= now.items()
             seen.update(now)
-            if at.done == 3:
+            if cases_done == 3:
                 with Client(address, set_as_default=False) as client:
                     victims.append(next(iter(client.run(os.getpid).values())))
                 os.kill(victims[0], signal.SIGKILL)

@@ -287,9 +287,9 @@ def test_a_log_that_begins_before_the_stop(tmp_path):
         "--swing", tmp_path / "log.csv", "--at", "0,4", "--out", tmp_path / "new.toml",
     ]  # fmt: skip
     early, late = run_here(*words), run_here(*words, "--after", "2.5")
-    assert "BEWARE" in early.out
+    assert "WARNING" in early.out
     assert "leave out what was logged before the axes stood still" in early.out
-    assert "BEWARE" not in late.out
+    assert "WARNING" not in late.out
     for outcome in (run_here(*words, "--json"), run_here(*words, "--after", "2.5", "--json")):
         row = outcome.document["parameters"]["L0"]
         assert abs(row["value"] - true["L0"]) <= row["half_range"]

@@ -85,10 +85,10 @@ def test_what_is_hardly_meant_is_told(name, override, place, cure):
 def test_a_doubt_is_told_once_and_is_among_the_warnings_of_the_check(tmp_path):
     implausible = ("--set", "can.start_tolerance=1")
     outcome = run_here("--preset", "paper", *implausible, "--out", tmp_path, "--json")
-    (said,) = (line for line in outcome.err.splitlines() if line.startswith("Beware: "))
+    (said,) = (line for line in outcome.err.splitlines() if line.startswith("Warning: "))
     assert outcome.code == 0
-    assert [f"Beware: {warning}" for warning in outcome.document["check"]["warnings"]] == [said]
-    assert said.startswith("Beware: can.start_tolerance: 1 m are more than half of the move")
+    assert [f"Warning: {warning}" for warning in outcome.document["check"]["warnings"]] == [said]
+    assert said.startswith("Warning: can.start_tolerance: 1 m are more than half of the move")
 
 
 def test_a_limit_that_nobody_typed_is_no_slip():

@@ -160,7 +160,7 @@ def test_what_a_worker_says_after_the_studio_ended_is_let_go():
     session.show(0, "state")
     loop = asyncio.new_event_loop()
     loop.close()
-    session._picture._loop = loop
+    session._queues["picture"]._loop = loop
     hands.taken[0].say("curves")
     assert messages == []
 

@@ -11,92 +11,9 @@ from __future__ import annotations
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE
+from gen_profile_exporters.text_parts import text_parts
 
-HEADER = """\
-(*
-    {name}: plays {block} on the axes given. Call it in the task of the motion, every fCycleTime.
-    Not tried on a controller: watch the first motion with the hand at the emergency stop.
-
-    An axis that fails is let go and left to its own reaction, the others stop on the path: until then, bBusy
-    is set beside bError. It takes another rising edge to start, from where the motion begins.
-
-    nErrorId: as of {block}, and
-              20 an axis is in error
-              21 an axis has no power
-              22 {guide} reports an error, or does not work
-              23 something else took an axis
-*)
-"""
-BODY = """\
-{edges}
-(* Idle lasts a cycle at least, so that the vendor's blocks see an edge at the next start. *)
-IF (nStage = cIdle) AND (nDue > 0) THEN
-    nStage := cTaking;
-    nTrigger := nDue;
-{take}
-ELSIF (nStage = cStopping) AND NOT fbMotion.bBusy THEN
-    nStage := cIdle;
-ELSIF (nStage = cPlaying) AND NOT fbMotion.bBusy AND NOT ({held}) THEN
-    nStage := cIdle;
-END_IF;
-IF (nStage = cTaking) OR (nStage = cPlaying) THEN nDue := 0; END_IF;
-
-bReady := TRUE;
-{prepare}
-IF (nFault <> 0) AND (nStage <> cIdle) THEN nStage := cStopping; END_IF;
-
-{levels}
-IF (nStage = cTaking) AND (bReady OR bAbort) THEN
-    nStage := cPlaying;
-{starts}
-END_IF;
-fbMotion(
-    {arguments});
-bGuided := fbMotion.bBusy OR fbMotion.bDone OR fbMotion.bAborted;
-IF (nStage = cPlaying) AND fbMotion.bError THEN
-    nStage := cIdle;
-    nFault := fbMotion.nErrorId;
-END_IF;
-
-{feed}
-IF (nFault <> 0) AND (nStage <> cIdle) THEN nStage := cStopping; END_IF;
-
-bBusy := (nStage = cTaking) OR (nStage = cStopping) OR fbMotion.bBusy;
-bDone := (nStage = cPlaying) AND fbMotion.bDone;
-bAborted := (nStage = cPlaying) AND fbMotion.bAborted;
-bError := nFault <> 0;
-nErrorId := nFault;
-{results}
-"""
-# For each input whose rising edge starts: what asks for a motion, or takes note of an error.
-EDGE = """\
-IF {input} AND NOT {input}Before THEN
-    nDue := {number};
-    nFault := 0;
-ELSIF {input}Before AND NOT {input} THEN
-    IF nDue = {number} THEN nDue := 0; END_IF;
-    nFault := 0;
-END_IF;
-{input}Before := {input};"""
-PREPARE = """\
-IF nStage = cIdle THEN bTaken{n} := FALSE; END_IF;
-nCause := 0;
-IF (nStage = cTaking) AND (ABS({setpoint} - {actual}) > fStartTolerance{i}) THEN nCause := 2; END_IF;
-{vendor}
-{let_go}"""
-FEED = """\
-bFeed := bTaken{n} AND ((nStage = cTaking) OR bGuided);
-fPosition := fbMotion.fPosition{i};
-fVelocity := fbMotion.fVelocity{i};
-fAcceleration := fbMotion.fAcceleration{i};
-IF nStage = cTaking THEN
-    fPosition := {setpoint};
-    fVelocity := 0.0;
-    fAcceleration := 0.0;
-END_IF;
-nCause := 0;
-{vendor}
-{let_go}"""
+TEXTS = text_parts("playback/text/axis_wrapper.st")
 STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
 TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
@@ -119,7 +36,7 @@ def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> Block
     places = [{"n": f"{n}" * several, "i": f"[{n}]" * several} for n in range(1, axes + 1)]
     name = f"{block.name}_Axis"
     return BlockSource(
-        header=HEADER.format(name=name, block=block.name, guide=library.guide),
+        header=TEXTS["header"].format(name=name, block=block.name, guide=library.guide) + "\n",
         name=name,
         variables=(
             *(
@@ -164,15 +81,17 @@ def _body(inputs: list[str], outputs: list[str], places: list[dict[str, str]], l
     stand = each("fStand{i} := " + library.setpoint + ";", places) if several else ""
     prepare, feed = (
         each(around(template, statements, library), places)
-        for template, statements in ((PREPARE, library.prepare), (FEED, library.feed))
+        for template, statements in ((TEXTS["prepare"], library.prepare), (TEXTS["feed"], library.feed))
     )
     given = {key: f"{key}Now" if key in triggers else key for key in inputs}
     given |= {
         "bAbort": "bAbort OR (nStage = cStopping)",
         ACTUAL: "fStand" if several else library.setpoint.format(n=""),
     }
-    return BODY.format(
-        edges="\n".join(EDGE.format(input=key, number=number) for number, key in enumerate(triggers, 1)),
+    text = TEXTS["body"].format(
+        edges="\n".join(
+            TEXTS["edge"].format(input=key, number=number) for number, key in enumerate(triggers, 1)
+        ),
         held=" OR ".join(triggers),
         take=each("    bTaken{n} := TRUE;", places),
         prepare=f"{prepare}\n{stand}".rstrip(),
@@ -182,6 +101,7 @@ def _body(inputs: list[str], outputs: list[str], places: list[dict[str, str]], l
         feed=feed,
         results="\n".join(f"{key} := fbMotion.{key};" for key in outputs if key not in STATES),
     )
+    return f"{text}\n"
 
 
 def _triggers(inputs: list[str]) -> list[str]:

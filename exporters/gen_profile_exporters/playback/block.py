@@ -1,6 +1,6 @@
 """The playback block's template, filled in for writing and matched for reading.
 
-The template (``template.st``) is portable IEC 61131-3 Structured Text. ``@name`` is a hole for a value.
+The template (``text/template.st``) is portable IEC 61131-3 Structured Text. ``@name`` is a hole for a value.
 ``$name`` is a part that the number of axes or the layout of the table decides; alone on its line, it is whole
 lines. A line that begins with ``%`` stands in blocks of several axes only. ``~`` after a name is the index of
 the axis there, and nothing where there is one axis.
@@ -19,7 +19,7 @@ import attrs
 from gen_profile.errors import ExportError
 from gen_profile_exporters.playback.layouts import LAYOUTS
 
-_TEMPLATE = Path(__file__).with_name("template.st").read_text("ascii")
+_TEMPLATE = (Path(__file__).with_name("text") / "template.st").read_text("ascii")
 _CHECKED = {  # how the value of a constant enters the checksum
     "DINT": "fValue := DINT_TO_LREAL({});",
     "LREAL": "fValue := {};",

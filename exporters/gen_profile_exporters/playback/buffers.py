@@ -2,8 +2,8 @@
 
 The block is that of constants (`structured_text`), with a handful of changes that can be undone: what is the
 motion's own stands in an array of LREAL, twice; the statements take it from the buffer in use; ahead of
-them stand others (``buffers.st``) that answer requests, and behind them some (``state.st``) that show how the
-block stands. A buffer holds
+them stand others (``text/buffers.st``) that answer requests, and behind them some (``text/state.st``) that
+show how the block stands. A buffer holds
 
     rows, checks, last segment, last, play on, checksum, slope, slope rate,
     room, inverse, stop jerk, start, target, least scale, mirrors, shifts of each axis,
@@ -61,8 +61,8 @@ NOTE = """\
 
 """
 
-_TEMPLATE = Path(__file__).with_name("buffers.st").read_text("ascii")
-_STATE = Path(__file__).with_name("state.st").read_text("ascii")
+TEXT = Path(__file__).with_name("text")
+_TEMPLATE, _STATE = ((TEXT / f"{name}.st").read_text("ascii") for name in ("buffers", "state"))
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _TAKEN = re.compile(rf"\bt({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(
@@ -99,10 +99,10 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
     ExportError
         The table is too long.
     """
-    found = {variable.name: variable for variable in source.variables}
-    layout = _layout(found)
-    columns, axes = COLUMNS[layout], len(_split(found["cStart"]))
-    texts = _texts(found, columns, axes)
+    declared = {variable.name: variable for variable in source.variables}
+    layout = _layout(declared)
+    columns, axes = COLUMNS[layout], len(_split(declared["cStart"]))
+    texts = _texts(declared, columns, axes)
     if capacity is None:
         capacity = max(LEAST_CAPACITY, 1 << (len(texts) + len(columns) - 1).bit_length())
     if len(texts) + len(columns) > min(capacity, MOST_CAPACITY):
@@ -118,7 +118,7 @@ def buffered(source: BlockSource, target: Target, capacity: int | None = None) -
         "cLayout": LAYOUT_NAMES.index(layout),
         "cCapacity": capacity,
         "cOwn": len(SCALARS) + axes * len(PER_AXIS),
-        "cPatience": ceil(PATIENCE / float(found["cCycleTime"].initial)),
+        "cPatience": ceil(PATIENCE / float(declared["cCycleTime"].initial)),
     }
     window, both = f"ARRAY [0..{LENGTH - 1}] OF LREAL", f"ARRAY [0..{2 * capacity - 1}] OF LREAL"
     variables = (
@@ -160,11 +160,11 @@ def buffer_texts(source: BlockSource) -> list[str]:
     ExportError
         They were altered so that they are none.
     """
-    found = {variable.name: variable for variable in source.variables}
+    variables = {variable.name: variable for variable in source.variables}
     try:
-        texts, rows = found[TABLE].elements, int(float(found[TABLE].elements[0]))
-        layout = LAYOUT_NAMES[int(found["cLayout"].initial)]
-        length = int(found["cOwn"].initial) + rows * len(COLUMNS[layout])
+        texts, rows = variables[TABLE].elements, int(float(variables[TABLE].elements[0]))
+        layout = LAYOUT_NAMES[int(variables["cLayout"].initial)]
+        length = int(variables["cOwn"].initial) + rows * len(COLUMNS[layout])
         if rows < 1 or length > len(texts) // 2:
             raise ValueError("sizes")
     except (KeyError, ValueError, IndexError, OverflowError) as error:
@@ -192,10 +192,10 @@ def constant_source(source: BlockSource, target: Target) -> BlockSource:
     """
     texts = buffer_texts(source)
     try:
-        found = {variable.name: variable for variable in source.variables}
-        layout = LAYOUT_NAMES[int(found["cLayout"].initial)]
+        variables = {variable.name: variable for variable in source.variables}
+        layout = LAYOUT_NAMES[int(variables["cLayout"].initial)]
         back = _constants(source, texts, layout, len(target.axes))
-        again = buffered(back, target, len(found[TABLE].elements) // 2)
+        again = buffered(back, target, len(variables[TABLE].elements) // 2)
     except (KeyError, ValueError, IndexError, OverflowError, ZeroDivisionError) as error:
         raise ExportError("The block's buffers were altered; export it again.") from error
     if again.program() != source.program():
@@ -206,18 +206,18 @@ def constant_source(source: BlockSource, target: Target) -> BlockSource:
     return back
 
 
-def _layout(found: dict[str, BlockVariable]) -> str:
-    if "cPower0" in found:
+def _layout(variables: dict[str, BlockVariable]) -> str:
+    if "cPower0" in variables:
         return "segments"
-    array = found["cPosition"].array
+    array = variables["cPosition"].array
     return "counts" if array is not None and array[2] == "DINT" else "samples"
 
 
-def _texts(found: dict[str, BlockVariable], columns: tuple[str, ...], axes: int) -> list[str]:
+def _texts(variables: dict[str, BlockVariable], columns: tuple[str, ...], axes: int) -> list[str]:
     """List the values of a block of constants in the order of a buffer, as literals of LREAL."""
-    scalars = [found[f"c{name}"].initial if f"c{name}" in found else "0" for name in SCALARS]
-    own = [_split(found[f"c{name}"]) for name in PER_AXIS]
-    rows = [_split(found[name]) for name in columns]
+    scalars = [variables[f"c{name}"].initial if f"c{name}" in variables else "0" for name in SCALARS]
+    own = [_split(variables[f"c{name}"]) for name in PER_AXIS]
+    rows = [_split(variables[name]) for name in columns]
     if "cFirst" in columns:  # of every axis alike
         rows[-1] = [text for text in rows[-1] for _ in range(axes)]
     return [_as_real(text) for text in chain(scalars, *zip(*own, strict=True), *rows)]
@@ -242,11 +242,11 @@ def _taken(variable: BlockVariable) -> BlockVariable:
 def _from_buffer(body: str, layout: str) -> str:
     """Make the statements look their numbers up in the buffer in use."""
 
-    def place(found: re.Match[str]) -> str:
-        name, index = found[2], found[3] if found[2] != "cFirst" else f"cAxes * ({found[3]})"
+    def place(match: re.Match[str]) -> str:
+        name, index = match[2], match[3] if match[2] != "cFirst" else f"cAxes * ({match[3]})"
         text = f"{TABLE}[nTable + {COLUMNS[layout].index(name)} * cRows + {index}]"
         # one that is wanted as a real number need not fit DINT if it was altered
-        return f"LREAL_TO_DINT({text})" if _is_whole(name, layout) and not found[1] else text
+        return f"LREAL_TO_DINT({text})" if _is_whole(name, layout) and not match[1] else text
 
     return _OWN.sub(r"t\1", _COLUMN.sub(place, body))
 
@@ -254,12 +254,12 @@ def _from_buffer(body: str, layout: str) -> str:
 def _to_constants(body: str, layout: str) -> str:
     """Undo `_from_buffer`."""
 
-    def place(found: re.Match[str]) -> str:
-        name, index = COLUMNS[layout][int(found[2])], found[3]
+    def place(match: re.Match[str]) -> str:
+        name, index = COLUMNS[layout][int(match[2])], match[3]
         if name == "cFirst":
             index = index.removeprefix("cAxes * (").removesuffix(")")
         text = f"{name}[{index}]"
-        return f"DINT_TO_LREAL({text})" if _is_whole(name, layout) and not found[1] else text
+        return f"DINT_TO_LREAL({text})" if _is_whole(name, layout) and not match[1] else text
 
     return _TAKEN.sub(r"c\1", _PLACE.sub(place, body))
 

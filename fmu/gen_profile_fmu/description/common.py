@@ -36,7 +36,14 @@ def root_element(model: Model, fmi_version: str, **identity: str) -> ElementTree
     return ElementTree.Element("fmiModelDescription", attributes)
 
 
-def add_units(root: ElementTree.Element, table: VariableTable) -> None:
+def add_common(root: ElementTree.Element, model: Model) -> None:
+    """Add what comes between the interfaces and the variables."""
+    _add_units(root, model.variables)
+    _add_log_categories(root)
+    _add_experiment(root, model)
+
+
+def _add_units(root: ElementTree.Element, table: VariableTable) -> None:
     """List the units in use, with their base units where these are known."""
     definitions = ElementTree.SubElement(root, "UnitDefinitions")
     shown_in: defaultdict[str, dict[str, float]] = defaultdict(dict)
@@ -53,14 +60,14 @@ def add_units(root: ElementTree.Element, table: VariableTable) -> None:
             ElementTree.SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
 
 
-def add_log_categories(root: ElementTree.Element) -> None:
+def _add_log_categories(root: ElementTree.Element) -> None:
     """List the log categories."""
     categories = ElementTree.SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         ElementTree.SubElement(categories, "Category", name=name, description=description)
 
 
-def add_experiment(root: ElementTree.Element, model: Model) -> None:
+def _add_experiment(root: ElementTree.Element, model: Model) -> None:
     """State a sensible simulation."""
     ElementTree.SubElement(
         root,

@@ -6,9 +6,7 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from gen_profile_fmu.description.common import (
-    add_experiment,
-    add_log_categories,
-    add_units,
+    add_common,
     initial_unknowns_of,
     outputs_of,
     root_element,
@@ -35,9 +33,7 @@ def model_description(model: Model, guid: str, source_file: str) -> bytes:
     root = root_element(model, "2.0", guid=guid)
     root.set("numberOfEventIndicators", "0")
     _add_interfaces(root, model, source_file)
-    add_units(root, model.variables)
-    add_log_categories(root)
-    add_experiment(root, model)
+    add_common(root, model)
     _add_variables(root, model.variables)
     _add_structure(root, model)
     return to_bytes(root)

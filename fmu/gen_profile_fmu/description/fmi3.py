@@ -6,9 +6,7 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from gen_profile_fmu.description.common import (
-    add_experiment,
-    add_log_categories,
-    add_units,
+    add_common,
     initial_unknowns_of,
     outputs_of,
     root_element,
@@ -24,9 +22,7 @@ def model_description(model: Model, token: str) -> bytes:
     """Write the XML text; `token` ties it to its binary."""
     root = root_element(model, "3.0", instantiationToken=token)
     _add_interfaces(root, model)
-    add_units(root, model.variables)
-    add_log_categories(root)
-    add_experiment(root, model)
+    add_common(root, model)
     _add_variables(root, model)
     _add_structure(root, model)
     return to_bytes(root)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import Enum
+from functools import cached_property
 
 import attrs
 
@@ -127,6 +128,24 @@ class VariableTable:
     def references(self, *blocks: str) -> list[int]:
         """Value references of blocks, in the order asked for."""
         return [self.offset(block) + index for block in blocks for index in range(len(self.blocks[block]))]
+
+    @cached_property
+    def _by_name(self) -> dict[str, int]:
+        return {variable.name: reference for reference, variable in enumerate(self.variables)}
+
+    def named(self, names: Collection[str]) -> list[int]:
+        """Value references of variables by name.
+
+        Raises
+        ------
+        CosimulationError
+            There is no such variable.
+        """
+        known = self._by_name
+        for name in names:
+            if variable_name(name) not in known:
+                raise CosimulationError(f"The FMU has no variable {name!r}.")
+        return [known[variable_name(name)] for name in names]
 
     def references_of(self, *kinds: Kind) -> list[int]:
         """Value references of all variables of some kinds, rising."""

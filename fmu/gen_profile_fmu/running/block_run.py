@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
 from typing import Any, Self
 
@@ -15,8 +15,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
 from gen_profile_fmu.running.instances import instance
 
 NO_NUMBER = -1  # a block's fault: a setpoint is none, or beyond all that a machine can follow
@@ -217,7 +216,7 @@ class _History(Structure):
     ]
 
 
-class _Found(Structure):
+class _Outcome(Structure):
     _fields_ = [
         *((name, POINTER(c_double)) for name in ("axes", "on_the_way", "residual", "trace")),
         ("copies", c_void_p),
@@ -242,7 +241,7 @@ class BlockFollower:
     """
 
     def __init__(self, fmu: PlantFmu) -> None:
-        self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
+        self._variables = fmu.variables
         self._loads = [v.name for v in fmu.variables.blocks["SWAY"]]
         self._setpoints = [v.name for v in fmu.variables.blocks["INPUTS"]]
         self._loop = _loop()
@@ -300,8 +299,8 @@ class BlockFollower:
         size = ctypes.sizeof(block.memory)
         copies = np.empty((len(marks), size), dtype=np.uint8)
         shown = np.zeros(0 if script.measured is None else len(script.measured.cycles))
-        found = _Found(
-            **{name: _doubles(array) for name, array in kept.items() if array.size},
+        outcome = _Outcome(
+            **{name: doubles(array) for name, array in kept.items() if array.size},
             copies=copies.ctypes.data,
             n_rows=rows,
         )
@@ -310,21 +309,21 @@ class BlockFollower:
             byref(self._fmu),
             byref(_called(block, script)),
             byref(self._history(script, values, led, hoists, marks=marks, shown=shown)),
-            _doubles(room),
-            byref(found),
+            doubles(room),
+            byref(outcome),
         )
-        if found.status:
+        if outcome.status:
             reason = " ".join(self._messages)
-            raise CosimulationError(f"The FMU could not go on after cycle {found.cycles}: {reason}")
+            raise CosimulationError(f"The FMU could not go on after cycle {outcome.cycles}: {reason}")
         return BlockRun(
             axes=tuple(
                 AxisExtremes(**dict(zip(_EXTREMES, row, strict=True))) for row in kept["axes"].tolist()
             ),
             on_the_way=kept["on_the_way"],
             residual=kept["residual"],
-            trace=kept["trace"][:, : found.cycles].T if rows else None,
+            trace=kept["trace"][:, : outcome.cycles].T if rows else None,
             copies=copies if marks else None,
-            **{name: getattr(found, name) for name in _SIMPLE},
+            **{name: getattr(outcome, name) for name in _SIMPLE},
         )
 
     def _history(
@@ -343,7 +342,7 @@ class BlockFollower:
             cycle=script.cycle,
             n_rows=len(start_cycles),
             start_cycles=start_cycles,
-            inputs=_doubles(script.inputs),
+            inputs=doubles(script.inputs),
             actual=(c_size_t * len(script.actual))(*script.actual),
             longest=script.longest,
             settle=script.settle,
@@ -371,18 +370,15 @@ class BlockFollower:
             return {"n_measured": 0}
         return {
             "n_measured": len(measured.cycles),
-            "measured": _doubles(measured.cycles),
+            "measured": doubles(measured.cycles),
             "quantity": self._numbers([measured.quantity])[0],
             "shows": measured.shows,
             "valid": measured.valid,
-            "shown": _doubles(shown),
+            "shown": doubles(shown),
         }
 
-    def _numbers(self, names: Mapping[str, float] | Sequence[str]) -> Any:
-        unknown = [name for name in names if variable_name(name) not in self._references]
-        if unknown:
-            raise CosimulationError(f"The FMU has no variable {unknown[0]!r}.")
-        return (c_uint * len(names))(*(self._references[variable_name(name)] for name in names))
+    def _numbers(self, names: Collection[str]) -> Any:
+        return unsigned(self._variables.named(names))
 
 
 _EXTREMES = [field.name for field in attrs.fields(AxisExtremes)]
@@ -407,14 +403,10 @@ def _called(block: CalledBlock, script: Script) -> _Block:
     )
 
 
-def _doubles(array: Array) -> Any:
-    return array.ctypes.data_as(POINTER(c_double))
-
-
 def _loop() -> Any:
     function = compiled_loops().block_run
     function.argtypes = [
-        *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Found)),
+        *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Outcome)),
     ]
     function.restype = None
     return function

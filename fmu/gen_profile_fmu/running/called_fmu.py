@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import Structure, c_void_p
+from collections.abc import Sequence
+from ctypes import POINTER, Structure, c_double, c_uint, c_void_p
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import fmpy
 
+from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
@@ -54,6 +56,16 @@ def called(slave: Any, version: Version) -> CalledFmu:
     for name in _FUNCTIONS[version]:
         setattr(fmu, name, ctypes.cast(getattr(slave.dll, name), c_void_p).value)
     return fmu
+
+
+def doubles(array: Array) -> Any:
+    """Point to the numbers of an array, which must outlive the call."""
+    return array.ctypes.data_as(POINTER(c_double))
+
+
+def unsigned(numbers: Sequence[int]) -> Any:
+    """Make an array of value references."""
+    return (c_uint * len(numbers))(*numbers)
 
 
 def loop_sources() -> dict[str, str]:

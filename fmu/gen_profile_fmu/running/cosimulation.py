@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, sizeof
-from typing import Any, Self
+from typing import Self
 
 import attrs
 import numpy as np
@@ -20,8 +20,7 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import called, compiled_loops
+from gen_profile_fmu.running.called_fmu import called, compiled_loops, doubles, unsigned
 from gen_profile_fmu.running.instances import Instance, instance
 
 # blocks of variables that are read after every step, and what a Response calls them
@@ -88,8 +87,8 @@ class PlantCosimulation:
         self._slave, self._messages = self._instance.slave, self._instance.messages
         self._called = called(self._slave, Version.FMI2)
         variables = self._fmu.variables
-        self._setpoints = _references(variables.references("INPUTS"))
-        self._outputs = _references(variables.references(*_OBSERVED))
+        self._setpoints = unsigned(variables.references("INPUTS"))
+        self._outputs = unsigned(variables.references(*_OBSERVED))
         self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in _OBSERVED])[:-1]
 
     def __enter__(self) -> Self:
@@ -159,8 +158,7 @@ class PlantCosimulation:
     ) -> None:
         """Start anew, at the first setpoint."""
         values = {**self._plant_values(parameters), **self._start_values(setpoints), **values}
-        table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}
-        references = [table[variable_name(name)] for name in values]
+        references = self._fmu.variables.named(values)
         if self._slave is None:
             raise CosimulationError("This co-simulation has been closed; make a new one.")
         with self._explained():
@@ -224,14 +222,14 @@ class PlantCosimulation:
             steps=len(steps.sizes),
             n_inputs=len(self._setpoints),
             n_outputs=len(self._outputs),
-            times=_doubles(steps.times),
-            sizes=_doubles(steps.sizes),
-            inputs=_doubles(np.ascontiguousarray(steps.setpoints)),
+            times=doubles(steps.times),
+            sizes=doubles(steps.sizes),
+            inputs=doubles(np.ascontiguousarray(steps.setpoints)),
             input_references=self._setpoints,
             output_references=self._outputs,
         )
         self._messages.clear()
-        done = loop(byref(self._called), byref(plan), _doubles(samples))
+        done = loop(byref(self._called), byref(plan), doubles(samples))
         if done < len(samples):
             raise self._refusal(f"it refused the step at {steps.times[max(done - 1, 0)]:g} s.")
         return samples
@@ -271,11 +269,3 @@ def _steps(
         sizes=np.concatenate((np.full(len(moving) - 1, cycle), np.full(len(held), hold))),
         setpoints=np.concatenate((setpoints.position[1:], last)),
     )
-
-
-def _references(references: Any) -> Any:
-    return (c_uint * len(references))(*references)
-
-
-def _doubles(array: Array) -> Any:
-    return array.ctypes.data_as(POINTER(c_double))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
 from typing import Any, Self
@@ -14,8 +14,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
 from gen_profile_fmu.running.instances import instance
 
 
@@ -56,7 +55,7 @@ class ManyRuns:
     """
 
     def __init__(self, fmu: PlantFmu, version: Version, *, workers: int = 1) -> None:
-        self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
+        self._variables = fmu.variables
         self._workers = [_Worker(fmu, version) for _ in range(workers)]
         self._threads = ThreadPoolExecutor(workers)  # which start when they are needed
 
@@ -113,36 +112,27 @@ class ManyRuns:
             n_inputs=len(inputs),
             n_parameters=len(parameters),
             n_outputs=len(outputs),
-            input_references=self._numbers(inputs),
-            parameter_references=self._numbers(parameters),
-            output_references=self._numbers(outputs),
+            input_references=unsigned(self._variables.named(inputs)),
+            parameter_references=unsigned(self._variables.named(parameters)),
+            output_references=unsigned(self._variables.named(outputs)),
             n_components=components,
             since=since * (1.0 - 1e-12),
         )
         return self._run(plan, np.empty((given.runs, len(outputs) + (components > 0))))
 
-    def _run(self, plan: _Plan, found: Array) -> Array:
+    def _run(self, plan: _Plan, rows: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""
-        edges = [len(found) * number // len(self._workers) for number in range(len(self._workers) + 1)]
+        edges = [len(rows) * number // len(self._workers) for number in range(len(self._workers) + 1)]
         shares = list(zip(self._workers, edges, edges[1:], strict=False))
         if len(shares) == 1:
-            reached = [self._workers[0].run(plan, 0, len(found), found)]
+            reached = [self._workers[0].run(plan, 0, len(rows), rows)]
         else:
-            reached = list(self._threads.map(lambda part: part[0].run(plan, *part[1:], found), shares))
+            reached = list(self._threads.map(lambda part: part[0].run(plan, *part[1:], rows), shares))
         for run, (worker, _, end) in zip(reached, shares, strict=True):
             if run < end:
                 reason = " ".join(worker.messages)
                 raise CosimulationError(f"The FMU could not go on in run {run}, counted from 0: {reason}")
-        return found
-
-    def _numbers(self, names: Iterable[str]) -> Any:
-        references = []
-        for name in names:
-            reference = self._references.get(variable_name(name))
-            if reference is None:
-                raise CosimulationError(f"The FMU has no variable {name!r}.")
-            references.append(reference)
-        return (c_uint * len(references))(*references)
+        return rows
 
 
 class _Worker:
@@ -154,11 +144,11 @@ class _Worker:
         self.messages = self._instance.messages
         self._fmu = called(self._instance.slave, version)
 
-    def run(self, plan: _Plan, first: int, end: int, found: Array) -> int:
+    def run(self, plan: _Plan, first: int, end: int, rows: Array) -> int:
         """Fill rows of what is to be found; the first bad run, or `end`."""
         self.messages.clear()
         room = np.empty(plan.n_outputs)
-        return int(self._loop(byref(self._fmu), byref(plan), first, end, _doubles(room), _doubles(found)))
+        return int(self._loop(byref(self._fmu), byref(plan), first, end, doubles(room), doubles(rows)))
 
     def close(self) -> None:
         """Give the instance back."""
@@ -203,11 +193,7 @@ def _stacked(what: str, arrays: Mapping[str, Array], length: int) -> Array:
 
 
 def _per_run(rows: Array) -> _PerRun:
-    return _PerRun(values=_doubles(rows), size=rows[0].size if len(rows) > 1 else 0)
-
-
-def _doubles(array: Array) -> Any:
-    return array.ctypes.data_as(POINTER(c_double))
+    return _PerRun(values=doubles(rows), size=rows[0].size if len(rows) > 1 else 0)
 
 
 def _loop() -> Any:

@@ -46,7 +46,7 @@ def print_warnings(sentences: Iterable[str]) -> None:
     said = click.get_current_context().meta.setdefault(f"{__name__}.said", set())
     for sentence in sentences:
         if sentence not in said:
-            click.echo(f"Beware: {sentence}", err=True)
+            click.echo(f"Warning: {sentence}", err=True)
         said.add(sentence)
 
 

@@ -81,14 +81,7 @@ def sweep(
     text = chosen.text()
     store = prepare(text, chosen.overrides, parse_grid(axes), formats, folder)
     with progress() as tell:
-        done = run(
-            store,
-            scheduler=scheduler,
-            workers=workers,
-            progress=lambda at: tell(
-                "designing cases", at.done, at.total, f"{at.failed} failed" if at.failed else ""
-            ),
-        )
+        done = run(store, scheduler=scheduler, workers=workers, progress=tell)
     print_outcome(done.to_dict(), words.sweep(done), as_json)
 
 

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from gen_profile.certificate.document import certificate_path
 from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, named, number
+from gen_profile.units import RATES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from gen_profile.verification.verdict import Check
 
 
-MOTION_LIMITS = ("velocity", "acceleration", "jerk")
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
 RESTS = 0.5  # of a half-range, from which on 1 % of another parameter is worth a word
@@ -187,7 +187,7 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
     limits = ", ".join(
         f"{axis.name} {name} {100.0 * document['limits'][axis.prefix + name]:.4g} %".lstrip()
         for axis in proof.worst.history.axes.values()
-        for name in MOTION_LIMITS
+        for name in RATES
     )
     return [
         *groups,
@@ -282,7 +282,7 @@ def identification(identified: Identification, path: Path) -> str:
         taken = f" ({row['averages']} averages over {row['lasts_s']:.4g} s)" if row["averages"] else ""
         samples = f"{row['samples']} samples of its {row['quantity']}{taken}"
         rows.append((f"log of {row['load']}", f"{samples}, {sizes}"))
-    rows += [("BEWARE", sentence) for sentence in identified.warnings()]
+    rows += [("WARNING", sentence) for sentence in identified.warnings()]
     rows += [*_stated_ranges(identified), *_rests(identified)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
     return _block(identified.spec.name, rows)
@@ -395,16 +395,16 @@ def _move(spec: Spec) -> str:
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:
-    from gen_profile.motion.metrics import greatest
+    from gen_profile.evaluation.demands import demands
 
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
-    axes, command = outcome.spec.machine().actuated, outcome.plan.evaluation.command
-    rows = []
-    for index, axis in enumerate(axes):
-        powers = zip((1, 2, 3), ("s", "s²", "s³"), strict=True)
-        peaks = [f"{greatest(command, order, index):.4g} {axis.unit}/{time}" for order, time in powers]
-        rows.append((kind if len(axes) == 1 else f"{kind}, {axis.name}", ", ".join(peaks)))
-    return rows
+    peaks: dict[str, list[str]] = {}
+    for one in demands(outcome.spec, outcome.plan.evaluation.command):
+        peaks.setdefault(one.axis.name, []).append(f"{one.asked:.4g} {one.unit}")
+    return [
+        (kind if len(peaks) == 1 else f"{kind}, {axis}", ", ".join(of_axis))
+        for axis, of_axis in peaks.items()
+    ]
 
 
 def _verdict(check: Check | None) -> str:

@@ -19,6 +19,7 @@ from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec.model import Spec
+from gen_profile.spec.values import NONE
 
 SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
 # what a robustness method is called, and its keys in the spec
@@ -40,11 +41,14 @@ class Candidate:
         Raises a `GenProfileError` where the method has no motion for the move.
     requirements : str
         Candidates of the same requirements have a motion all or none; empty where that says nothing.
+    changes : mapping of str to value
+        By which a spec asks for the method, by their places in it; none for its own one.
     """
 
     method: str
     design: Callable[[], Profile]
     requirements: str = ""
+    changes: Mapping[str, Any] = NONE
 
 
 def own_method(spec: Spec) -> str:
@@ -77,25 +81,29 @@ def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
             raise SpecError(f"Two motions are called {motion.method!r}; give yours another method.")
         known.append(motion.method)
     for name in SHAPERS:
-        yield Candidate(method=name, design=partial(shaped_motion, spec, name))
-    if spec.solver.shaper is not None:
-        spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
+        changes = {} if name == spec.solver.shaper else {"solver.method": name}
+        yield Candidate(method=name, design=partial(shaped_motion, spec, name), changes=changes)
     yield from _optimal_candidates(spec)
     for motion in own:
         yield Candidate(method=motion.method, design=partial(_given, motion))
 
 
 def _optimal_candidates(spec: Spec) -> Iterator[Candidate]:
+    unshaped = {} if spec.solver.shaper is None else {"solver.method": "auto"}
+    spec = spec.changed(unshaped)
     once = cache(partial(timed, spec))  # the shortest duration does not depend on β
     of_spec = cache(partial(_attempt, once))
     weight = spec.cost.sway_weight
     for other in sorted({*SWAY_WEIGHTS, weight}):
         name = own_method(spec) if other == weight else f"optimal-beta{other:g}"
         design = partial(_result, of_spec) if other == weight else partial(_weighed, once, other)
-        yield Candidate(method=name, design=design, requirements="the spec's own")
+        changes = unshaped if other == weight else {**unshaped, "cost.sway_weight": other}
+        yield Candidate(method=name, design=design, requirements="the spec's own", changes=changes)
     for kind, keys in _other_robustness(spec).items():
         robust = attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, **keys))
-        yield Candidate(method=f"optimal-{kind}", design=partial(_optimal_within, robust, of_spec))
+        changes = {**unshaped, **{f"robustness.{key}": value for key, value in keys.items()}}
+        design = partial(_optimal_within, robust, of_spec)
+        yield Candidate(method=f"optimal-{kind}", design=design, changes=changes)
 
 
 def _given(motion: Profile) -> Profile:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +32,15 @@ class ComparedMethod:
     figures : dict of str to float
     safe : bool
         Whether every load keeps its limit of residual sway on all machines.
+    changes : mapping of str to value
+        By which a spec asks for the method, as of `gen_profile.comparison.candidates.Candidate`.
     """
 
     method: str
     evaluation: MotionEvaluation
     figures: dict[str, float]
     safe: bool
+    changes: Mapping[str, Any]
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -178,6 +181,7 @@ def _row(spec: Spec, candidate: Candidate) -> ComparedMethod:
         evaluation=evaluation,
         figures=evaluation.figures,
         safe=keeps_residual_sway(spec, evaluation),
+        changes=candidate.changes,
     )
 
 

@@ -133,9 +133,9 @@ def _proved(table: BlockTable, box: Mailbox, buffer: int, held: bool, progress: 
             "that was in use before, as deployments.json tells, or deploy it without rollback."
         )
     progress("reading the table back")
-    found = box.read(buffer, len(table.values))
-    require_same(found, table.values)
-    judgement = table.check(found, progress)
+    values = box.read(buffer, len(table.values))
+    require_same(values, table.values)
+    judgement = table.check(values, progress)
     if not judgement.check.passed:
         raise CheckFailed(*judgement.check.reasons())
     require_same(box.read(buffer, len(table.values)), table.values)
@@ -193,10 +193,10 @@ def require_fit(table: BlockTable, status: BlockStatus) -> None:
     """
     layout = LAYOUT_NAMES[table.constant("cLayout")]
     cycle = table.spec.export.cycle_time
-    found = LAYOUT_NAMES[status.layout] if 0 <= status.layout < len(LAYOUT_NAMES) else "unknown"
+    shown = LAYOUT_NAMES[status.layout] if 0 <= status.layout < len(LAYOUT_NAMES) else "unknown"
     due = {
         "version": (status.interface, INTERFACE),
-        "table's layout": (found, layout),
+        "table's layout": (shown, layout),
         "number of axes": (status.axes, len(table.spec.axis_scales())),
         "cycle time in s": (status.cycle_time, cycle),
     }

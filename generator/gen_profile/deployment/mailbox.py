@@ -220,24 +220,24 @@ def _understood(reply: Array, count: int) -> tuple[BlockStatus, Array]:
     return status, reply[FIRST : FIRST + count].copy()
 
 
-def differing(found: Array, due: Array) -> list[int]:
+def differing(held: Array, due: Array) -> list[int]:
     """List the places where values differ in any bit."""
-    return np.flatnonzero(found.view(np.uint64) != due.view(np.uint64)).tolist()
+    return np.flatnonzero(held.view(np.uint64) != due.view(np.uint64)).tolist()
 
 
-def require_same(found: Array, due: Array, place: int = 0) -> None:
+def require_same(held: Array, due: Array, place: int = 0) -> None:
     """Hold values that were read back to those that were written, bit for bit.
 
     Raises
     ------
     DeploymentError
     """
-    places = differing(found, due)
+    places = differing(held, due)
     if not places:
         return
     first = places[0]
-    words = f"value {place + first} is {float(found[first])!r} there, not {float(due[first])!r}"
-    if (found == due.astype(np.float32)).all():
+    words = f"value {place + first} is {float(held[first])!r} there, not {float(due[first])!r}"
+    if (held == due.astype(np.float32)).all():
         words += ": something on the way rounds to REAL"
     raise DeploymentError(
         f"{len(places)} of {len(due)} values were altered on the way ({words}); let the controller show "

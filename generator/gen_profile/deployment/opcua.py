@@ -150,8 +150,8 @@ class OpcUaLink:
             client.set_user(access.user)
             client.set_password(access.password)
         await client.connect()
-        found = [one async for one in _instances(client)]
-        path, nodes = _chosen(found, access.instance, access.url)
+        instances = [one async for one in _instances(client)]
+        path, nodes = _chosen(instances, access.instance, access.url)
         self._request, self._reply, self._state = nodes
         self.instance = path
         for node, name in ((self._request, REQUEST), (self._reply, REPLY)):
@@ -167,10 +167,10 @@ class OpcUaLink:
         access = self._access
         offered = await client.connect_and_get_server_endpoints()
         mode = getattr(ua.MessageSecurityMode, MODES[access.security])
-        found = {one.SecurityPolicyUri.rpartition("#")[2].replace("_", ""): one for one in offered
+        by_policy = {one.SecurityPolicyUri.rpartition("#")[2].replace("_", ""): one for one in offered
                  if one.SecurityMode == mode}  # fmt: skip
-        name = next((name for name in POLICIES if name in found), None)
-        if access.certificate is None and "None" in found:
+        name = next((name for name in POLICIES if name in by_policy), None)
+        if access.certificate is None and "None" in by_policy:
             self.server = {"policy": "None", "certificate_sha256": "", "user": ""}
             return
         if access.certificate is None or name is None:
@@ -179,7 +179,7 @@ class OpcUaLink:
                 f"{access.url} offers no {access.security} with a policy that is still held to be safe, only "
                 f"{', '.join(modes)}; enable it there, or ask for the security that there is."
             )
-        der = found[name].ServerCertificate
+        der = by_policy[name].ServerCertificate
         shown = fingerprint(der)
         if shown != _plain(access.fingerprint):
             asked = "another one than was named" if access.fingerprint else "not known here yet"
@@ -212,14 +212,16 @@ def _plain(text: str) -> str:
 
 def _doubles(value: Any, name: str) -> Array:
     """Take an array of doubles, and nothing that was converted to another type."""
-    found = value.Value
-    if found is None or found.VariantType != ua.VariantType.Double or not isinstance(found.Value, list):
-        kind = "nothing" if found is None else f"{'array' if isinstance(found.Value, list) else 'value'} of "
-        type_ = "" if found is None else found.VariantType.name
+    variant = value.Value
+    if variant is None or variant.VariantType != ua.VariantType.Double or not isinstance(variant.Value, list):
+        kind = (
+            "nothing" if variant is None else f"{'array' if isinstance(variant.Value, list) else 'value'} of "
+        )
+        type_ = "" if variant is None else variant.VariantType.name
         raise DeploymentError(
             f"{name} is {kind}{type_} there, not an array of Double; let the server show it as LREAL."
         )
-    return np.array(found.Value, dtype=np.float64)
+    return np.array(variant.Value, dtype=np.float64)
 
 
 async def _instances(client: Any) -> Any:
@@ -242,12 +244,12 @@ async def _instances(client: Any) -> Any:
         level = below if len(seen) < MOST_NODES else []
 
 
-def _chosen(found: list[tuple[str, Any]], instance: str, url: str) -> tuple[str, Any]:
-    fitting = [one for one in found if f"/{one[0]}".endswith(f"/{instance}" if instance else "")]
+def _chosen(instances: list[tuple[str, Any]], instance: str, url: str) -> tuple[str, Any]:
+    fitting = [one for one in instances if f"/{one[0]}".endswith(f"/{instance}" if instance else "")]
     if len(fitting) == 1:
         return fitting[0]
-    paths = ", ".join(one[0] for one in found)
-    if not found:
+    paths = ", ".join(one[0] for one in instances)
+    if not instances:
         raise DeploymentError(
             f"{url} shows no block with {REQUEST} and {REPLY}: load one that was exported with "
             'export.plc_tables = "variables", and let the server show these two arrays of its instance.'

@@ -69,7 +69,7 @@ class SimulatedBlock:
 
 def _places(elements: Iterable[str]) -> dict[str, list[int]]:
     """Gather the places of each variable's elements: those of ``a[0]`` and ``a[1]`` under ``a``."""
-    found: dict[str, list[int]] = {}
+    places: dict[str, list[int]] = {}
     for number, name in enumerate(elements):
-        found.setdefault(name.partition("[")[0], []).append(number)
-    return found
+        places.setdefault(name.partition("[")[0], []).append(number)
+    return places

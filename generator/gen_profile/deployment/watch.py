@@ -146,20 +146,20 @@ class Judge:
     def _require_setpoints(self, state: BlockState) -> None:
         """Compare with the table where the motion is, and with rest where nothing moves."""
         due = self._due(state)
-        found = state.setpoints
+        issued = state.setpoints
         with np.errstate(invalid="ignore"):
-            near = np.abs(found - due) <= LAST_DIGITS * self._span(state)
+            near = np.abs(issued - due) <= LAST_DIGITS * self._span(state)
         follows = state.phase in (MOVING, DONE, ABORTED)
         near |= np.isnan(due)
         if not near.all():
             at = tuple(np.argwhere(~near)[0])
             raise CheckFailed(
-                f"The {QUANTITIES[at[0]]} of {self._axes[at[1]]} is {float(found[at])!r} in cycle "
+                f"The {QUANTITIES[at[0]]} of {self._axes[at[1]]} is {float(issued[at])!r} in cycle "
                 f"{state.place:.10g} of the motion, and {float(due[at])!r} by {self._name}: these are not "
                 "the setpoints that were proved."
             )
         self.seen.moving += follows
-        self.seen.exact += follows and bool((found == due).all())  # which for numbers are bits, zero apart
+        self.seen.exact += follows and bool((issued == due).all())  # which for numbers are bits, zero apart
 
     def _due(self, state: BlockState) -> Array:
         """Give the setpoints of a state, not a number where any is right, shape (3, axes)."""

@@ -13,11 +13,11 @@ from gen_profile.problem.limits import rounded_down, rounded_up
 from gen_profile.proof.verdict import TAKEN_BACK, Proof
 from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
+from gen_profile.units import RATES
 
 # the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 UNKNOWN = 1.25  # times the limit: at least so much a block counts that takes its promise back
-WHAT_MOVES = ("velocity", "acceleration", "jerk")
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 
@@ -67,7 +67,7 @@ def _tried(
 
 def _slower(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated, axes = spec.limits.stated(), planned_axes(spec)
-    places = dict.fromkeys(spec.limits.place(axis, name) for axis in axes for name in WHAT_MOVES)
+    places = dict.fromkeys(spec.limits.place(axis, name) for axis in axes for name in RATES)
     values = {place: float(rounded_down(factor * stated[place], digits=2)) for place in places}
     return spec.changed(values), values
 

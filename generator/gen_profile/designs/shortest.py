@@ -156,9 +156,9 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
     return None if duration is None else exact[duration]
 
 
-def _drafted(spec: Spec, found: Relaxed) -> Draft:
+def _drafted(spec: Spec, relaxed: Relaxed) -> Draft:
     """Take a shortest motion within limits, its duration rounded up to a cycle."""
-    return drafted(lasting(spec, in_cycles(spec, found.duration)), found.solution)
+    return drafted(lasting(spec, in_cycles(spec, relaxed.duration)), relaxed.solution)
 
 
 def _slow(spec: Spec) -> Spec:

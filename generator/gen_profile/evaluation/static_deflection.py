@@ -84,18 +84,18 @@ def static_deflection(
         The force is so great that the loads come to rest nowhere.
     """
     rows, loads = parameter_rows(plant, list(machines.values())), len(plant.loads)
-    found = np.zeros((len(rows), loads))
+    held = np.zeros((len(rows), loads))
     for direction in range(loads)[plant.end_load]:
         pushed = _deflected(plant, rows, q_a, force * np.eye(loads)[direction])
         # what the force does not act along, of a load in another direction, is not its deflection
         alike = slice(direction % plant.directions, None, plant.directions)
-        found[:, alike] = pushed[:, alike]
-    if not np.isfinite(found).all():
+        held[:, alike] = pushed[:, alike]
+    if not np.isfinite(held).all():
         raise SpecError(
             f"check.wind.force: {force:g} N hold the {plant.end_load_name} nowhere; state the force in N."
         )
-    worst = int(np.argmax(found[:, plant.end_load].max(axis=1)))
-    by_load = dict(zip(plant.loads, map(float, found[worst]), strict=True))
+    worst = int(np.argmax(held[:, plant.end_load].max(axis=1)))
+    by_load = dict(zip(plant.loads, map(float, held[worst]), strict=True))
     return StaticDeflection(force=force, machine=list(machines)[worst], loads=by_load)
 
 

@@ -32,7 +32,7 @@ CHANCE = 1e-3  # how rarely good readings may look contradictory
 INDISTINCT = 1e-6  # relative size of a combination of parameters that no measurement depends on
 ZEROS = 32  # of a sensor that are tried, all over one step of its resolution
 STRAIGHT = 0.1  # how far residuals may be from straight lines, in shares of a range
-ENOUGH = 0.95  # of how much worse the fit shall be at a range's ends
+REACHED = 0.95  # of how much worse the fit shall be at a range's ends
 WIDENINGS = 6
 PINNED = 1e-3  # of a standard deviation, by which a parameter may leave its place
 
@@ -129,7 +129,7 @@ class Uncertainty:
             worse = self._best_at(index, place) - best
             deviations = math.sqrt(max(worse, 0.0)) / widening
             useless = half > WIDEST * abs(self.unknowns[index]) > 0.0
-            if deviations >= ENOUGH * factor or place in (lower, upper) or useless:
+            if deviations >= REACHED * factor or place in (lower, upper) or useless:
                 break
             half *= min(factor / max(deviations, 1e-9), 2.0)
         return half

@@ -24,6 +24,7 @@ from gen_profile.planner.machine import (
 )
 from gen_profile.planner.sensor import between, damping_room, sensor_constants
 from gen_profile.spec.model import Spec
+from gen_profile.units import RATES
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
 from gen_profile_exporters.planner.block import (
     SLOTS_PER_PERIOD,
@@ -168,7 +169,7 @@ def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
     template = "required{of} for a planner block, which keeps it in every motion"
     faults: list[str] = [
         placed(f"limits.{name}", Phrase(template, of=of))
-        for name in ("velocity", "acceleration", "jerk", "travel")
+        for name in (*RATES, "travel")
         if getattr(own, name) is None
     ]
     if quick and own.acceleration and quick < own.acceleration:

@@ -20,6 +20,9 @@ from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import digest
 from gen_profile_fmu.running.block_run import CalledBlock
+from gen_profile_fmu.running.called_fmu import doubles
+
+LOOP = Path(__file__).with_name("block_loop.c").read_text("ascii")  # over cycles
 
 
 class BlockInstance:
@@ -91,7 +94,7 @@ class BlockInstance:
         given = np.ascontiguousarray(inputs, dtype=np.float64)
         issued = np.empty((len(given), len(self._translation.outputs)))
         play = self._library.instance_play
-        require_sound(play(self._memory, _doubles(given), len(given), _doubles(issued)))
+        require_sound(play(self._memory, doubles(given), len(given), doubles(issued)))
         return issued
 
 
@@ -111,10 +114,6 @@ def require_sound(fault: int) -> None:
         raise ExportError(f"The function block {FAULTS[fault]}; its text was altered.")
 
 
-def _doubles(array: Array) -> ctypes._Pointer[c_double]:
-    return array.ctypes.data_as(POINTER(c_double))
-
-
 @lru_cache(maxsize=4)
 def _loaded(text: str) -> tuple[Translation, ctypes.CDLL]:
     translation = translate(text)
@@ -126,23 +125,7 @@ def _compiled(translation: Translation) -> ctypes.CDLL:
     block, library = translation.name, f"block{fmpy.sharedLibraryExtension}"
     taken = "".join(f"        fb->{v.name} = *inputs++;\n" for v in translation.inputs)
     given = "".join(f"        *outputs++ = fb->{v.name};\n" for v in translation.outputs)
-    loop = f"""\
-#define CHECKED
-#include "{block}.c"
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-EXPORT long instance_size(void) {{ return sizeof({block}); }}
-EXPORT void instance_init({block} *fb) {{ {block}_init(fb); }}
-EXPORT int instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
-    for (long cycle = 0; cycle < cycles && fb->fault_ == 0; ++cycle) {{
-{taken}        {block}_step(fb);
-{given}    }}
-    return fb->fault_;
-}}
-"""
+    loop = LOOP.replace("BLOCK", block).replace("TAKEN", taken).replace("GIVEN", given)
     texts = {f"{block}.h": translation.header, f"{block}.c": translation.source, "loop.c": loop}
     compiler = find_compiler()
 

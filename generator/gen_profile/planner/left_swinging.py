@@ -71,15 +71,15 @@ class GivenModes:
         poles = self.poles.ravel()
         starts = [0, *ends[:-1]]
         wave = _wave(poles * cycle, 1 + max(end - begin for begin, end in zip(starts, ends, strict=True)))
-        left, found = np.zeros((len(acceleration), len(poles)), dtype=np.complex128), []
+        left, over_time = np.zeros((len(acceleration), len(poles)), dtype=np.complex128), []
         for begin, end in zip(starts, ends, strict=True):
             passed = acceleration[:, begin + 1 : end + 1][:, ::-1] @ wave[: end - begin].view(np.float64)
             left = left * wave[end - begin] + passed.view(np.complex128)
-            found.append(left)
+            over_time.append(left)
         half = (
             0.5 * poles * cycle
         )  # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
-        by_mode = np.abs(np.array(found) * cycle * (np.sinh(half) / half) ** 2 / poles)
+        by_mode = np.abs(np.array(over_time) * cycle * (np.sinh(half) / half) ** 2 / poles)
         swings = self.gains[..., None] * by_mode.reshape(len(ends), *self.gains.shape, -1)
         return swings[..., 0].sum(axis=(1, 2)), swings.max(axis=-1).sum(axis=(1, 2))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypedDict, Unpack
 
 import attrs
 import numpy as np
@@ -28,6 +28,13 @@ OWN = {  # of each axis
     "stop_distance": "fStopDistance",
 }
 COMMON = {"busy": "bBusy", "done": "bDone", "promise": "bPromise", "error_id": "nErrorId"}
+OF_AXES: dict[
+    Literal["target", "velocity", "velocity_limit"], str
+] = {  # inputs of each, by what a caller gives
+    "target": "fTarget",
+    "velocity": "fVelocityCommand",
+    "velocity_limit": "fVelocityLimit",
+}
 ZONES = ("aBlockedLow", "aBlockedHigh", "aSlowLow", "aSlowHigh", "aSlowLimit")
 KINDS = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
 
@@ -76,9 +83,33 @@ class SetpointHistory:
     outputs: Mapping[str, NDArray[Any]] = attrs.field(repr=False)
 
 
-@attrs.frozen(kw_only=True)
-class _Orders:
-    """What a caller gave; None is for what goes on as it was."""
+class Orders(TypedDict, total=False):
+    """What a caller may give for one cycle or many; what is left out goes on as it was.
+
+    Attributes
+    ----------
+    target : float or (axes,) array
+        m (or rad), to move to.
+    velocity : float or (axes,) array
+        m/s, to follow, as of a stick; over many cycles also (cycles,) or (cycles, axes), its history.
+    stop : bool
+        Whether to stop without sway.
+    quick_stop : bool
+        Whether to brake at once: the load swings. At most one of these four; the command before goes on
+        where there is none.
+    reset : bool
+        Whether to acknowledge an error that stopped a command.
+    load_at_rest : bool
+        Whether the load was seen to hang still, as some time after a quick stop: the promise holds again.
+    live : mapping of str to float or (cycles,) array
+        Live parameters that change, by name, in their SI units; an array changes on the way.
+    override : float
+        Share of the greatest velocity. It holds, and so does the next.
+    velocity_limit : float or (axes,) array
+        m/s; 0 for none but the machine's.
+    sensor : float or (cycles,) array
+        What the sensor shows in every cycle, in its unit; there is no news where it is not given.
+    """
 
     target: ArrayLike | None
     velocity: ArrayLike | None
@@ -203,45 +234,13 @@ class Planner:
                 )
             self._inputs |= dict.fromkeys(places, 0.0) | dict(zip(places, values, strict=False))
 
-    def step(
-        self,
-        *,
-        target: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        stop: bool = False,
-        quick_stop: bool = False,
-        reset: bool = False,
-        load_at_rest: bool = False,
-        live: Mapping[str, float] | None = None,
-        override: float | None = None,
-        velocity_limit: ArrayLike | None = None,
-        sensor: float | None = None,
-    ) -> Setpoint:
+    def step(self, **orders: Unpack[Orders]) -> Setpoint:
         """Issue the setpoint of the next cycle.
 
         Parameters
         ----------
-        target : float or (axes,) array, optional
-            m (or rad), to move to.
-        velocity : float or (axes,) array, optional
-            m/s, to follow, as of a stick.
-        stop : bool
-            Whether to stop without sway.
-        quick_stop : bool
-            Whether to brake at once: the load swings. At most one of these four; the command before goes on
-            where there is none.
-        reset : bool
-            Whether to acknowledge an error that stopped a command.
-        load_at_rest : bool
-            Whether the load was seen to hang still, as some time after a quick stop: the promise holds again.
-        live : mapping of str to float, optional
-            Live parameters that change, by name, in their SI units.
-        override : float, optional
-            Share of the greatest velocity. It holds, and so does the next.
-        velocity_limit : float or (axes,) array, optional
-            m/s; 0 for none but the machine's.
-        sensor : float, optional
-            What the sensor shows in this cycle, in its unit; there is no news where it is not given.
+        **orders
+            See `Orders`.
 
         Raises
         ------
@@ -249,18 +248,6 @@ class Planner:
             More than one command, a parameter that is not live, or what is no number. A number out of range,
             or nan, is the planner's to refuse: by ``error_id``.
         """
-        orders = _Orders(
-            target=target,
-            velocity=velocity,
-            stop=stop,
-            quick_stop=quick_stop,
-            reset=reset,
-            load_at_rest=load_at_rest,
-            live=live,
-            override=override,
-            velocity_limit=velocity_limit,
-            sensor=sensor,
-        )
         issued = self._issue(orders, 1)
         outputs = {name: column.item() for name, column in issued.items()}
         own = {name: self._own(output, issued)[0] for name, output in OWN.items()}
@@ -270,35 +257,15 @@ class Planner:
             **own, **{name: outputs[name_in_block] for name, name_in_block in COMMON.items()}, outputs=outputs
         )
 
-    def hold(
-        self,
-        seconds: float,
-        *,
-        target: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        stop: bool = False,
-        quick_stop: bool = False,
-        reset: bool = False,
-        load_at_rest: bool = False,
-        live: Mapping[str, ArrayLike] | None = None,
-        override: float | None = None,
-        velocity_limit: ArrayLike | None = None,
-        sensor: ArrayLike | None = None,
-    ) -> SetpointHistory:
+    def hold(self, seconds: float, **orders: Unpack[Orders]) -> SetpointHistory:
         """Issue the setpoints of many cycles, in a compiled loop.
 
         Parameters
         ----------
         seconds : float
             For how long, in whole cycles.
-        target, stop, quick_stop, reset, load_at_rest, override, velocity_limit
-            As of `step`.
-        velocity : float, (cycles,) array, or (axes,) or (cycles, axes) array, optional
-            m/s; over the cycles it is the history of a stick.
-        live : mapping of str to float or (cycles,) array, optional
-            As of `step`; an array changes on the way.
-        sensor : float or (cycles,) array, optional
-            Likewise.
+        **orders
+            See `Orders`.
 
         Raises
         ------
@@ -309,18 +276,6 @@ class Planner:
         cycles = round(exact) if math.isfinite(exact) else 0
         if cycles < 1:
             raise SpecError(f"seconds: at least one cycle of {self.cycle_time:g} s, found {seconds!r}.")
-        orders = _Orders(
-            target=target,
-            velocity=velocity,
-            stop=stop,
-            quick_stop=quick_stop,
-            reset=reset,
-            load_at_rest=load_at_rest,
-            live=live,
-            override=override,
-            velocity_limit=velocity_limit,
-            sensor=sensor,
-        )
         issued = self._issue(orders, cycles)
         return SetpointHistory(
             outputs=issued,
@@ -333,7 +288,7 @@ class Planner:
         columns = [issued[axis.of(output)] for axis in self._axes]
         return np.stack(columns, axis=1) if len(columns) > 1 else columns[0]
 
-    def _issue(self, orders: _Orders, cycles: int) -> dict[str, NDArray[Any]]:
+    def _issue(self, orders: Orders, cycles: int) -> dict[str, NDArray[Any]]:
         """Call the block; nothing has changed where the orders are refused."""
         columns = self._columns(orders, cycles)
         rows = np.tile(list(self._inputs.values()), (cycles, 1))
@@ -348,24 +303,22 @@ class Planner:
             for name, column in zip(self._block.outputs, issued, strict=True)
         }
 
-    def _columns(self, orders: _Orders, cycles: int) -> dict[str, Array]:
+    def _columns(self, orders: Orders, cycles: int) -> dict[str, Array]:
         """Give the inputs that orders change, a value per cycle."""
-        commands = (orders.target is not None, orders.velocity is not None, orders.stop, orders.quick_stop)
-        if sum(commands) > 1:
+        if unknown := sorted(orders.keys() - Orders.__annotations__.keys()):
+            raise TypeError(
+                f"The planner takes no {unknown[0]!r}{suggestion(unknown[0], Orders.__annotations__)}"
+            )
+        if sum(_commands(orders).values()) > 1:
             raise SpecError("Planner: give one of target, velocity, stop and quick_stop, not several.")
-        own = {
-            "fTarget": ("target", orders.target),
-            "fVelocityCommand": ("velocity", orders.velocity),
-            "fVelocityLimit": ("velocity_limit", orders.velocity_limit),
-        }
         columns: dict[str, Array] = {}
-        for name, (what, value) in own.items():
-            if value is not None:
+        for what, name in OF_AXES.items():
+            if (value := orders.get(what)) is not None:
                 columns |= _columns_of(name, what, value, self._axes, cycles)
-        if orders.override is not None:
-            columns["rOverride"] = _column("override", orders.override, cycles)
-        columns |= self._sensed(orders.sensor, cycles)
-        for name, value in (orders.live or {}).items():
+        if (override := orders.get("override")) is not None:
+            columns["rOverride"] = _column("override", override, cycles)
+        columns |= self._sensed(orders.get("sensor"), cycles)
+        for name, value in (orders.get("live") or {}).items():
             if name not in self._live:
                 raise SpecError(
                     f"live: the planner has no live parameter {name!r}{suggestion(name, self._live)}"
@@ -382,26 +335,21 @@ class Planner:
             raise SpecError("sensor: the planner has none; state planner.sensor.")
         return {value: _column("sensor", shown, cycles), valid: np.ones(1)}
 
-    def _command(self, orders: _Orders, columns: dict[str, Array]) -> None:
+    def _command(self, orders: Orders, columns: dict[str, Array]) -> None:
         """Let another command take the place of the one that holds; one that was stopped is given anew."""
-        noted = {"bReset": orders.reset, "bLoadAtRest": orders.load_at_rest}
-        columns |= {name: np.full(1, float(is_so)) for name, is_so in noted.items() if name in self._inputs}
-        if orders.reset:
+        reset, commands = orders.get("reset", False), _commands(orders)
+        levels = {"bReset": reset, "bLoadAtRest": orders.get("load_at_rest", False)}
+        if reset:
             self._target = None
-        if orders.target is not None:
+        if commands.pop("bExecute"):
             target = [float(columns[axis.of("fTarget")][0]) for axis in self._axes]
             self._is_due = self._is_due or target != self._target
             self._target = target
-        elif orders.velocity is not None or orders.stop or orders.quick_stop:
+            levels |= commands
+        elif any(commands.values()):
             self._is_due, self._target = False, None
-        else:
-            return
-        moves = {
-            "bVelocity": orders.velocity is not None,
-            "bStop": orders.stop,
-            "bQuickStop": orders.quick_stop,
-        }
-        columns |= {name: np.full(1, float(value)) for name, value in moves.items()}
+            levels |= commands
+        columns |= {name: np.full(1, float(is_so)) for name, is_so in levels.items() if name in self._inputs}
 
     def _edge(self, cycles: int) -> Array:
         """Give bExecute: high while a position is commanded, but for a cycle before another one is."""
@@ -412,6 +360,16 @@ class Planner:
             self._is_due = waits and cycles == 1
         self._was_given = bool(execute[-1])
         return execute
+
+
+def _commands(orders: Orders) -> dict[str, bool]:
+    """Tell which of the block's inputs commands are given by."""
+    return {
+        "bExecute": orders.get("target") is not None,
+        "bVelocity": orders.get("velocity") is not None,
+        "bStop": orders.get("stop", False),
+        "bQuickStop": orders.get("quick_stop", False),
+    }
 
 
 def _columns_of(

@@ -203,8 +203,8 @@ def _sensed(
 def _largest(spec: Spec) -> list[int]:
     """Find the load that shows each mode most in the middle of the live ranges, by its number."""
     middle: Linearization = linearized(spec, [0.0] * len(spec.planner.live))
-    found: list[int] = np.abs(middle.sway_gain @ middle.modes).argmax(axis=0).tolist()
-    return found
+    loads: list[int] = np.abs(middle.sway_gain @ middle.modes).argmax(axis=0).tolist()
+    return loads
 
 
 def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:

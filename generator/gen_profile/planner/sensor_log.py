@@ -70,15 +70,15 @@ def read_sensor_log(text: str, inputs: Mapping[str, float]) -> SensorLog:
             f"sensor: there is no column {missing[0]}; the first line must be {','.join(COLUMNS)}."
         )
     rows.fieldnames = names
-    found = []
+    readings = []
     for row in rows:
         try:
-            found.append([float(row[name] or "") for name in COLUMNS])
+            readings.append([float(row[name] or "") for name in COLUMNS])
         except ValueError:
             raise SpecError(f"sensor, line {rows.line_num}: time_s and value must be numbers.") from None
-    if not found:
+    if not readings:
         raise SpecError("sensor: there is no row; write one such as 0.0,0.01.")
-    times, values = np.array(found).T
+    times, values = np.array(readings).T
     if not (math.isfinite(times.sum()) and times[0] >= 0.0) or any(
         b < a for a, b in pairwise(times.tolist())
     ):

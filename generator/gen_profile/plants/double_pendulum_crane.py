@@ -19,7 +19,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.drawing import Drawing, Pose, hanging, level
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Vector
 
 
@@ -64,11 +63,6 @@ def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     return Mechanics(mass=[p.m1, p.m2], place=places, gravity=p.g)
 
 
-def picture(pose: Pose) -> tuple[Drawing, ...]:
-    """Draw the cart and what hangs below it."""
-    return (hanging("from the side", pose, trolley=level),)
-
-
 PLANT = Plant(
     type="double-pendulum-crane",
     summary="cart, hook and payload on two ropes",
@@ -88,5 +82,4 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("hook", "payload"),
     mechanics=mechanics,
-    picture=picture,
 )

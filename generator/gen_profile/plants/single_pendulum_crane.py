@@ -17,7 +17,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.drawing import Drawing, Pose, hanging, level
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Vector
 
 
@@ -47,11 +46,6 @@ def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     return Mechanics(mass=[p.m], place=[(cart - output.sway[0], 0.0, output.height[0])], gravity=p.g)
 
 
-def picture(pose: Pose) -> tuple[Drawing, ...]:
-    """Draw the cart and what hangs below it."""
-    return (hanging("from the side", pose, trolley=level),)
-
-
 PLANT = Plant(
     type="single-pendulum-crane",
     summary="cart with a hoist, and a payload on the rope",
@@ -70,5 +64,4 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("payload",),
     mechanics=mechanics,
-    picture=picture,
 )

@@ -12,6 +12,7 @@ from gen_profile.motion.metrics import extremes, greatest
 from gen_profile.motion.profile import Profile
 from gen_profile.phrase import Phrase
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.units import RATES
 
 SWAY_TOLERANCE = 1.01  # times limits.sway that machines off nominal may sway: searches find the worst so well
 ROUNDING = 1e-6  # share of a limit, or of travel's width, that counts for nothing: programs are no more exact
@@ -75,7 +76,7 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
     """List what the motion needs of every limit there is."""
     for column in range(command.axes):
         allowed_here = limits.of(column)
-        for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
+        for order, name in enumerate(RATES, start=1):
             allowed = getattr(allowed_here, name)
             if allowed is not None:
                 demand = (1.0 - ROUNDING) * greatest(command, order, column)

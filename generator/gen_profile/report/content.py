@@ -6,6 +6,7 @@ Every text here may come from a stranger (a machine's file, a log's header): the
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import attrs
 
@@ -102,6 +103,7 @@ class Listing:
     kind = "listing"
 
 
+BlockOfKind = TypeVar("BlockOfKind")
 Block = Terms | Table | Figure | Animation | Listing
 
 
@@ -160,14 +162,6 @@ class Page:
         papers = [field for field in fields if field[1]]
         return attrs.evolve(self, papers=papers, signatures=[name for name, value in fields if not value])
 
-    @property
-    def figures(self) -> list[Figure]:
-        """All figures, in their order."""
-        return [block for section in self.sections for block in section.blocks if isinstance(block, Figure)]
-
-    @property
-    def animations(self) -> list[Animation]:
-        """All animations, in their order."""
-        return [
-            block for section in self.sections for block in section.blocks if isinstance(block, Animation)
-        ]
+    def blocks(self, kind: type[BlockOfKind]) -> list[BlockOfKind]:
+        """All blocks of a kind, in their order."""
+        return [block for section in self.sections for block in section.blocks if isinstance(block, kind)]

@@ -157,7 +157,7 @@ def _known_columns(
         head = _head(table, ())
         names = list(table.rows[head])
         by_name = {
-            name: _column(_with_unit(name, unit), spec, where) for name, unit in _headings(table, head)
+            name: _column(_with_unit(table, head, place), spec, where) for place, name in enumerate(names)
         }
         known = {name: column for name, column in by_name.items() if column is not None}
         places = [names.index(name) for name in known]
@@ -211,8 +211,8 @@ def column_meanings(text: str, source: str, spec: Spec) -> list[tuple[str, str]]
     table = read_table(text, where)
     head = _head(table, ())
     return [
-        (name if table.is_head(head) else "", _meaning(_with_unit(name, unit), spec, where))
-        for name, unit in _headings(table, head)
+        (name if table.is_head(head) else "", _meaning(_with_unit(table, head, place), spec, where))
+        for place, name in enumerate(table.rows[head])
     ]
 
 
@@ -264,17 +264,10 @@ def _head(table: LogTable, chosen: Collection[str]) -> int:
     return 0
 
 
-def _headings(table: LogTable, head: int) -> list[tuple[str, str]]:
-    """List the names of a row, and what stands in the row below each, which may be its unit."""
-    below = head + 1 < len(table.rows)
-    return [
-        (name, table.cell(head + 1, place) if below else "") for place, name in enumerate(table.rows[head])
-    ]
-
-
-def _with_unit(name: str, below: str) -> str:
-    """Put the unit that stands in the row below a name behind it, where the name has none."""
-    match, unit = _COLUMN.fullmatch(name), below.strip("[]() ")
+def _with_unit(table: LogTable, head: int, place: int) -> str:
+    """Read a column's name, with the unit that stands in the row below behind it, where the name has none."""
+    name, below = table.rows[head][place], head + 1 < len(table.rows)
+    match, unit = _COLUMN.fullmatch(name), table.cell(head + 1, place).strip("[]() ") if below else ""
     if match is None or match["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
         return name
     return f"{name}_{unit}"

@@ -8,8 +8,10 @@ import json
 from importlib.resources import files
 from typing import Any
 
+from gen_profile.charts.figure import Figure
 from gen_profile.charts.plotly_json import figure_json
 from gen_profile.plugins import require_installed
+from gen_profile.report.animation import Animation
 from gen_profile.report.content import Page
 
 ASSETS = files("gen_profile.report") / "assets"
@@ -56,8 +58,8 @@ def render(page: Page) -> bytes:
 
 def _data(page: Page) -> str:
     document = {
-        "figures": [figure_json(block) for block in page.figures],
-        "animations": [block.to_json() for block in page.animations],
+        "figures": [figure_json(block) for block in page.blocks(Figure)],
+        "animations": [block.to_json() for block in page.blocks(Animation)],
     }
     return _json(document)
 

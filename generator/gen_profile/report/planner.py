@@ -24,6 +24,7 @@ from gen_profile.proof.verdict import LISTED, JudgedHistory, Proof
 from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.page import render, require_pages
 from gen_profile.spec.model import Spec
+from gen_profile.units import RATES
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -105,7 +106,7 @@ def _verdict(proof: Proof, path: Path) -> Verdict:
             f"{mm(proof.limit[load])} are allowed.",
             "Every history kept velocity, acceleration, jerk and travel in every cycle, and came to rest.",
             again,
-            *(f"Beware: {sentence}" for sentence in proof.warnings()),
+            *(f"Warning: {sentence}" for sentence in proof.warnings()),
         ],
     )
 
@@ -202,7 +203,7 @@ def _limits(spec: Spec, proof: Proof) -> Table:
     rows = []
     for column, axis in proof.worst.history.axes.items():
         own = spec.limits.of(column)
-        for name, per in (("velocity", "/s"), ("acceleration", "/s²"), ("jerk", "/s³")):
+        for name, per in RATES.items():
             fraction = max(one.limits[f"{axis.prefix}{name}"] for one in proof.judged)
             limit, unit = getattr(own, name), f"{axis.unit}{per}"
             title = f"{name} of {axis.name}" if axis.name else name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Any
 
 import attrs
@@ -20,9 +21,10 @@ from gen_profile.charts.figure import PLAIN
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison
 from gen_profile.designs.design import Design
+from gen_profile.evaluation.demands import demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
-from gen_profile.motion.metrics import extremes, greatest
+from gen_profile.motion.metrics import extremes
 from gen_profile.report.actors import animation
 from gen_profile.report.content import Block, Listing, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.measured import Measured
@@ -32,9 +34,6 @@ from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 from gen_profile.verification.verdict import Check
 
-UNITS_OF_TIME = ("s", "s²", "s³")
-QUANTITIES = ("velocity", "acceleration", "jerk")
-JERK = 3
 MOST_LISTED = 40  # scenarios; the worst of them say enough
 GROUPED = ("how many", "median (mm)", "99 % (mm)", "worst (mm)", "verdict")
 # head → figure, and how many of the head's unit make one of the figure's
@@ -63,7 +62,7 @@ def verdict(check: Check) -> Verdict:
             f"({machine(finding.scenario.name)}), and {mm(check.limit[load])} are allowed.",
             f"Co-simulated from the written file in {tried} scenario{'s' if tried > 1 else ''}; "
             f"integration error below {bound(check.error_bound)}, counted against the margin.",
-            *(f"Beware: {sentence}" for sentence in check.warnings()),
+            *(f"Warning: {sentence}" for sentence in check.warnings()),
         ),
     )
 
@@ -77,13 +76,9 @@ def facts(
     return [
         ("Duration", f"{number(evaluation.motion.duration)} s"),
         *(
-            (
-                f"Peak {quantity}{_of(spec, axis.name)}",
-                f"{number(greatest(evaluation.command, order, column))} {axis.unit}/{per}",
-            )
-            for column, axis in enumerate(spec.machine().actuated)
-            for order, (quantity, per) in enumerate(zip(QUANTITIES, UNITS_OF_TIME, strict=True), start=1)
-            if order < JERK or len(spec.axis) == 1
+            (f"Peak {one.quantity}{_of(spec, one.axis.name)}", f"{number(one.asked)} {one.unit}")
+            for one in demands(spec, evaluation.command)
+            if one.quantity != "jerk" or len(spec.axis) == 1
         ),
         ("Sway on the way, nominal", mm(figures["sway_transient_peak_m"])),
         (f"Residual sway of the {load}, worst", mm(finding.residual[load])),
@@ -147,16 +142,15 @@ def _limits(spec: Spec, evaluation: MotionEvaluation, figures: Mapping[str, floa
 
 
 def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]:
-    for column, axis in enumerate(spec.machine().actuated):
-        limits = spec.limits.of(column)
-        for order, (quantity, per) in enumerate(zip(QUANTITIES, UNITS_OF_TIME, strict=True), start=1):
-            allowed = getattr(limits, quantity)
-            taken = greatest(evaluation.command, order, column)
-            name, unit = f"{quantity} of {axis.name}", f"{axis.unit}/{per}"
-            if allowed is None:
-                yield TableRow(cells=(name, f"{number(taken)} {unit}", "no limit stated", "", ""))
+    by_axis = groupby(demands(spec, evaluation.command), key=lambda one: one.column)
+    for (column, of_axis), axis in zip(by_axis, spec.machine().actuated, strict=True):
+        for one in of_axis:
+            name = f"{one.quantity} of {axis.name}"
+            if one.allowed is None:
+                yield TableRow(cells=(name, f"{number(one.asked)} {one.unit}", "no limit stated", "", ""))
             else:
-                yield _limit(name, taken, allowed, unit)
+                yield _limit(name, one.asked, one.allowed, one.unit)
+        limits = spec.limits.of(column)
         if limits.travel is not None:
             unit, factor = place_unit(spec, column)
             low, high = (factor * end for end in limits.travel)

@@ -13,6 +13,7 @@ from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.plugins import require_installed
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.units import RATES
 
 PLACES = 65  # of a segment, at which peaks are looked for
 
@@ -62,9 +63,7 @@ def jerk_limited(limits: LimitsSpec, distance: Sequence[float]) -> BaseMove:
     SpecError
         There is no limit of jerk, or Ruckig is not installed.
     """
-    velocity, acceleration, jerk = (
-        _share(limits, name, distance) for name in ("velocity", "acceleration", "jerk")
-    )
+    velocity, acceleration, jerk = (_share(limits, name, distance) for name in RATES)
     if math.isinf(jerk):
         raise SpecError(
             "limits.jerk: a jerk-limited base move needs it; state it, or take another base move."

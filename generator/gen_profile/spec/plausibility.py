@@ -18,6 +18,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.phrase import Phrase, placed
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import RESIDUAL_SHARE, Spec
+from gen_profile.units import RATES
 
 STEP = 1e-6  # m (or rad), for differences of forces and outputs about rest
 # (unit of the axis, what) → beyond which it is implausible, and impossible
@@ -160,7 +161,7 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
         *table, kind = place.split(".")
         unit = units[table[-1]] if len(table) > 1 else max(units.values(), key="m".__eq__)
         if (unit, kind) in FAST:
-            per = f"{unit}/s" if kind == "velocity" else f"{unit}/s²"
+            per = f"{unit}{RATES[kind]}"
             cure = _thousandth(value, Phrase("limits are in {per}", per=per))
             yield from _fast(value, unit, place, Phrase("allows {value:g} {per}", value=value, per=per), cure)
         if unit == "m" and kind == "travel" and (far := max(map(abs, value))) > LONG_WAY:

@@ -11,7 +11,7 @@ from gen_profile.plants.virtual_work import end_load_is_a_body
 from gen_profile.spec.model import RobustnessSpec, Spec
 from gen_profile.spec.structure import place
 from gen_profile.suggestion import suggestion
-from gen_profile.units import UNITS
+from gen_profile.units import RATES, UNITS
 
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
 SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
@@ -75,10 +75,10 @@ def _move(spec: Spec) -> Iterator[Fault]:
     if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
         problem: str = Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE)
         yield "move.distance", problem
-    limits, limited = ("velocity", "acceleration", "jerk"), " ".join(spec.limits.stated())
-    if move.shortest and not any(name in limited for name in limits):
+    limited = " ".join(spec.limits.stated())
+    if move.shortest and not any(name in limited for name in RATES):
         problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'
-        yield "move.duration", problem, "limits.axis", *(f"limits.{name}" for name in limits)
+        yield "move.duration", problem, "limits.axis", *(f"limits.{name}" for name in RATES)
 
 
 def _setpoint_path(spec: Spec) -> Iterator[Fault]:

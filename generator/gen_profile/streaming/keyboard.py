@@ -13,7 +13,7 @@ from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.streaming.status import in_units
 
-SHARE = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
+FRACTION = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
 ARROWS = "← →", "↓ ↑"  # of the first axis and the second
 CURSOR = {b"C": (0, 1), b"D": (0, -1), b"A": (1, 1), b"B": (1, -1)}  # keys' last bytes: axis, tenths more
 CURSOR_KEY = 3  # bytes of an escape sequence, also in application mode
@@ -63,7 +63,7 @@ class Keys:
         if more and axis < len(self._axes):
             self._tenths[axis] = max(-10, min(10, self._tenths[axis] + more))
             pairs = zip(self._tenths, self._greatest, strict=True)
-            values = tuple(tenths * SHARE * greatest for tenths, greatest in pairs)
+            values = tuple(tenths * FRACTION * greatest for tenths, greatest in pairs)
             return self._given("velocity", values, f"stick at {in_units(values, self._axes, '{:.3g}', '/s')}")
         if key in END:
             self.over = True

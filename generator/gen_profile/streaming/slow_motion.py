@@ -20,7 +20,7 @@ from gen_profile.streaming.stream import actual_positions, designed
 from gen_profile.suggestion import suggestion
 from gen_profile_exporters.can.following_window import LEAST_USEFUL
 from gen_profile_exporters.can.host.port import Port
-from gen_profile_exporters.can.streaming.approach import CREEP, SHARE
+from gen_profile_exporters.can.streaming.approach import CREEP, FRACTION
 
 # room for the shape of a motion: its peaks over those at even speed, or with even acceleration
 PEAK_VELOCITY, PEAK_ACCELERATION = 4.0, 16.0
@@ -81,8 +81,8 @@ def slow(source: Source, start: Sequence[float], target: Sequence[float]) -> Spe
     durations, limits = [SETTLE * observation_time(spec)], {}
     for column, (name, axis) in enumerate(spec.axis.items()):
         scale = abs(axis.counts_per_metre)
-        velocity = SHARE * demand.velocity[column] / scale or CREEP
-        acceleration = SHARE * demand.acceleration[column] / scale or CREEP
+        velocity = FRACTION * demand.velocity[column] / scale or CREEP
+        acceleration = FRACTION * demand.acceleration[column] / scale or CREEP
         distance = abs(target[column] - start[column])
         durations += [
             PEAK_VELOCITY * distance / velocity,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -56,7 +55,7 @@ def _comparison(compared: Comparison, own: str) -> Part:
                 **point(row.method, row.figures),
                 "safe": row.safe,
                 "pareto": row.method in compared.efficient,
-                "edits": _taking(spec, row.method, own),
+                "edits": dict(row.changes),
             }
             for row in compared.rows
         ],
@@ -65,23 +64,6 @@ def _comparison(compared: Comparison, own: str) -> Part:
             advice.aim: advice.method for advice in compared.recommended.values() if advice.method
         },
     }
-
-
-def _taking(spec: Spec, method: str, own: str) -> dict[str, Any]:
-    """Say what to change in order to design by a method of the comparison."""
-    optimal = {} if spec.solver.shaper is None else {"solver.method": "auto"}
-    if method == own:
-        return {}
-    if not method.startswith("optimal"):
-        return {"solver.method": method}
-    if weight := re.fullmatch(r"optimal-beta([0-9.]+)", method):
-        return {**optimal, "cost.sway_weight": float(weight[1])}
-    kinds: dict[str, dict[str, Any]] = {
-        "optimal-order1": {"robustness.method": "sensitivity", "robustness.order": 1},
-        "optimal-order2": {"robustness.method": "sensitivity", "robustness.order": 2},
-        "optimal-range": {"robustness.method": "range"},
-    }
-    return {**optimal, **kinds.get(method, {})}
 
 
 def _rivals(compared: Comparison, own: str) -> Sequence[ComparedMethod]:

@@ -17,9 +17,9 @@ from gen_profile.plants.plant import Parameter
 from gen_profile.spec.model import MoveSpec, Spec
 from gen_profile.spec.structure import kinds_of
 from gen_profile.spec.values import Bounds
+from gen_profile.units import RATES
 
 REACH = 4.0  # times the value to begin with, up to which a slider goes, and down to which share of it
-RATES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
 UNITS = {
     "move.duration": "s",
     "actuator.tau": "s",

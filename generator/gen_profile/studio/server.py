@@ -40,29 +40,12 @@ KINDS = {
     ".js": "text/javascript; charset=utf-8",
     ".json": "application/json",
 }
+OWN = resources.files("gen_profile.studio") / "assets"
 ASSETS = {
-    **{
-        name: ("gen_profile.studio", name)
-        for name in (
-            "studio.html",
-            "studio.css",
-            "studio.js",
-            "knobs.js",
-            "cards.js",
-            "words.js",
-            "numbers.js",
-            "views.js",
-            "curves.js",
-            "designs.js",
-            "logs.js",
-            "maps.js",
-            "drive.js",
-            "words.json",
-        )
-    },
-    "uPlot.js": ("gen_profile.studio", "uPlot/uPlot.iife.min.js"),
-    "uPlot.css": ("gen_profile.studio", "uPlot/uPlot.min.css"),
-    "animation.js": ("gen_profile.report", "animation.js"),
+    **{file.name: file for file in OWN.iterdir() if Path(file.name).suffix in KINDS},
+    "uPlot.js": OWN / "uPlot" / "uPlot.iife.min.js",
+    "uPlot.css": OWN / "uPlot" / "uPlot.min.css",
+    "animation.js": resources.files("gen_profile.report") / "assets" / "animation.js",
 }
 
 
@@ -159,9 +142,8 @@ class Asset(Guarded):
         """Send it."""
         if name not in ASSETS:
             raise tornado.web.HTTPError(404)
-        package, file = ASSETS[name]
-        self.set_header("Content-Type", KINDS[Path(file).suffix])
-        self.finish((resources.files(package) / "assets" / file).read_bytes())
+        self.set_header("Content-Type", KINDS[Path(name).suffix])
+        self.finish(ASSETS[name].read_bytes())
 
 
 class FrontPage(Entering, Asset):
@@ -223,12 +205,12 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
                 "show": self._show,
                 "agree": self._agree,
                 "make": self._make,
-                "stop": lambda _: self._session.cancel(),
+                "stop": lambda _: self._session.stop("files"),
                 "drop": lambda said: self._drop(said, content),
                 "read": self._read,
                 "forget": lambda _: self._forget(),
                 "drive": self._drive,
-                "park": lambda _: self._session.leave_drive(),
+                "park": lambda _: self._session.stop("drive"),
             }
             act[said["say"]](said)
         except GenProfileError as error:
@@ -325,7 +307,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             at=at,
             free=tuple(map(str, said["free"])),
         )
-        self._session.read(int(said["number"]), asked)
+        self._session.ask("log", int(said["number"]), asked)
 
     def _drive(self, said: dict[str, Any]) -> None:
         """Let a planner block go on for a moment, once its spec may run what it wants to run."""
@@ -339,12 +321,12 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             values=tuple(map(float, said["values"])),
             live={str(name): float(value) for name, value in said["live"].items()},
         )
-        self._session.drive(int(said["number"]), asked)
+        self._session.ask("drive", int(said["number"]), asked)
 
     def _forget(self) -> None:
         """Read no log any more."""
         self._dropped = None
-        self._session.leave_log()
+        self._session.stop("log")
 
     def _tell(self, part: Part) -> None:
         self._write(json.dumps({**part, "serial": self._serial}))

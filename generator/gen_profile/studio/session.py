@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import attrs
 
-from gen_profile.studio.workers import BEGUN, ENDED, LOST, Job, Message, Worker, Workers, failure
+from gen_profile.studio.workers import ANSWERS, BEGUN, ENDED, LOST, Job, Message, Worker, Workers, failure
 
 PATIENCE = 0.6  # s that a question may wait for the first part of an older one's answer
 IDLE_TIME = 0.3  # s without a new question, after which what takes longer is asked for
@@ -109,11 +109,7 @@ class Session:
     def __init__(self, workers: Workers, loop: Loop) -> None:
         self._loop, self._heard = loop, list[Message]()
         self._tell: Tell = self._heard.append
-        self._picture = RequestQueue("picture", workers, loop, self._take)
-        self._depth = RequestQueue("depth", workers, loop, self._take)
-        self._files = RequestQueue("files", workers, loop, self._take)
-        self._log = RequestQueue("log", workers, loop, self._take)
-        self._drive = RequestQueue("drive", workers, loop, self._take)
+        self._queues = {kind: RequestQueue(kind, workers, loop, self._take) for kind in ANSWERS}
         self._question: Any = None
         self._newest, self._solved, self._orders = -1, -1, 0
 
@@ -127,39 +123,27 @@ class Session:
         """Ask for the picture of a state."""
         if (number, question) != (self._newest, self._question):  # else it is on its way: the first page's
             self._newest, self._question = number, question
-            self._depth.pause()
-            self._picture.ask(number, question)
+            self._queues["depth"].pause()
+            self.ask("picture", number, question)
 
     def make(self, order: Any) -> None:
         """Ask for files."""
         self._orders += 1
-        self._files.ask(self._orders, order)
+        self.ask("files", self._orders, order)
 
-    def cancel(self) -> None:
-        """Make no files."""
-        self._files.stop()
+    def ask(self, kind: str, number: int, question: Any) -> None:
+        """Ask for one of `ANSWERS`; the numbers of a kind rise."""
+        self._queues[kind].ask(number, question)
 
-    def read(self, number: int, question: Any) -> None:
-        """Ask what a log tells."""
-        self._log.ask(number, question)
-
-    def drive(self, number: int, question: Any) -> None:
-        """Ask for what a planner block does next."""
-        self._drive.ask(number, question)
-
-    def leave_drive(self) -> None:
-        """Drive no more."""
-        self._drive.stop()
-
-    def leave_log(self) -> None:
-        """Read no log."""
-        self._log.stop()
+    def stop(self, kind: str) -> None:
+        """Ask no more for it, and let go of its worker."""
+        self._queues[kind].stop()
 
     def close(self) -> None:
         """Let go of all workers, and take none any more for what was due later."""
         self._newest = NO_PAGE
-        for line in (self._picture, self._depth, self._files, self._log, self._drive):
-            line.stop()
+        for queue in self._queues.values():
+            queue.stop()
 
     def _take(self, message: Message) -> None:
         if message.name not in (BEGUN, ENDED):
@@ -171,4 +155,4 @@ class Session:
 
     def _look_deeper(self, number: int) -> None:
         if number == self._newest:
-            self._depth.ask(number, self._question)
+            self.ask("depth", number, self._question)

@@ -7,6 +7,7 @@ Every part is a mapping of plain values with its name under ``"part"``. What tak
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Any
 
 import attrs
@@ -16,9 +17,10 @@ from gen_profile.charts.curves import motion_figure, select_machines, sway_figur
 from gen_profile.comparison.candidates import own_method
 from gen_profile.designs.plan import Plan, draft, judged
 from gen_profile.errors import GenProfileError, NoMotion, SpecError
+from gen_profile.evaluation.demands import demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
-from gen_profile.motion.metrics import extremes, greatest, peak
+from gen_profile.motion.metrics import extremes, peak
 from gen_profile.phrase import PLACED, Phrase
 from gen_profile.problem.limits import ROUNDING
 from gen_profile.report.actors import animation
@@ -89,7 +91,7 @@ def _setting(question: Question, spec: Spec) -> Part:
         "command": command_of(start, state.edits),
         "text": text_of(start, state.edits),
         "address": state.address,
-        "doubts": [fault(sentence) for sentence in plausibility_warnings(spec)],
+        "warnings": [fault(sentence) for sentence in plausibility_warnings(spec)],
     }
 
 
@@ -105,18 +107,17 @@ def _json(knob: Any) -> dict[str, Any]:
 
 def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any]]:
     """Hold what the drives are asked for against the limits."""
-    for column, axis in enumerate(spec.machine().actuated):
-        limits = spec.limits.of(column)
-        for order, (quantity, per) in enumerate(
-            zip(("velocity", "acceleration", "jerk"), ("", "²", "³"), strict=True), start=1
-        ):
+    by_axis = groupby(demands(spec, evaluation.command), key=lambda one: one.column)
+    for (column, of_axis), axis in zip(by_axis, spec.machine().actuated, strict=True):
+        limits, name = spec.limits.of(column), axis.name if len(spec.axis) > 1 else ""
+        for one in of_axis:
             yield {
-                "place": spec.limits.place(column, quantity),
-                "quantity": quantity,
-                "axis": axis.name if len(spec.axis) > 1 else "",
-                "unit": f"{axis.unit}/s{per}",
-                "takes": greatest(evaluation.command, order, column),
-                "allowed": getattr(limits, quantity),
+                "place": spec.limits.place(column, one.quantity),
+                "quantity": one.quantity,
+                "axis": name,
+                "unit": one.unit,
+                "takes": one.asked,
+                "allowed": one.allowed,
             }
         if limits.travel is not None:
             least, most = extremes(evaluation.command, 0, column)
@@ -127,7 +128,7 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
             yield {
                 "place": spec.limits.place(column, "travel"),
                 "quantity": "travel",
-                "axis": axis.name if len(spec.axis) > 1 else "",
+                "axis": name,
                 "unit": unit,
                 "takes": factor * way,
                 "allowed": factor * (high - low),

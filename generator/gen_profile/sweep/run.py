@@ -8,7 +8,7 @@ a sweep that is started again works out the rest.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
@@ -19,27 +19,14 @@ from distributed import Client, Future, KilledWorker, as_completed
 
 from gen_profile.cluster import client_of, processes, unable
 from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.progress import Progress, no_progress
 from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_cases
 from gen_profile.sweep.reading import swept_table
 from gen_profile.sweep.store import Keeper, Store, opened
 
+STAGE = "designing cases"
 CASES_PER_TASK = 8  # at most; Dask's work for a task is a fifth of that for a case
 TASKS_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
-
-
-@attrs.frozen(kw_only=True)
-class CasesDone:
-    """How far a sweep is.
-
-    Attributes
-    ----------
-    done, failed, total : int
-        Cases; those that were finished before are done, too.
-    """
-
-    done: int
-    failed: int
-    total: int
 
 
 @attrs.frozen(kw_only=True)
@@ -83,7 +70,7 @@ def sweep(
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-    progress: Callable[[CasesDone], None] = lambda _: None,
+    progress: Progress = no_progress,
 ) -> Sweep:
     """Work out all cases that are not finished, and write the table.
 
@@ -131,7 +118,7 @@ def _work(
     *,
     scheduler: str | None,
     workers: int | None,
-    progress: Callable[[CasesDone], None],
+    progress: Progress,
 ) -> None:
     """Hand the cases to workers, a few ahead, and keep what comes back.
 
@@ -139,14 +126,14 @@ def _work(
     """
     grid, total, failures = store.grid, len(store.grid), 0
     done = total - len(unfinished)
-    progress(CasesDone(done=done, failed=failures, total=total))
+    progress(STAGE, done, total)
 
     def keep(outcomes: Sequence[CaseOutcome]) -> None:
         nonlocal done, failures
         for outcome in outcomes:
             kept.keep(outcome.record["case"], outcome)
             done, failures = done + 1, failures + (not outcome.passed)
-            progress(CasesDone(done=done, failed=failures, total=total))
+            progress(STAGE, done, total, f"{failures} failed" if failures else "")
 
     with client_of(scheduler, min(workers or CPU_COUNT, len(unfinished))) as client:
         ahead = TASKS_AHEAD * processes(client)

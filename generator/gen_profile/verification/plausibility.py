@@ -9,6 +9,7 @@ import numpy as np
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.phrase import Phrase
 from gen_profile.spec.model import Spec
+from gen_profile.units import RATES
 
 TARGET_TOLERANCE = 1e-6  # of the axis' move, beside the artefact's own resolution
 STANDING = 1e-7  # of the longest move, within which an axis stands, beside half the artefact's resolution
@@ -166,7 +167,7 @@ def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
             worst = int(played[:, column].argmax())
             demand = float(played[worst, column])
             if allowed is not None and demand > (1.0 + overshoot) * allowed + rounding[column]:
-                unit = f"{axis.unit}/s" if order == 1 else f"{axis.unit}/s²"
+                unit = f"{axis.unit}{RATES[name]}"
                 template = (
                     "The setpoints ask {name} for {found:.4g} {unit} at {time:.6g} s, and {place} "
                     "allows {allowed:.4g} {unit}."

@@ -18,7 +18,7 @@ from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.scaling import Demand, Setpoints, magnitude_counts
 from gen_profile_exporters.exporter import Target
 
-SHARE = 0.1  # of the motion's greatest velocity and acceleration
+FRACTION = 0.1  # of the motion's greatest velocity and acceleration
 CREEP = 0.001  # m/s and m/s² (or rad) of an axis that the motion leaves at rest
 PEAK_VELOCITY, PEAK_ACCELERATION = 15 / 8, 10 / 3**0.5  # of the polynomial, for unit distance and time
 
@@ -59,8 +59,8 @@ def _durations(distance: Integers, demand: Demand, target: Target) -> list[float
     durations = []
     for column, axis in enumerate(target.axes):
         far, creep = abs(int(distance[column])), magnitude_counts(CREEP, axis)
-        velocity = SHARE * demand.velocity[column] or creep
-        acceleration = SHARE * demand.acceleration[column] or creep
+        velocity = FRACTION * demand.velocity[column] or creep
+        acceleration = FRACTION * demand.acceleration[column] or creep
         by_velocity = PEAK_VELOCITY * far / velocity
         durations.append(max(by_velocity, (PEAK_ACCELERATION * far / acceleration) ** 0.5))
     return durations

@@ -79,8 +79,8 @@ class Access:
         return S7Link(S7Access(url=self.url, host=host, block=self.data_block, **place), table)
 
     def _require_s7(self) -> None:
-        found = _S7.fullmatch(self.url)
-        if found is None or int(found[2] or 1) > MOST_PORT or int(found[4]) > MOST_SLOT:
+        match = _S7.fullmatch(self.url)
+        if match is None or int(match[2] or 1) > MOST_PORT or int(match[4]) > MOST_SLOT:
             raise SpecError(f"--to {self.url}: is no address such as s7://10.0.0.5/0/1 (rack 0, slot 1).")
         if self.data_block is None:
             raise SpecError(
@@ -99,8 +99,8 @@ class Access:
         require_s7()
 
     def _require_opcua(self) -> None:
-        found = _OPC_UA.fullmatch(self.url)
-        if found is None or int(found[1]) > MOST_PORT:
+        match = _OPC_UA.fullmatch(self.url)
+        if match is None or int(match[1]) > MOST_PORT:
             raise SpecError(
                 f"--to {self.url}: is no address such as opc.tcp://10.0.0.5:4840 or s7://10.0.0.5/0/1."
             )
@@ -121,8 +121,8 @@ class Access:
 
 
 def _matched(pattern: re.Pattern[str], text: str) -> tuple[str, ...]:
-    found = pattern.fullmatch(text)
-    return () if found is None else found.groups()
+    match = pattern.fullmatch(text)
+    return () if match is None else match.groups()
 
 
 def require_opcua() -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 HEIGHT, MARGIN = 6, 12  # lines of an axis's picture, and columns beside it
 REDRAWN = 0.1  # s between two pictures
-STANDING = 1.0  # s between two rows of a log while nothing moves
+IDLE_PERIOD = 1.0  # s between two rows of a log while nothing moves
 SUFFIXES = {"position": "", "velocity": "_per_s", "acceleration": "_per_s2"}
 
 
@@ -85,7 +85,7 @@ def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
         for axis in axes
         for quantity, suffix in SUFFIXES.items()
     ]
-    began, last = datetime.now(UTC), -STANDING
+    began, last = datetime.now(UTC), -IDLE_PERIOD
     try:
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
@@ -95,7 +95,7 @@ def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
 
             def report(state: BlockState, at: float, events: str) -> None:
                 nonlocal last
-                if state.phase != MOVING and not events and at - last < STANDING:
+                if state.phase != MOVING and not events and at - last < IDLE_PERIOD:
                     return
                 if last < 0.0:
                     events = "; ".join(filter(None, (f"began {began.isoformat(timespec='seconds')}", events)))

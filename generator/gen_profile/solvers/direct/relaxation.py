@@ -27,7 +27,7 @@ from gen_profile.work import OutOfWork, budget, left, spend
 
 # of the effort without limits: ever less sway would take ever more of it
 PRICES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
-ENOUGH = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
+TOLERANCE = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
 KEPT = 2e-4  # by how much it must fall short of it in the shortest motion; ten times that costs 0.2 %
 RESTS = 0.985  # fraction of a load's limit, for the worst machine after the move; 0.95 to 0.999 give the same
 NEARBY = math.log(1.2)  # to a duration's logarithm, from where a motion is a start for the next one
@@ -189,7 +189,7 @@ def least_duration(relaxation: Relaxation) -> float | None:
         relaxed = lasting.least(places)
         if relaxed is not None:
             settled.append(duration)
-            return math.log(max(relaxed.wider, TINY)) - ENOUGH
+            return math.log(max(relaxed.wider, TINY)) - TOLERANCE
         unsettled.append(duration)
         return -math.inf if unsettled[0] < duration > max(settled) else math.inf
 
@@ -242,7 +242,7 @@ def shortest(
     return None if duration is None else by_duration[duration]
 
 
-def refined(problem: Problem, found: Relaxed, progress: Progress = no_progress) -> Relaxed:
+def refined(problem: Problem, relaxed: Relaxed, progress: Progress = no_progress) -> Relaxed:
     """Find a shorter motion on intervals that are bisected where limits begin or cease to bind.
 
     Programs with the snap, or with limits of the sway, hardly find any, so they are not asked.
@@ -250,15 +250,17 @@ def refined(problem: Problem, found: Relaxed, progress: Progress = no_progress) 
     Parameters
     ----------
     problem : Problem
-    found : Relaxed
+    relaxed : Relaxed
         The shortest motion on its mesh, of the nominal machine only.
     progress : Progress
     """
     if problem.worst_case is not None or problem.effort == "snap" or problem.limits.sway is not None:
-        return found
+        return relaxed
     longer = math.inf
     with suppress(OutOfWork), budget(REFINING * left()):
-        while found.duration < (1.0 - WORTH_REFINING) * longer and (finer := found.bisected()) is not None:
-            longer, found = found.duration, shortest(problem, finer, progress=progress) or found
+        while (
+            relaxed.duration < (1.0 - WORTH_REFINING) * longer and (finer := relaxed.bisected()) is not None
+        ):
+            longer, relaxed = relaxed.duration, shortest(problem, finer, progress=progress) or relaxed
     spend(0.0)
-    return found
+    return relaxed

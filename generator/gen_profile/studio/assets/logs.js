@@ -170,7 +170,7 @@ const logs = (() => {
     identified(part) {
       const button = element("button", { type: "button", class: "main" }, page.phrase("field.take"));
       button.addEventListener("click", () => page.edit(part.edits));
-      tell(...listed(part), ...sentences(part.warnings.map((one) => `${page.phrase("beware")}: ${page.phrase(one)}.`)), button, command(part.command));
+      tell(...listed(part), ...sentences(part.warnings.map((one) => `${page.phrase("warning")}: ${page.phrase(one)}.`)), button, command(part.command));
       curves.draw($("logged"), part.panels, page.drawing({ alone: true }));
     },
     measured(part) {

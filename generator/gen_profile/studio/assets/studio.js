@@ -230,7 +230,7 @@
       knobs.show(part.knobs, setting());
       knobs.blame([]);
       showCommand();
-      notice(part.doubts.length ? `${phrase("beware")}: ${part.doubts.map(placed).join(" ")}` : "");
+      notice(part.warnings.length ? `${phrase("warning")}: ${part.warnings.map(placed).join(" ")}` : "");
       if (latest.curves && String(handles) !== String(draggable())) take(latest.curves); // they came before their knobs
       tellAddress();
     },

@@ -1,0 +1,21 @@
+"""Texts for controllers in files of their own, where they can be read as what they are."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parent
+_PART = re.compile(r"(?m)^@part (\w+)\n")
+
+
+@cache
+def text_parts(path: str) -> dict[str, Any]:
+    """Read the parts of a file of this package, each below a line ``@part NAME``.
+
+    The last line of a part has no end.
+    """
+    _, *pieces = _PART.split((FOLDER / path).read_text("ascii"))
+    return {name: text.removesuffix("\n") for name, text in zip(pieces[::2], pieces[1::2], strict=True)}

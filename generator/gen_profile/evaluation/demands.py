@@ -1,0 +1,54 @@
+"""What a motion asks of the drives beside what is allowed, once for terminal, report and studio."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import attrs
+
+from gen_profile.motion.metrics import greatest
+from gen_profile.motion.profile import Profile
+from gen_profile.plants.plant import Coordinate
+from gen_profile.spec.model import Spec
+from gen_profile.units import RATES
+
+
+@attrs.frozen(kw_only=True)
+class AxisDemand:
+    """The greatest magnitude of a derivative of one axis's command.
+
+    Attributes
+    ----------
+    axis : Coordinate
+    column : int
+        Of the axis.
+    quantity : str
+        ``"velocity"``, ``"acceleration"`` or ``"jerk"``.
+    unit : str
+        Of both values, such as ``"m/s²"``.
+    asked : float
+    allowed : float or None
+        The spec's limit, if it states one.
+    """
+
+    axis: Coordinate
+    column: int
+    quantity: str
+    unit: str
+    asked: float
+    allowed: float | None
+
+
+def demands(spec: Spec, command: Profile) -> Iterator[AxisDemand]:
+    """List what a command asks of every axis, in the order of axes and of derivatives."""
+    for column, axis in enumerate(spec.machine().actuated):
+        limits = spec.limits.of(column)
+        for order, (quantity, per) in enumerate(RATES.items(), start=1):
+            yield AxisDemand(
+                axis=axis,
+                column=column,
+                quantity=quantity,
+                unit=f"{axis.unit}{per}",
+                asked=greatest(command, order, column),
+                allowed=getattr(limits, quantity),
+            )
