@@ -35,6 +35,10 @@ fix:
     ruff check --fix
     ruff format
 
+# These pages as a site, in build/site: any warning, such as of a link that leads nowhere, is an error.
+site:
+    sphinx-build -q -W --keep-going -c docs . build/site
+
 # Timings, printed and not judged.
 bench:
     pytest -s tests/benchmarks
