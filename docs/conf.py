@@ -13,7 +13,8 @@ from sphinx.util.typing import ExtensionMetadata
 import gen_profile
 
 NAVIGATION = {
-    "How to": "machines plc sweeps planner deploy can fmu studio report python /examples/README",
+    "Tutorials": "tutorial-crane tutorial-research tutorial-drive",
+    "How to": "machines plc sweeps planner deploy can fmu studio report python troubleshooting /examples/README",
     "Reference": "command-line spec formats api glossary",
     "Explanation": "check certificate shapers solvers planner-algorithm paper architecture",
     "Project": "/CHANGELOG /CONTRIBUTING",
