@@ -39,6 +39,25 @@ fix:
 site:
     sphinx-build -q -W --keep-going -c docs . build/site
 
+# Wheel and source archive in dist, built twice to the same bytes and tried from the built file, with their hashes.
+distributions:
+    rm -rf dist build/again build/fresh
+    uv build --quiet --out-dir dist
+    uv build --quiet --out-dir build/again
+    rm -f dist/.gitignore build/again/.gitignore
+    diff --recursive dist build/again
+    uv venv --quiet build/fresh
+    uv pip install --quiet --python build/fresh dist/*.whl
+    build/fresh/bin/gen-profile --version
+    build/fresh/bin/gen-profile --export plc --out build/fresh/tried
+    cd dist && sha256sum *.whl *.tar.gz | tee SHA256SUMS
+
+# The same of a version that CHANGELOG.md dates, from a checkout without changes.
+release:
+    git diff --quiet HEAD || { echo "There are changes that are not committed."; exit 1; }
+    grep -Eq "^## \\[$(sed -n 's/^version = \"\(.*\)\"/\1/p' pyproject.toml)\\] – 20[0-9-]{8}$" CHANGELOG.md || { echo "CHANGELOG.md: date this version."; exit 1; }
+    just distributions
+
 # Timings, printed and not judged.
 bench:
     pytest -s tests/benchmarks
