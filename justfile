@@ -37,7 +37,7 @@ fix:
 
 # These pages as a site, in build/site: any warning, such as of a link that leads nowhere, is an error.
 site:
-    sphinx-build -q -W --keep-going -c docs . build/site
+    sphinx-build -q -E -W --keep-going -c docs . build/site
 
 # Wheel and source archive in dist, built twice to the same bytes and tried from the built file, with their hashes.
 distributions:

@@ -37,7 +37,10 @@ def method_styles(methods: Iterable[str], thick: Collection[str | None] = ()) ->
         for dash, first, group in GROUPS
         for place, method in enumerate(group)
     }
-    others = cycle(reversed(PALETTE))  # the spec's own β first, then what users bring
+    methods = list(methods)
+    taken = {looks[method][0] for method in methods if method in looks}
+    # the spec's own β first, then what users bring: in colours that no other curve has, as far as there are
+    others = cycle(sorted(PALETTE[::-1], key=taken.__contains__))
     styles = {}
     for method in methods:
         colour, dash = looks.get(method) or (next(others), "solid")
