@@ -21,15 +21,15 @@ TABLES = [
 def numbers(header, variable):
     """List the numbers that a block's header explains: at the beginning of a line, or after a semicolon."""
     _, _, rest = header.partition(f"{variable}: ")
-    told = re.split(r"\n    \w|\n\*\)", rest)[0]
-    return set(re.findall(r"(?:^|\n\s+|; )(\d+) (?=[a-z{])", told, flags=re.IGNORECASE)) - {"0"}
+    explained = re.split(r"\n    \w|\n\*\)", rest)[0]
+    return set(re.findall(r"(?:^|\n\s+|; )(\d+) (?=[a-z{])", explained, flags=re.IGNORECASE)) - {"0"}
 
 
 PLAYBACK = (BLOCKS / "playback" / "template.st").read_text("utf-8")
 PLANNER = (BLOCKS / "planner" / "text" / "interface.st").read_text("utf-8")
 LISTED = [
     {code.value for code in Code},
-    numbers(PLAYBACK, "nErrorId") | {"6"},  # of a library alone, told where profiles are selected
+    numbers(PLAYBACK, "nErrorId") | {"6"},  # of a library alone, explained where profiles are selected
     numbers(playback_wrapper.HEADER, "nErrorId"),
     numbers(PLANNER, "nErrorId"),
     numbers(planner_wrapper.HEADER, "nErrorId") - numbers(playback_wrapper.HEADER, "nErrorId"),
@@ -39,6 +39,6 @@ LISTED = [
 
 @pytest.mark.parametrize(("table", "listed"), list(zip(TABLES, LISTED, strict=True)))
 def test_every_code_has_a_cure(table, listed):
-    told = {word for word in table if not set(word) <= {"-"}}
-    assert told - {"code", "nErrorId", "nPromise"} == listed
+    cured = {word for word in table if not set(word) <= {"-"}}
+    assert cured - {"code", "nErrorId", "nPromise"} == listed
     assert all(table.values())
