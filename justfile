@@ -18,6 +18,10 @@ types:
 types-on-windows:
     mypy --platform win32 --cache-dir .mypy_cache/win32
 
+# Not in CI, where it would take another half a minute.
+types-on-macos:
+    mypy --platform darwin --cache-dir .mypy_cache/darwin
+
 [private]
 layers:
     lint-imports
@@ -34,6 +38,29 @@ test *arguments:
 fix:
     ruff check --fix
     ruff format
+
+# These pages as a site, in build/site: any warning, such as of a link that leads nowhere, is an error.
+site:
+    sphinx-build -q -E -W --keep-going -c docs . build/site
+
+# Wheel and source archive in dist, built twice to the same bytes and tried from the built file, with their hashes.
+distributions:
+    rm -rf dist build/again build/fresh
+    uv build --quiet --out-dir dist
+    uv build --quiet --out-dir build/again
+    rm -f dist/.gitignore build/again/.gitignore
+    diff --recursive dist build/again
+    uv venv --quiet build/fresh
+    uv pip install --quiet --python build/fresh dist/*.whl
+    build/fresh/bin/gen-profile --version
+    build/fresh/bin/gen-profile --export plc --out build/fresh/tried
+    cd dist && sha256sum *.whl *.tar.gz | tee SHA256SUMS
+
+# The same of a version that CHANGELOG.md dates, from a checkout without changes.
+release:
+    git diff --quiet HEAD || { echo "There are changes that are not committed."; exit 1; }
+    grep -Eq "^## \\[$(sed -n 's/^version = \"\(.*\)\"/\1/p' pyproject.toml)\\] – 20[0-9-]{8}$" CHANGELOG.md || { echo "CHANGELOG.md: date this version."; exit 1; }
+    just distributions
 
 # Timings, printed and not judged.
 bench:

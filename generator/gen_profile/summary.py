@@ -1,9 +1,15 @@
-"""Results as one line in a terminal, and as a small table in a notebook."""
+"""Results as a line in a terminal, as a small table and a picture in a notebook, and as a table of pandas."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from html import escape
+from importlib import import_module
+from typing import Any
+
+from gen_profile.errors import OutputError
+from gen_profile.plugins import require_installed
 
 
 class Summarised:
@@ -26,3 +32,42 @@ class Summarised:
             for name, value in self.summary().items()
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+
+
+class Drawable(Summarised):
+    """What `gen_profile.plot` draws, too: a notebook shows the picture below the table."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """Add an image, since ids of inline SVGs may meet in one page; none without Matplotlib."""
+        table = super()._repr_html_()
+        try:
+            picture = import_module("gen_profile.charts.plot").plot(self)  # above this layer
+        except OutputError:
+            return table
+        source = f"data:image/svg+xml;base64,{b64encode(picture.svg.encode()).decode()}"
+        return f'{table}<img style="max-width: 100%" alt="{escape(repr(self))}" src="{source}">'
+
+
+class Tabled:
+    """What is a table, too."""
+
+    __slots__ = ()
+
+    def records(self) -> Sequence[Mapping[str, object]]:
+        """List its rows, values by column, in SI units."""
+        raise NotImplementedError
+
+    def to_pandas(self) -> Any:
+        """Make a `pandas.DataFrame` of its rows.
+
+        Raises
+        ------
+        OutputError
+            pandas is not installed.
+        """
+        require_installed("to_pandas needs pandas", "data", "pandas")
+        import pandas as pd  # noqa: PLC0415  # an extra
+
+        return pd.DataFrame(self.records())

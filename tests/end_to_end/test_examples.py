@@ -1,5 +1,7 @@
 """Every example runs by itself, in a folder of its own; what a page shows of one is what it prints."""
 
+import ast
+import json
 import re
 import runpy
 import sys
@@ -11,6 +13,7 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9][0-9]_*.py"))
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 SHOWN = {"07_every_machine": ROOT / "docs" / "machines.md"}
 SOME = {"07_every_machine": ["flexible-joint"]}  # all take a minute
 
@@ -49,3 +52,27 @@ def table(text):
 
 def number(cell):
     return float(re.match(r"[0-9.]+", cell)[0])
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_and_shows_what_its_cells_end_with(notebook, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    document = json.loads(notebook.read_text("utf-8"))
+    scope = {"__name__": "__main__"}
+    cells = ["".join(cell["source"]) for cell in document["cells"] if cell["cell_type"] == "code"]
+    shown = [run_cell(cell, scope) for cell in cells]
+    assert any(shown)
+    assert all(cell.get("outputs", []) == [] for cell in document["cells"])  # they would grow old
+
+
+def run_cell(source, scope):
+    """Run a cell as a notebook does: what its last line is worth is shown, in HTML if it can be."""
+    *statements, last = ast.parse(source).body
+    ends_in_value = isinstance(last, ast.Expr)
+    exec(compile(ast.Module([*statements, *([] if ends_in_value else [last])], []), "cell", "exec"), scope)
+    if not ends_in_value:
+        return None
+    value = eval(compile(ast.Expression(last.value), "cell", "eval"), scope)
+    in_html = getattr(value, "_repr_html_", lambda: None)()
+    return in_html or (None if value is None else repr(value))

@@ -182,6 +182,8 @@ def test_what_is_said_of_all_axes_replaces_what_was_said_of_one():
 
 
 def test_curves_of_motions_that_users_bring_differ():
+    styles = method_styles(["zvd", "mine", "yours"])
+    assert len({style.colour for style in styles.values()}) == 3
     styles = method_styles(["optimal", "mine", "yours", "theirs"])
     assert len({(style.colour, style.dash) for style in styles.values()}) == 4
 

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("generator", "fmu", "exporters", "recheck", "tests", "examples", "docs")
-KINDS = {".py", ".c", ".h", ".st", ".js", ".html", ".json", ".toml", ".md"}
+KINDS = {".py", ".c", ".h", ".st", ".js", ".html", ".json", ".toml", ".md", ".ipynb"}
 PROSE = re.compile(
     r"\b(lest|who(?:m)?ever|nobody|somebody|anybody|beware|hardly\s+meant|doubtful|say\s+it"
     r"|(?:is|are|was|were|be|been|being)\s+(?:[#*/]+\s+)?told)\b",

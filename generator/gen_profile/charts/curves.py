@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle
 
 import attrs
 import numpy as np
@@ -90,6 +91,25 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
         caption=f"The reference and its derivatives. {drawn}. Dashed in red: limits of the spec.",
         panels=panels,
     )
+
+
+def profile_figure(profile: Profile) -> Figure:
+    """Draw a motion and its derivatives by themselves, in SI units, each axis a line."""
+    panels = [
+        Panel(
+            title=quantity,
+            x_label=TIME,
+            y_label=f"{quantity.lower()} ({unit.format('m')} or {unit.format('rad')})",
+            lines=[
+                derivative_line(
+                    f"axis {axis + 1}", profile, order, axis, Style(colour=PALETTE[axis % len(PALETTE)])
+                )
+                for axis, colour in zip(range(profile.axes), cycle(PALETTE), strict=False)
+            ],
+        )
+        for order, (quantity, unit) in enumerate(ORDERS)
+    ]
+    return Figure(caption="The motion and its derivatives.", panels=panels)
 
 
 def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:

@@ -37,7 +37,11 @@ def method_styles(methods: Iterable[str], thick: Collection[str | None] = ()) ->
         for dash, first, group in GROUPS
         for place, method in enumerate(group)
     }
-    others = cycle(reversed(PALETTE))  # the spec's own β first, then what users bring
+    methods = list(methods)
+    taken = {looks[method][0] for method in methods if method in looks}
+    # the spec's own β first, then what users bring: first in colours that no other curve has
+    backwards = PALETTE[::-1]
+    others = cycle(sorted(backwards, key=taken.__contains__))
     styles = {}
     for method in methods:
         colour, dash = looks.get(method) or (next(others), "solid")

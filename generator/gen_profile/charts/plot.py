@@ -7,8 +7,10 @@ from tempfile import TemporaryDirectory
 
 import attrs
 
+from gen_profile.charts.check import check_figure
 from gen_profile.charts.comparison import comparison_figure
-from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
+from gen_profile.charts.curves import motion_figure, profile_figure, select_machines, sway_figure
+from gen_profile.charts.figure import Figure
 from gen_profile.charts.identification import identification_figure
 from gen_profile.charts.machine import draw_machine
 from gen_profile.charts.picture import require_drawable, save
@@ -21,7 +23,10 @@ from gen_profile.designs.plan import Plan
 from gen_profile.designs.planner import Deployment
 from gen_profile.errors import OutputError
 from gen_profile.identification.identify import Identification
+from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
+from gen_profile.verification.check import Judgement
+from gen_profile.verification.verdict import Check
 
 
 @attrs.frozen
@@ -34,15 +39,17 @@ class Picture:
         return self.svg
 
 
-def plot(
-    result: Spec | Plan | Design | Comparison | Robustness | Identification | Deployment,
-    path: Path | str | None = None,
-) -> Picture | None:
-    """Draw a machine, a motion and its sway, a comparison, robustness, a fitted swing or a planner's proof.
+Drawn = (
+    Spec | Plan | Design | Profile | Check | Judgement | Comparison | Robustness | Identification | Deployment
+)
+
+
+def plot(result: Drawn, path: Path | str | None = None) -> Picture | None:
+    """Draw a result: a machine, a motion, its sway, a check, a comparison, a fitted swing, a proof.
 
     Parameters
     ----------
-    result : Spec, Plan, Design, Comparison, Robustness, Identification or Deployment
+    result : Spec, Plan, Design, Profile, Check, Judgement, Comparison, Robustness, Identification, Deployment
     path : Path or str, optional
         Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
 
@@ -61,31 +68,37 @@ def plot(
     match result:
         case Spec(plant=plant):
             draw_machine(result.machine(), plant.parameters, path, f"{result.name}: {plant.type}")
-            return None
-        case Design(plan=made):
-            plot(made, path)
-            return None
-        case Plan(spec=spec, evaluation=evaluation):
-            arrival = evaluation.motion.duration
-            sway = sway_figure(spec, evaluation, select_machines(evaluation), arrival)
-            figures = [motion_figure(spec, evaluation), sway]
-            save(figures, path, spec.name, f"{spec.name}: {spec.plant.type}")
-            return None
-        case Comparison(spec=spec):
-            figure, title = comparison_figure(result), f"{spec.name}: {spec.plant.type}"
-        case Robustness(spec=spec):
-            load = spec.machine().end_load_name
-            title = f"{spec.name}: residual sway of the {load} on machines that are not as specified"
-            figure = robustness_figure(result)
-        case Identification(spec=spec):
-            names = ", ".join(result.estimate.values)
-            figure, title = identification_figure(result), f"{spec.name}: {names} identified"
         case Deployment(spec=spec, block=block, proof=proof):
             if proof is None:
                 raise OutputError("There is nothing to draw: the block was not proved.")
             draw(spec, block.text, proof, path)
-            return None
+        case Design(plan=part) | Judgement(check=part):
+            plot(part, path)
+        case _:
+            figures, name, title = _figures(result)
+            save(figures, path, name, title)
+    return None
+
+
+def _figures(result: object) -> tuple[list[Figure], str, str]:
+    """Choose the figures of a result, with a name and a title."""
+    match result:
+        case Plan(spec=spec, evaluation=evaluation):
+            arrival = evaluation.motion.duration
+            sway = sway_figure(spec, evaluation, select_machines(evaluation), arrival)
+            return [motion_figure(spec, evaluation), sway], spec.name, f"{spec.name}: {spec.plant.type}"
+        case Profile(method=method):
+            return [profile_figure(result)], method, method
+        case Check():
+            return [check_figure(result)], "check", "The check"
+        case Comparison(spec=spec):
+            return [comparison_figure(result)], spec.name, f"{spec.name}: {spec.plant.type}"
+        case Robustness(spec=spec):
+            load = spec.machine().end_load_name
+            title = f"{spec.name}: residual sway of the {load} on machines that are not as specified"
+            return [robustness_figure(result)], spec.name, title
+        case Identification(spec=spec):
+            names = ", ".join(result.estimate.values)
+            return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"
         case _:
             raise TypeError(f"There is no picture of a {type(result).__name__}.")
-    save([figure], path, spec.name, title)
-    return None

@@ -24,6 +24,7 @@ from gen_profile.cli.options import (
     require_formats,
     scheduler_option,
     spec_options,
+    version_option,
 )
 from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 
 @click.group(cls=DefaultGroup, epilog="Example: gen-profile crane.toml --export plc --out deploy")
-@click.version_option(package_name="gen-profile", message="%(version)s")
+@version_option
 def cli() -> None:
     """Design motion profiles that leave no sway, prove them by co-simulation, and export them.
 

@@ -194,6 +194,25 @@ def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return choosing
 
 
+def version_option(command: Command) -> Command:
+    """Add ``--version``, which tells the commit, too, where the distribution was built from a checkout."""
+
+    def show(context: click.Context, _: click.Parameter, asked: bool) -> None:
+        if asked and not context.resilient_parsing:
+            from importlib.metadata import version
+            from importlib.resources import files
+
+            commit = files("gen_profile") / "commit.txt"  # of hatch_build.py
+            built_from = f" ({commit.read_text('utf-8').strip()})" if commit.is_file() else ""
+            click.echo(version("gen-profile") + built_from)
+            context.exit()
+
+    option = click.option(
+        "--version", is_flag=True, expose_value=False, is_eager=True, callback=show, help="Show the version."
+    )
+    return option(command)
+
+
 def scheduler_option(work: str) -> Callable[..., Any]:
     """Name the Dask scheduler whose workers do some work."""
     return click.option(

@@ -18,7 +18,7 @@ from gen_profile.phrase import Phrase, joined
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable, Tabled
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -44,7 +44,7 @@ class ComparedMethod:
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Comparison(Summarised):
+class Comparison(Drawable, Tabled):
     """All methods, and which to take.
 
     Attributes
@@ -67,6 +67,10 @@ class Comparison(Summarised):
     too_slow: dict[str, float]
     efficient: frozenset[str]
     recommended: dict[str, Recommendation]
+
+    def records(self) -> list[dict[str, object]]:
+        """List the methods with their figures, and whether every load keeps its limit."""
+        return [{"method": row.method, **row.figures, "safe": row.safe} for row in self.rows]
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""

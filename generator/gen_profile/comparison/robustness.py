@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from io import StringIO
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,7 +23,7 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable, Tabled
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
 
 POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
@@ -39,7 +40,7 @@ def _arrays(values: Mapping[str, Array]) -> Mapping[str, Array]:
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Robustness(Summarised):
+class Robustness(Drawable, Tabled):
     """Residual sway over relative errors of one parameter (a curve) or of two (a map).
 
     Attributes
@@ -57,6 +58,15 @@ class Robustness(Summarised):
     errors: Mapping[str, Array] = attrs.field(converter=_arrays)
     residual: Mapping[str, Array] = attrs.field(converter=_arrays)
     left_out: Mapping[str, str] = attrs.field(factory=dict)
+
+    def records(self) -> list[dict[str, object]]:
+        """List every machine with its errors, and under each method what its end load is left with in m."""
+        machines = product(*self.errors.values())
+        swayed = {method: self.end_load(method).ravel().tolist() for method in self.residual}
+        return [
+            dict(zip([*self.errors, *swayed], [*map(float, machine), *sways], strict=True))
+            for machine, *sways in zip(machines, *swayed.values(), strict=True)
+        ]
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""

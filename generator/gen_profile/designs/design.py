@@ -21,7 +21,7 @@ from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import CHECKING, with_further
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Design(Summarised):
+class Design(Drawable):
     """Outcome of the main job.
 
     Attributes

@@ -19,14 +19,14 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable
 from gen_profile.work import OutOfWork, budget
 
 EXPLAINING = "looking for what would do"
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Plan(Summarised):
+class Plan(Drawable):
     """A design that is not yet written.
 
     Attributes

@@ -22,11 +22,11 @@ from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Deployment(Summarised):
+class Deployment(Drawable):
     """A planner block, and how it was judged.
 
     Attributes

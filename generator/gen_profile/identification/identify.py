@@ -35,14 +35,14 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable
 from gen_profile.units import units_of
 
 NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Identification(Summarised):
+class Identification(Drawable):
     """Outcome of an identification.
 
     Attributes

@@ -14,7 +14,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from gen_profile.errors import GenProfileError
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable, Summarised, Tabled
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Motion:
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Profile(Summarised):
+class Profile(Drawable):
     """Piecewise polynomial motion of every actuated axis, from rest at time 0.
 
     Segment k covers ``knots[k] <= t < knots[k + 1]``; its polynomial counts time from ``knots[k]``. Before
@@ -227,7 +227,7 @@ def grid_duration(duration: float, cycle_time: float) -> float:
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class SampledProfile(Summarised):
+class SampledProfile(Summarised, Tabled):
     """What a controller issues each cycle: one setpoint per cycle and axis, the first at time 0.
 
     Attributes
@@ -277,6 +277,18 @@ class SampledProfile(Summarised):
         """Tell what a reader looks for first."""
         samples, axes = self.position.shape
         return {"axes": axes, "samples": samples, "cycle time": f"{self.cycle_time:g} s"}
+
+    def records(self) -> list[dict[str, object]]:
+        """List the samples: time, and what the artefact carries, in m or rad and s; axes by number from 1."""
+        carried = {
+            name: values
+            for name in ("position", "velocity", "acceleration", "jerk")
+            if (values := getattr(self, name)) is not None
+        }
+        axes = self.position.shape[1]
+        names = [name if axes == 1 else f"{name}_{axis}" for name in carried for axis in range(1, axes + 1)]
+        rows = np.column_stack([self.times, *carried.values()]).tolist()
+        return [dict(zip(["time", *names], row, strict=True)) for row in rows]
 
     @property
     def times(self) -> Array:

@@ -43,7 +43,7 @@ from gen_profile.spec.values import (
     Words,
     example,
 )
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable
 from gen_profile.units import AxisScale, axis_factor
 
 DEFAULT_COUNTS_PER_SI = 1e6
@@ -311,7 +311,7 @@ class ExportSpec(Checked, table="export"):
 
 
 @attrs.frozen(kw_only=True, repr=False)
-class Spec(Summarised, Checked):
+class Spec(Drawable, Checked):
     """One motion task, complete: nothing downstream looks anything else up."""
 
     name: Name = "profile"

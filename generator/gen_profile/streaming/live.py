@@ -7,9 +7,7 @@ nothing to fill up, and a viewer that hangs or dies is not noticed.
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -20,11 +18,11 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.streaming.outcome import Source
+from gen_profile.streaming.priority import lower_priority
 from gen_profile_exporters.can.streaming.record import Book, Phase
 
 PAUSE = 0.1  # s between two looks
 LAST_LOOK = 1.0  # s, for the viewer to show the end
-NICENESS = 10
 OVER = (Phase.DONE, Phase.ABORTED)
 
 
@@ -121,8 +119,7 @@ def watched(source: Source, show: Show) -> Iterator[Book]:
 def _look(memory: Any, view: View, show: Show) -> None:
     """Show a stream until it is over, or its process is gone; in a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # which is for the streamer
-    if sys.platform != "win32":
-        os.nice(NICENESS)
+    lower_priority()
     book = Book(memory, *view.planned.shape)
     parent = multiprocessing.parent_process()
 

@@ -19,6 +19,7 @@ import attrs
 
 from gen_profile.one_thread import one_thread
 from gen_profile.phrase import plain
+from gen_profile.streaming.priority import lower_priority
 
 # what can be asked, and what answers it, which only a worker loads
 ANSWERS = {
@@ -29,7 +30,6 @@ ANSWERS = {
     "log": "gen_profile.studio.logs:log",
 }
 POLITE = {"depth", "files", "log"}  # give way to what a hand waits for
-NICENESS = 10
 FRAME = 0.015  # s after the curves of a picture, in which the browser has the processor to draw them
 PAUSE = 1.0  # s after a worker was taken, in which it has the processor for itself
 BEGUN, ENDED, LOST = "begun", "ended", "lost"
@@ -219,8 +219,8 @@ def _work(connection: Connection) -> None:
 
 
 def _answer(connection: Connection, job: Job) -> None:
-    if job.kind in POLITE and sys.platform != "win32" and os.nice(0) < NICENESS:
-        os.nice(NICENESS)
+    if job.kind in POLITE:
+        lower_priority()
     connection.send(Message(number=job.number, kind=job.kind, name=BEGUN))
     for part in _parts(job):
         file, document = part.get("file"), {**part, "of": job.kind, "serial": job.number}

@@ -18,7 +18,7 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec, spec_from_dict
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
@@ -30,7 +30,7 @@ from gen_profile_exporters.registry import find_exporter, format_of
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
-class Judgement(Summarised):
+class Judgement(Drawable):
     """A check of one file, and what its manifest says about it.
 
     Attributes

@@ -13,7 +13,7 @@ from gen_profile.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
 from gen_profile.evaluation.static_deflection import StaticDeflection
 from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE
-from gen_profile.summary import Summarised
+from gen_profile.summary import Drawable, Tabled
 
 QUANTILES = (0.5, 0.9, 0.99)  # of the residual sways of a group, as they are reported
 FINE = 1e3  # µm, up to which an error is shown in these
@@ -68,7 +68,7 @@ class Examination:
 
 
 @attrs.frozen(kw_only=True, repr=False)
-class Check(Summarised, Examination):
+class Check(Drawable, Tabled, Examination):
     """Verdict on one artefact.
 
     Attributes
@@ -116,6 +116,19 @@ class Check(Summarised, Examination):
             "machines": len(self.findings),
             "worst": f"{load} {1e3 * worst.residual[load]:.4g} mm of {1e3 * self.limit[load]:.4g} mm allowed",
         }
+
+    def records(self) -> list[dict[str, object]]:
+        """List what was tried: machine, parameters, residual sway of every load in m, and the verdict."""
+        return [
+            {
+                "group": finding.scenario.group,
+                "machine": finding.scenario.name,
+                **finding.scenario.parameters,
+                **{f"{load}_m": sway for load, sway in finding.residual.items()},
+                "passed": self.keeps_limit(finding),
+            }
+            for finding in self.findings
+        ]
 
     @property
     def groups(self) -> dict[str, tuple[Finding, ...]]:

@@ -1,4 +1,4 @@
-"""Print the picture of docs/architecture.md, drawn from the import layers and the packages' first lines.
+"""Print the table of docs/architecture.md, made from the import layers and the packages' first lines.
 
 python docs/draw_layers.py
 """
@@ -32,22 +32,13 @@ def purpose(name: str) -> str:
     return (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").partition("\n")[0].rstrip(".")
 
 
-def label(name: str) -> str:
-    """Name a package with its purpose."""
-    return f"<b>{name.removeprefix('gen_profile.')}</b><br>{purpose(name)}"
-
-
-def picture() -> str:
-    """Draw a flow chart in Mermaid's language."""
-    rows = layers()
-    lines = ["flowchart TB"]
-    for number, row in enumerate(rows):
-        lines.append(f'  subgraph layer{number}[" "]')
-        lines += [f'    {name.replace(".", "_")}["{label(name)}"]' for name in row]
-        lines.append("  end")
-    lines += [f"  layer{number} --> layer{number + 1}" for number in range(len(rows) - 1)]
+def table() -> str:
+    """Lay the layers out as a table, top to bottom."""
+    lines = ["| layer | package | what |", "|---|---|---|"]
+    for number, names in enumerate(layers(), 1):
+        lines += [f"| {number} | `{name.removeprefix('gen_profile.')}` | {purpose(name)} |" for name in names]
     return "\n".join(lines)
 
 
 if __name__ == "__main__":
-    sys.stdout.write(picture() + "\n")
+    sys.stdout.write(table() + "\n")
