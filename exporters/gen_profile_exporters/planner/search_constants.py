@@ -1,4 +1,4 @@
-"""How a planner block searches for a plan: what its interior-point method and its first guesses are tuned by."""
+"""How a planner block searches for a plan: constants of its interior-point method and its first guesses."""
 
 from __future__ import annotations
 
