@@ -19,19 +19,19 @@ planner = {{ live = {{ L1 = [0.3, 0.6] }} }}
 check = {{ residual_sway = 0.01 }}
 export = {{ cycle_time = {CYCLE} }}
 """
-ORDERS = (  # s until the next, target in m: much of the worst that a search found of the block without
+ORDERS = (  # s until the next, target in m: what a search found that leaves much of the block without
     (2.74, 1.63),
-    (0.11, 1.263),
-    (0.1, 0.82),
-    (5.3, 2.0),
-    (0.04, 1.845),
+    (0.08, 1.413),
+    (0.07, 0.82),
+    (4.0, 1.99),
+    (0.04, 1.349),
     (1.11, 1.233),
-    (1.72, 2.0),
-    (0.36, 0.246),
-    (0.05, 1.451),
-    (1.69, 0.925),
-    (0.27, 2.0),
-    (20.0, 1.158),
+    (1.72, 1.99),
+    (0.36, 0.092),
+    (0.04, 1.451),
+    (1.7, 0.634),
+    (0.09, 1.528),
+    (20.0, 0.103),
 )
 
 
@@ -60,10 +60,10 @@ def left(out, L1, m1=0.192, m2=0.183, L2=0.391, g=9.81):
 
 
 def test_stated_errors_leave_less_of_new_targets_in_time_with_the_fast_mode():
-    """Rope and load are some per cent off: 7 mm in the fast mode where the block knows of no errors."""
+    """Rope and load are some per cent off: 13 mm in the fast mode where the block knows of no errors."""
     unaware = left(played("{}", ORDERS, 2.0), 0.382)
     aware = left(played("{L1=0.05, m2=0.1}", ORDERS, 2.0), 0.382)
-    assert unaware[1] > 4e-3
+    assert unaware[1] > 0.01
     assert aware.max() < 2e-3
 
 

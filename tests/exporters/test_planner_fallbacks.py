@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from driven_block import CYCLE, Driver
+from driven_block import CYCLE, Driver, frequencies, residual
 
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import preset_spec
@@ -13,6 +13,33 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def text():
     return planner_block(preset_spec("bay-crane")).text
+
+
+FOUND = "bGood := bMet AND ((fPlanWay > 1.0E-9) OR (nTail > 0));"
+
+
+@pytest.fixture(scope="module")
+def helpless(text):
+    """A block whose search never finds a stop, nor a way to another velocity."""
+    assert text.count(FOUND) == 1
+    return text.replace(FOUND, FOUND.replace("bMet", "(nJob <> cJobStop) AND bMet"))
+
+
+@pytest.mark.parametrize("seconds", [1.2, 6.0, 20.0])
+@pytest.mark.parametrize("order", [{"bStop": 1}, {"rOverride": 0.0}, {"bVelocity": 1}])
+def test_an_axis_stops_where_no_stop_can_be_planned(helpless, seconds, order):
+    """By pulses, without sway and within the stated ends: it went on to its old target, 25 m away."""
+    driver = Driver(helpless, fActPosition=2.0, fL1=6.0, fm2=2000.0).hold(5.0)
+    driver.hold(seconds, bExecute=1, fTarget=30.0).hold(CYCLE, bExecute=int("rOverride" in order), **order)
+    driver.parts.append(driver.block.play_on(round(40.0 / CYCLE)))
+    low, high = (driver.parts[1][name][-1] for name in ("fStopLow", "fStopHigh"))
+    place, velocity = (driver.parts[-1][name] for name in ("fPosition", "fVelocity"))
+    assert velocity[round(5.0 / CYCLE)] < 0.9 * velocity[: round(5.0 / CYCLE)].max()
+    assert np.abs(velocity[: round(12.5 / CYCLE)]).min() < 0.1
+    assert place.min() >= low
+    assert place.max() <= min(high, place[0] + 12.0)
+    assert velocity[-1] == 0.0
+    assert residual(driver.outputs, frequencies(6.0, 2000.0)) < 1e-12
 
 
 def last_motion(driver):

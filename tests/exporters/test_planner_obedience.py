@@ -253,6 +253,15 @@ def test_a_slow_stick_has_its_velocity_soon_and_ends_soon(text, order, way):
     assert 0.0 < last(driver, "fPosition") - begin < way
 
 
+def test_a_stick_at_zero_takes_the_axis_from_its_way_to_a_target(text):
+    """It went on to the target, 25 m away, since nothing of the stick had changed."""
+    driver = standing(text, 2.0).hold(6.0, bExecute=1, fTarget=30.0)
+    begin = last(driver, "fPosition")
+    driver.hold(7.0, bVelocity=1, fVelocityCommand=0.0)
+    assert last(driver, "fVelocity") == 0.0
+    assert last(driver, "fPosition") - begin < 4.0
+
+
 def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text):
     ends = []
     for phase in np.arange(0.0, 0.3, 0.05):

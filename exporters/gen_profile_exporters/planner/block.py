@@ -47,6 +47,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile_exporters.block_source import initialiser
+from gen_profile_exporters.planner import search_constants as of_search
 from gen_profile_exporters.planner import sensor_constants as of_sensor
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants, axis_interface, axis_words
 from gen_profile_exporters.playback.structured_text import block_name, literal
@@ -64,7 +65,6 @@ REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LON
 SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
 CHUNK = 45  # slots that a phase takes at once
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
-ITERATIONS = 6
 RAMP_LEAST = 0.05  # of full speed: a change of the stick that is planned for
 RAMP_LEAST_SLOTS = 9
 TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
@@ -72,22 +72,15 @@ PULSE_ADMITTED = 0.9
 ADMITTED = 0.8  # of the allowed sway: no plan that leaves more, if that is more than now
 BETWEEN = 1.05  # of the sway on the machines watched: those between them
 MET = 1e-6  # sum of shares by which a plan may miss a condition
-RAMP_SLOTS = 5.0  # that a plan to another velocity takes longer than the axis alone would
 VARIATIONS = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated errors: machines watched
 HOLD = 0.2  # s, in which an input that is out of range is held
 STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
 ROUNDING = 1e-3  # of a live parameter's greatest rate
 SPARE = 0.3  # slots more than expected, by slots between two measured motions
-MORE_ITERATIONS = 5  # where these do not lead to a plan
-WAY_ITERATIONS = 13  # where the axis moves already
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
-STALLED = 0.015  # of the full step: three shorter ones end a search; orders take as long, within 2 %
 MOST_LONGER = 20  # slots by which a plan may take longer than expected before pulses are quicker
 MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
-CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
-AGAINST = 0.1  # share of full speed away from a new target, from which an axis turns round first
-NEARER = 6.0  # slots at full speed, by which a new target is so much nearer that the axis brakes first
-STEP = 0.93  # share of the way to the nearest bound that it goes
+AGAINST = 0.1  # share of full speed, below which a tap of the stick ends by itself
 FRESH = 8  # cycles, for which the machine that is followed counts as constant
 AT_ONCE = 2.0  # of full speed, from a slot's pulse to the next: no bound
 AFTER_CUT = 0.1  # of full speed, by which pulses grow from slot to slot after one was cut
@@ -360,9 +353,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cWork": _work(c),
         **({"cZones": ZONES} if c.zones else {}),
         "cHoldCycles": round(HOLD / c.cycle),
-        "cIterations": ITERATIONS,
-        "cMoreIterations": MORE_ITERATIONS,
-        "cWayIterations": WAY_ITERATIONS,
+        **of_search.whole(),
         "cColumnWork": _column_work(c),
         "cReaches": len(_reach_slots(c)),
         **of_sensor.whole(c.sensor, modes, c.cycle),
@@ -397,7 +388,9 @@ def _reaction(c: PlannerConstants) -> float:
 
     def bound(period: float) -> float:
         cycles = max(1, round(period / (SLOTS_PER_PERIOD * c.cycle)))
-        ahead = 2 + 2 * len(c.axes) * WAY_ITERATIONS * _column_work(c) * MOST // (_work(c) * cycles)
+        ahead = 2 + 2 * len(c.axes) * of_search.SEARCH_ITERATIONS * _column_work(c) * MOST // (
+            _work(c) * cycles
+        )
         return 2 * (ahead + 2) * cycles * c.cycle
 
     return max(bound(period) for period in c.periods)
@@ -411,7 +404,7 @@ def _longest_slot(c: PlannerConstants) -> int:
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 110 + 4 * c.modes * (4 * c.modes + 17)
-    axes = (120 + (following if c.rates else 0)) * len(c.axes)
+    axes = (120 + (following if c.rates else 0) + (23 * ZONES if c.zones else 0)) * len(c.axes)
     return axes - 35 + of_sensor.cycle_work(c.sensor, c.modes)
 
 
@@ -437,7 +430,6 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cRate": min(axis.acceleration / axis.velocity for axis in c.axes),
         "cCurve": min(axis.jerk / axis.velocity for axis in c.axes),
-        "cStalled": STALLED,
         "cInside": INSIDE + (RESERVE if c.rates else 0.0),
         "cReserve": RESERVE if c.rates else 0.0,
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
@@ -459,14 +451,11 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
             }
         ),
         "cRampLeast": RAMP_LEAST,
-        "cRampSlots": RAMP_SLOTS,
         "cMet": MET,
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,
-        "cCentre": CENTRE,
-        "cNearer": NEARER,
         "cAgainst": AGAINST,
-        "cStep": STEP,
+        **of_search.real(robust=not c.sway_share),
         **of_sensor.real(c.sensor, c.cycle),
     }
 
