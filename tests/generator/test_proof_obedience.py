@@ -110,7 +110,7 @@ REACTIONS = {TOLD: 20, STICK: 20, STOPPED: 20}
 
 
 def kinds(followed, reactions=REACTIONS):
-    return {kind_of(fault) for fault in faults(followed, reactions)}
+    return {kind_of(fault) for fault in faults(measured(followed, reactions), CYCLE)}
 
 
 def with_output(name, within, value):
@@ -207,6 +207,7 @@ FAULTS = {
     "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
     "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
     "sway left": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
+    "understated": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
     "event": with_output("nEvents", 0, 0.0),
     "promise": with_output("bPromise", 300, 0.0),
     "lost": with_output("nPromise", slice(2000, 3000), 1.0),
@@ -243,7 +244,7 @@ def test_a_command_that_changes_nothing_for_too_long_is_obeyed_late():
 
 
 def test_faults_tell_when_and_by_how_much():
-    (fault,) = faults(FAULTS["distance"], REACTIONS)
+    (fault,) = faults(measured(FAULTS["distance"], REACTIONS), CYCLE)
     assert fault == "fDistanceToGo is wrong by 3.19 m, at 3.00 s"
 
 

@@ -132,6 +132,10 @@ class Followed:
         """Give an output of all axes, (axes, cycles)."""
         return np.stack([self.issued[axis.of(name)] for axis in self.axes])
 
+    def sensed(self, name: str) -> Flags:
+        """Tell when an output of a block with a sensor is set; never of one without."""
+        return np.asarray(self.issued.get(name, np.zeros(self.cycles)) != 0.0)
+
     @property
     def cycles(self) -> int:
         """How many there were."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -82,6 +82,7 @@ WORDS = {
     "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
     "swings": "a motion leaves the machine as given swinging by {needed:.3g} m",
     "sway left": "fSwayLeft is wrong by {needed:.3g} m",
+    "understated": "errors leave more than fSwayLeft states by {needed:.3g} m",
     "event": "the events that are kept are not those that happened",
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
@@ -89,17 +90,17 @@ WORDS = {
 }
 
 
-def faults(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[str]:
+def faults(measurements: Iterable[Allowance], cycle: float) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence; each kind once, where it is worst."""
     worst: dict[str, Allowance] = {}
-    for met in measured(followed, reactions):
+    for met in measurements:
         if not met.needed <= met.allowed:
             known = worst.get(met.what)
             if known is None or met.needed - met.allowed > known.needed - known.allowed:
                 worst[met.what] = met
     for what, met in worst.items():
         words = WORDS[what].format(needed=met.needed, over=met.needed - met.allowed)
-        yield f"{words}, at {met.cycle * followed.cycle:.2f} s"
+        yield f"{words}, at {met.cycle * cycle:.2f} s"
 
 
 def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
@@ -169,7 +170,22 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         elif end > latest:
             yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
         if first < end and order.kind == POSITION:
-            yield Allowance("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
+            yield from _left(followed, motion, (first, end), allowed)
+
+
+def _left(
+    followed: Followed, motion: IssuedMotion, cycles: tuple[int, int], arriving_again: float
+) -> Iterator[Allowance]:
+    """Judge that a target is left but to damp what was measured, and then reached again."""
+    first, last = cycles
+    damps, away = followed.sensed("bDamping"), motion.away[first:last]
+    for begin, end in runs_of(away > max(EXACT, followed.wander)):
+        damped = np.flatnonzero(damps[first + begin : first + end])
+        if damped.size and damped[0] <= 1:
+            returns = (end - begin - int(damped[-1])) * followed.cycle
+            yield Allowance(POSITION, first + begin, returns, arriving_again)
+        else:
+            yield Allowance("left", first + begin, float(away[begin:end].max()), EXACT)
 
 
 def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice) -> Flags:

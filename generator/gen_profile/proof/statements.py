@@ -45,6 +45,7 @@ TURNING = 0.05  # of the greatest velocity, below which a plan may begin that tu
 BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
 AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
 BESIDE = 1e-4  # of the allowed sway, likewise
+LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
@@ -71,7 +72,8 @@ def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from never("vanished", received.holds & motion.goes & ~busy & ~done)
     if not followed.reserve:  # calming goes on as long as it must
         yield from _lasting(followed, "not done", there & ~done)
-        yield from _lasting(followed, "not busy", busy & motion.stands & ~(received.holds & motion.goes))
+        asked = received.holds & motion.goes | followed.sensed("bDamping")
+        yield from _lasting(followed, "not busy", busy & motion.stands & ~asked)
 
 
 def _lasting(followed: Followed, what: str, flags: Flags) -> Iterator[Allowance]:
@@ -104,7 +106,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     time, slot = followed.issued["fTimeToGo"], 2.0 * followed.cycle
     for order in followed.orders:
         moving = np.flatnonzero(~motion.stands[order.begin : order.end])
-        if not len(moving):
+        if not len(moving) or followed.sensed("bDamping")[order.begin : order.end].any():
             continue
         rests = order.begin + int(moving[-1]) + 1
         if rests >= order.end or not _is_end(motion, order, rests):
@@ -201,7 +203,7 @@ def _shown(followed: Followed) -> Iterator[tuple[int, int]]:
 
 def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
     """Tell when it may, and when it must be unknown how the load swings."""
-    may_be, must_be = np.zeros((2, followed.cycles), dtype=bool)
+    may_be, must_be = np.cumsum(followed.sensed("nSensorFault")) > 0, np.zeros(followed.cycles, dtype=bool)
     for order in followed.orders:
         moving, at = not motion.stands[max(0, order.begin - 1)], order.begin
         if order.kind == DISABLED:
@@ -357,12 +359,17 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
     if followed.modes is None or not ends:
         return
-    as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
+    as_given, watched, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
     limit, stated = followed.sway_limit, followed.issued.get("fSwayLeft")
     if not followed.modes.damped:
         worst = int(np.argmax(as_given))
         yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
     if stated is not None and not followed.modes.damped:
-        wrong = np.abs(stated[ends] - BETWEEN * at_most) - AS_STATED * at_most
+        wrong = np.abs(stated[ends] - BETWEEN * watched) - AS_STATED * watched
         worst = int(np.argmax(wrong))
         yield Allowance("sway left", ends[worst], float(wrong[worst]), BESIDE * limit)
+        promised = followed.issued["bPromise"][ends] != 0.0
+        yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
+        above = (at_most - (1.0 + AS_STATED) * stated[ends]) * promised
+        worst = int(np.argmax(above))
+        yield Allowance("understated", ends[worst], float(above[worst]), BESIDE * limit)
