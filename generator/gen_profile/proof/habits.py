@@ -16,6 +16,7 @@ CREEPING = 40
 LONGEST_WAIT = 0.6  # s, from one of them to the next
 SOON = 100  # cycles, in which a mind is changed
 STOPS = 4
+HELD = 0.15  # s, at most, in which the last good ones are held in place of values that cannot be
 WRONG = 0.5  # s, at least, in which values count that cannot be
 OUTSIDE = 10.0  # m (or rad) beyond the targets
 FAR = 1e6  # m (or rad)
@@ -262,18 +263,19 @@ def _held(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _wild(command: Command, how: float, around: Surroundings) -> Manner:
-    """Give one cycle of a live parameter, override or velocity limit that cannot be, or a spike."""
-    values: list[dict[str, float]] = [
-        {"rOverride": nan},
-        {"rOverride": 1.5},
-        {f"fVelocityLimit{around.suffixes[0]}": -1.0},
+    """Give shortly a live parameter, override or velocity limit that cannot be, or a spike for one cycle."""
+    lasts = _log(around.cycle, HELD, _fraction(how, 9))
+    values: list[tuple[str, float, float]] = [
+        ("rOverride", nan, lasts),
+        ("rOverride", 1.5, lasts),
+        (f"fVelocityLimit{around.suffixes[0]}", -1.0, lasts),
     ]
     for name, (low, high) in around.live.items():
-        spike = low + _fraction(how, 8) * (high - low)
-        values += [{f"f{name}": wild} for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high, spike, spike)]
-    inputs = values[int(how * len(values)) % len(values)]
-    later = around.period * _fraction(how, 3)
-    return Manner(commands=(command,), changes=(Change(time=command.time + later, lasts=0.0, inputs=inputs),))
+        values += [(f"f{name}", wild, lasts) for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high)]
+        values += [(f"f{name}", low + _fraction(how, 8) * (high - low), 0.0)] * 2
+    name, wild, lasts = values[int(how * len(values)) % len(values)]
+    begin = command.time + around.period * _fraction(how, 3)
+    return Manner(commands=(command,), changes=(Change(time=begin, lasts=lasts, inputs={name: wild}),))
 
 
 def _wrong(command: Command, how: float, around: Surroundings) -> Manner:

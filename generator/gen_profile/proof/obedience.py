@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from gen_profile.proof.followed import (
+    AHEAD,
     ENABLED,
     EXACT,
     FROM_REST,
     IN_VELOCITY,
     RUN_OUT,
     TO_SLOW,
-    TO_STICK,
     TO_STOP,
     TO_TURN,
     Allowance,
@@ -150,8 +150,6 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 allowed = arriving(followed, place, before, order)
                 there = (motion.away[own] <= EXACT) & motion.stands[own]
             case "velocity":
-                if max(map(abs, order.values)) > followed.slowest:
-                    continue
                 tops = [(1.0 - followed.reserve) * top for top in order.tops]
                 wanted = [min(max(w, -top), top) for w, top in zip(order.values, tops, strict=True)]
                 allowed = reaching(followed, before, wanted)
@@ -189,7 +187,7 @@ def _left(
 
 
 def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice) -> Flags:
-    """Whether an axis has a velocity, or is at the end of its way."""
+    """Whether an axis has a velocity, or is near the end of its way or a slow interval."""
     limits = followed.limits[axis]
     reached = (
         np.abs(motion.velocity[axis, own] - wanted)
@@ -197,12 +195,13 @@ def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, ow
     )
     if not wanted or reached[-1]:
         return reached
-    room, speed = followed.room(axis, motion.position[axis, own], np.array(wanted)), abs(wanted)
-    return reached | (
-        room
-        <= speed
-        * (speed / limits.acceleration + limits.acceleration / limits.jerk + TO_STICK * followed.period)
-    )
+    position, speed = motion.position[axis, own], abs(wanted)
+    near = speed * (speed / limits.acceleration + limits.acceleration / limits.jerk + AHEAD * followed.period)
+    reached |= followed.room(axis, position, np.array(wanted)) <= near
+    for zone in followed.zones:
+        if zone.axis == axis and 0.0 < zone.limit < speed:
+            reached |= np.maximum(zone.low - position, position - zone.high) <= near
+    return reached
 
 
 def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

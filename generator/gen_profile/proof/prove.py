@@ -73,7 +73,7 @@ def prove(
         for numbers in numbering.rounds:
             climbs = numbering.group(numbers[0]) == RHYTHMS
             among = [one for one in judged if (one.group == RHYTHMS) == climbs]
-            worst = sorted(among, key=lambda one: _fraction(spec, one), reverse=True)[:KEPT]
+            worst = sorted(among, key=lambda one: _height(spec, one), reverse=True)[:KEPT]
             numbering = numbering.after_round([one.number for one in worst])
             judged += judge(numbering, numbers)
         return _verdict(spec, loop, numbering, judged, progress)
@@ -121,8 +121,13 @@ def _on_cluster(
 
 def _fraction(spec: Spec, judged: JudgedHistory) -> float:
     """Tell how near a history comes to a limit; a fault is beyond all."""
+    return np.inf if judged.faults else judged.fraction(spec.check.residual_sway, 0.0)
+
+
+def _height(spec: Spec, judged: JudgedHistory) -> float:
+    """Tell by what the search climbs: in a rhythm by what any stated error would leave."""
     by_errors = judged.left / min(spec.check.residual_sway.values())
-    return np.inf if judged.faults else max(judged.fraction(spec.check.residual_sway, 0.0), by_errors)
+    return max(_fraction(spec, judged), by_errors * (judged.group == RHYTHMS))
 
 
 def _verdict(

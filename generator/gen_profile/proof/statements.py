@@ -44,7 +44,8 @@ ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
 BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
 AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
-BESIDE = 1e-4  # of the allowed sway, likewise
+BESIDE, MOST_BESIDE = 1e-4, 500.0  # of the allowed sway, likewise; and how often that may be after long
+EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
@@ -365,11 +366,15 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         worst = int(np.argmax(as_given))
         yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
     if stated is not None and not followed.modes.damped:
-        wrong = np.abs(stated[ends] - BETWEEN * watched) - AS_STATED * watched
+        turned = (
+            np.array(ends) * followed.cycle / (EXACTLY * followed.period)
+        )  # by frequencies that are rounded
+        beside = BESIDE * limit * np.clip(turned**2, 1.0, MOST_BESIDE)
+        wrong = np.abs(stated[ends] - BETWEEN * watched) - AS_STATED * watched - beside
         worst = int(np.argmax(wrong))
-        yield Allowance("sway left", ends[worst], float(wrong[worst]), BESIDE * limit)
+        yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        above = (at_most - (1.0 + AS_STATED) * stated[ends]) * promised
+        above = (at_most - (1.0 + AS_STATED) * stated[ends] - beside) * promised
         worst = int(np.argmax(above))
-        yield Allowance("understated", ends[worst], float(above[worst]), BESIDE * limit)
+        yield Allowance("understated", ends[worst], float(above[worst]), 0.0)
