@@ -13,6 +13,7 @@ from typing import Self
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.evaluation.simulation import AT_REST
@@ -147,7 +148,7 @@ class ClosedLoop:
         ExportError, CosimulationError
         """
         script, block = self._script(history), self._block.called()
-        if history.commands[-1].time > SHIFT:  # too long to be kept whole
+        if history.commands[-1].time >= SHIFT:  # too long to be kept whole
             return WatchedRun(run=self._followed(history, block, script, rows=0))
         orders = self._watch.orders(script)
         marks = self._watch.marks(orders) if history.sensed is None else ()
@@ -216,9 +217,9 @@ class ClosedLoop:
         for number, axis in self._histories.axes.items():
             position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))] + pushed
         script = self._script(history)
-        row = np.searchsorted(script.start_cycles, np.arange(len(traced)), side="right") - 1
+        given = _rows_at(script.start_cycles, script.inputs, np.arange(len(traced)))
         for hoist in self._hoists(history):
-            position[1:, hoist.axis] = hoist.ratio * script.inputs[row, hoist.column]
+            position[1:, hoist.axis] = hoist.ratio * given[:, hoist.column]
         with PlantCosimulation(self._machine) as fmu:
             response = fmu.run(
                 SampledProfile(cycle_time=self.cycle, position=position),
@@ -264,14 +265,10 @@ class ClosedLoop:
         self, history: History, start_cycles: Sequence[int], inputs: Array
     ) -> tuple[Sequence[int], Array]:
         """Let the last row begin no sooner than what swings at first, or after a gust, was measured."""
-        ends = 0
-        if history.sensed:
-            ends = math.ceil((history.sensed.ends + self._histories.period) / self.cycle)
-        return (
-            (start_cycles, inputs)
-            if ends <= start_cycles[-1]
-            else ([*start_cycles, ends], np.vstack([inputs, inputs[-1]]))
-        )
+        ends = math.ceil((history.sensed.ends + self._histories.period) / self.cycle) if history.sensed else 0
+        if ends <= start_cycles[-1]:
+            return start_cycles, inputs
+        return [*start_cycles, ends], np.vstack([inputs, inputs[-1]])
 
     def _sensor_faults(self, history: History, run: BlockRun) -> Iterator[str]:
         """Judge how the block used its sensor; after a quick stop at the end it does not."""
@@ -306,7 +303,7 @@ class ClosedLoop:
         starting = math.ceil(HOIST_STARTS * self._histories.period / self.cycle)
         end = max(corners[-1][0] for corners in history.hoisting.values())
         cycles = np.arange(max(start_cycles[-1], math.ceil(end / self.cycle) + starting) + 1)
-        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+        inputs = _rows_at(start_cycles, inputs, cycles)
         for name, corners in history.hoisting.items():
             low, high = self._spec.planner.live[name]
             line = np.interp(np.arange(1 - starting, len(cycles)) * self.cycle, *np.transpose(corners))
@@ -321,7 +318,7 @@ class ClosedLoop:
         if not noise:
             return start_cycles, inputs
         cycles = np.arange(start_cycles[-1] + math.ceil(NOISY_ON * self._histories.period / self.cycle))
-        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+        inputs = _rows_at(start_cycles, inputs, cycles)
         for name, most in noise.items():
             reported = inputs[:, list(self._block.inputs).index(f"f{name}")]
             reported[:] = np.clip(
@@ -342,7 +339,7 @@ class ClosedLoop:
         ]
         edges = {edge for begin, end, _ in spans for edge in (begin, end) if edge < LONGEST}
         cycles = sorted({*start_cycles, *edges})
-        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+        inputs = _rows_at(start_cycles, inputs, cycles)
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
             for name, value in change.inputs.items():
@@ -373,6 +370,12 @@ class ClosedLoop:
         for axis, place in zip(self._machine.actuated, self._places(history), strict=True):
             values |= {f"{axis.name}.start": place, f"{axis.name}.setpoint": place}
         return values | dict(history.sensed.starts if history.sensed else {})
+
+
+def _rows_at(start_cycles: Sequence[int], inputs: Array, cycles: Sequence[int] | NDArray[np.int64]) -> Array:
+    """Give the rows that hold in some cycles."""
+    rows: Array = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+    return rows
 
 
 def _cycles(script: Script) -> int:

@@ -66,11 +66,9 @@ WORDS = {
     "vanished": "none of bBusy, bDone, bCommandAborted and bError tells of a command",
     "in velocity": "bInVelocity is set without the velocity of the command",
     "not in velocity": "bInVelocity is not set at the velocity of the command",
-    "aborted": "bCommandAborted is set though no command was replaced",
-    "not aborted": "bCommandAborted is not set though a command was replaced",
+    "aborted": "bCommandAborted does not tell what became of the command",
     "error": "bError and nErrorId contradict each other",
-    "refused": "nErrorId does not tell an error, or not as long as stated",
-    "wrong error": "nErrorId tells an error without a cause, or another one",
+    "wrong error": "nErrorId does not tell the error that there is, or one without a cause",
     "disabled": "bEnabled is not what bEnable asks for",
     "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
     "zone": "nZone is not the number of the blocked interval",
@@ -255,8 +253,8 @@ def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         begin, end = order.begin, order.end
         if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
             continue
-        if before.kind == VELOCITY:
-            continue  # whose last tap still counts
+        if before.kind == VELOCITY or followed.sensed("bDamping")[begin - 1 : end].any():
+            continue  # its last tap still counts, or what was measured
         for k, way in enumerate(motion.way[:, begin].tolist()):
             velocity = motion.velocity[k, begin:end]
             if not way:

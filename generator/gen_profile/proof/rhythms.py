@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
 from gen_profile.proof.habits import Manner, Surroundings
 
 WAITS = (0.15, 1.0)  # periods, from one command to the next
 UNEVEN = 2.0  # by which every other wait may be longer or shorter
+EVEN = 1.0 / 3.0  # share of the rhythms whose waits are all the same
 STEPS = (0.002, 0.5)  # of the travel, between targets
 SPEEDS = (0.2, 1.0)  # of the greatest
 KINDS = (  # what is commanded in turn, and its sign
@@ -33,7 +32,8 @@ def rhythm(choices: Array, around: Surroundings, lasts: float) -> Manner:
     kind, wait, uneven, size, place, *shares = choices.tolist()
     beats = KINDS[min(int(kind * len(KINDS)), len(KINDS) - 1)]
     first = around.period * WAITS[0] * (WAITS[1] / WAITS[0]) ** wait
-    waits = (first, first * UNEVEN ** np.clip(3.0 * uneven - 1.5, -0.5, 0.5))  # a third are even
+    uneven = 2.0 * uneven - 1.0
+    waits = (first, first * UNEVEN ** (uneven - min(max(uneven, -EVEN), EVEN)))
     size = min(1.0, 1.1 * size)
     axes = [*zip(around.targets, around.speeds, shares, strict=True)]
     fast, far = SPEEDS[0] + size * (SPEEDS[1] - SPEEDS[0]), STEPS[0] * (STEPS[1] / STEPS[0]) ** size

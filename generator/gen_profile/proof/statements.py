@@ -64,10 +64,8 @@ def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     there = received.holds & motion.goes & motion.stands & (motion.away <= EXACT)
     yield from never("disabled", enabled != motion.guided)
     yield from never("error", error != (number != 0.0))
-    yield from never("wrong error", (number != received.error) & (number != 0.0))
-    yield from never("refused", (number != received.error) & (number == 0.0))
-    yield from never("aborted", aborted & ~received.aborted)
-    yield from never("not aborted", received.aborted & ~aborted)
+    yield from never("wrong error", number != received.error)
+    yield from never("aborted", aborted != received.aborted)
     yield from never("busy", motion.guided & ~(motion.stands | busy))
     yield from never("done", done & (busy | ~there))
     yield from never("vanished", received.holds & motion.goes & ~busy & ~done)
@@ -366,10 +364,10 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         worst = int(np.argmax(as_given))
         yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
     if stated is not None and not followed.modes.damped:
-        turned = (
+        long = (
             np.array(ends) * followed.cycle / (EXACTLY * followed.period)
         )  # by frequencies that are rounded
-        beside = BESIDE * limit * np.clip(turned**2, 1.0, MOST_BESIDE)
+        beside = BESIDE * limit * np.clip(long**2, 1.0, MOST_BESIDE)
         wrong = np.abs(stated[ends] - BETWEEN * watched) - AS_STATED * watched - beside
         worst = int(np.argmax(wrong))
         yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)

@@ -118,14 +118,14 @@ class BlockWatch:
     def marks(self, orders: Sequence[TimedOrder]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
         least = self.reaction / self.cycle
-        begins = [
+        starts = [
             one.begin
             for one in orders
             if 0 < one.begin == one.edge
             and one.end - one.begin > least
             and one.kind not in (QUICK_STOP, DISABLED)
         ]
-        return begins[:MOST_COPIES]
+        return starts[:MOST_COPIES]
 
     def faults(
         self,
