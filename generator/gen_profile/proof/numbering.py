@@ -71,9 +71,9 @@ class Numbering:
     def rounds(self) -> list[range]:
         """Numbers that depend on what is found before, round by round."""
         first, rhythms, shift, end = self._edges
-        number = min(MOST_ROUNDS, max(1, (rhythms - first) // PER_ROUND))
-        edges = np.linspace(first, rhythms, number + 1, dtype=int).tolist()
-        edges += [*range(rhythms + PER_RHYTHM, shift, PER_RHYTHM), shift, end]
+        number = min(MOST_ROUNDS, max(1, (end - first) // PER_ROUND))
+        edges = np.linspace(first, end, number + 1, dtype=int).tolist()
+        edges = [*(edge for edge in edges if edge < rhythms), *range(rhythms, shift, PER_RHYTHM), shift, end]
         return [range(begin, end) for begin, end in pairwise(edges) if begin < end]
 
     def group(self, number: int) -> str:
