@@ -130,11 +130,7 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
     monkeypatch.setattr(ClosedLoop, "watched", watched)
     histories = Histories.of(spec)
     many = [histories.history(choices) for choices in histories.drawn(4, seed=0)] * 1000
-    with (
-        ClosedLoop(spec, text, histories) as loop,
-        pytest.raises(KeyboardInterrupt),
-        loop.runs(many) as runs,
-    ):
+    with ClosedLoop(spec, text, histories) as loop, pytest.raises(KeyboardInterrupt), loop.runs(many) as runs:
         next(runs)
         raise KeyboardInterrupt
     assert 0 < len(begun) < len(many)
@@ -323,10 +319,7 @@ def test_of_several_axes_the_one_at_fault_is_named():
     stop = Command(time=0.1, command="stop")
     history = History(live={}, parameters={}, places=(0.0, 0.0), commands=(stop,), axes=axes)
     faults = judge_run(spec, WatchedRun(run=run), history, cycle=CYCLE, number=0, group=DRAWS).faults
-    assert faults == (
-        "the velocity of y is above its limit by 20 %",
-        "the axis y leaves its travel by 0.5 m",
-    )
+    assert faults == ("the velocity of y is above its limit by 20 %", "the axis y leaves its travel by 0.5 m")
 
 
 def test_after_a_quick_stop_nothing_is_promised(spec):

@@ -266,12 +266,7 @@ NAMES = [
     *("fVelocityLimit", "fL", "bReset", "fCycleTime", "fActPosition", "fActVelocity", "fFollowingLimit"),
 ]
 INPUTS = Inputs(
-    names=NAMES,
-    axes=[BlockAxis(name="")],
-    limits=[LIMITS],
-    live={"L": (1.0, 2.0)},
-    held=20,
-    cycle=CYCLE,
+    names=NAMES, axes=[BlockAxis(name="")], limits=[LIMITS], live={"L": (1.0, 2.0)}, held=20, cycle=CYCLE
 )
 
 

@@ -53,9 +53,7 @@ class GivenModes:
         shares = np.array([*ERRORS, *finer])
         poles = 1j * damped[:, None] * (1.0 + np.outer(errors, shares)) - (ratios * rates)[:, None]
         return cls(
-            poles=np.asarray(poles, dtype=np.complex128),
-            gains=np.array(gains),
-            damped=bool(ratios.any()),
+            poles=np.asarray(poles, dtype=np.complex128), gains=np.array(gains), damped=bool(ratios.any())
         )
 
     def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, ...]:

@@ -67,14 +67,7 @@ class ClosedLoop:
         Something cannot be compiled or loaded.
     """
 
-    def __init__(
-        self,
-        spec: Spec,
-        text: str,
-        histories: Histories,
-        *,
-        workers: int = 1,
-    ) -> None:
+    def __init__(self, spec: Spec, text: str, histories: Histories, *, workers: int = 1) -> None:
         self._spec, self._histories = spec, histories
         self._block = BlockInstance(text)
         self.cycle = self._block.inputs["fCycleTime"]
@@ -343,8 +336,7 @@ class ClosedLoop:
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
             for name, value in change.inputs.items():
-                if name in self._block.inputs:  # those of earlier versions have no bReset
-                    inputs[within, list(self._block.inputs).index(name)] = value
+                inputs[within, list(self._block.inputs).index(name)] = value
         return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:

@@ -19,7 +19,7 @@ EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated e
 # longest met in 6000 histories of twelve machines, but for faults of the block.
 FAR = 1.1  # of the way's time at full speed
 FROM_REST = 1.8  # (1.7)
-ON_WAY = 3.8  # to a target: after changes of mind an axis turns to and fro (3.6)
+ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (4.0)
 TO_STICK = 3.4  # to its velocity, as a motion to a target is stopped first (3.2)
 AHEAD = 1.5  # before an end of the way, or a slow interval, in which a stick's velocity need not be reached
 MORE_AXES = 1.7  # for each further axis, as they are planned one after the other (1.5)

@@ -201,13 +201,7 @@ class Histories:
             by_machine.append(linearize(spec.machine(), *_machine(spec, live_values, errors)).frequencies)
         slowest, fastest = float(np.min(by_machine)), float(np.max(by_machine))
         period = 2.0 * np.pi / slowest
-        return cls(
-            spec=spec,
-            axes=planned_axes(spec),
-            uncertain=ranges,
-            period=period,
-            fastest=fastest,
-        )
+        return cls(spec=spec, axes=planned_axes(spec), uncertain=ranges, period=period, fastest=fastest)
 
     def slowest(self, history: History) -> float:
         """Find the longest period in s of the machine that a block is given in a history."""

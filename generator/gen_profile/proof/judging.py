@@ -40,13 +40,7 @@ class WatchedRun:
 
 
 def judge_run(
-    spec: Spec,
-    watched: WatchedRun,
-    history: History,
-    *,
-    cycle: float,
-    number: int,
-    group: str,
+    spec: Spec, watched: WatchedRun, history: History, *, cycle: float, number: int, group: str
 ) -> JudgedHistory:
     """Judge what became of a history.
 

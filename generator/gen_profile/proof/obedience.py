@@ -259,16 +259,9 @@ def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             velocity = motion.velocity[k, begin:end]
             if not way:
                 yield from greatest("unasked", np.abs(velocity), 0.0, begin)
-        if order.kind == VELOCITY:
-            yield from _beyond(followed, motion, order, begin)
-
-
-def _beyond(followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: int) -> Iterator[Allowance]:
-    """Judge that no axis goes faster than its stick, from a cycle on, but to calm."""
-    for k, (wanted, own) in enumerate(zip(order.values, followed.limits, strict=True)):
-        if wanted and not followed.reserve:
-            top = abs(wanted) + MORE * own.velocity
-            yield from greatest("beyond", motion.velocity[k, begin : order.end] * np.sign(wanted), top, begin)
+            elif order.kind == VELOCITY:
+                top = abs(way) + MORE * followed.limits[k].velocity
+                yield from greatest("beyond", velocity * np.sign(way), top, begin)
 
 
 def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

@@ -51,10 +51,7 @@ class ProofRecipe:
     def of(cls, spec: Spec, text: str, histories: Histories) -> ProofRecipe:
         """Pack a proof's block and machine."""
         return cls(
-            spec=json.dumps(spec.to_dict()),
-            files=tuple(spec.files().items()),
-            text=text,
-            versions=versions(),
+            spec=json.dumps(spec.to_dict()), files=tuple(spec.files().items()), text=text, versions=versions()
         )
 
     def read_spec(self) -> Spec:

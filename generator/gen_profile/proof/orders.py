@@ -213,12 +213,7 @@ class _Reader:
             self._edge = cycle
         self._execute, self._velocity = bool(row["bExecute"]), bool(row["bVelocity"])
         return TimedOrder(
-            begin=cycle,
-            end=cycle,
-            kind=self._kind,
-            values=self._goal,
-            tops=self._tops,
-            edge=self._edge,
+            begin=cycle, end=cycle, kind=self._kind, values=self._goal, tops=self._tops, edge=self._edge
         )
 
     def _of(self, row: Mapping[str, float], name: str) -> tuple[float, ...]:
@@ -308,8 +303,6 @@ class _Reader:
 
     def _strays(self, row: Mapping[str, float]) -> bool:
         """Whether an axis is farther from its setpoint than its limit allows."""
-        if self._names("fFollowingLimit")[0] not in row:
-            return False
         pairs = zip(self._of(row, "fFollowingLimit"), self._of(row, "fActPosition"), strict=True)
         return any(limit > 0.0 and not abs(apart) <= limit for limit, apart in pairs)
 

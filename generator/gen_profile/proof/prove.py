@@ -131,11 +131,7 @@ def _height(spec: Spec, judged: JudgedHistory) -> float:
 
 
 def _verdict(
-    spec: Spec,
-    loop: ClosedLoop,
-    numbering: Numbering,
-    judged: Sequence[JudgedHistory],
-    progress: Progress,
+    spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory], progress: Progress
 ) -> Proof:
     """Bound the error at the worst histories, and let FMPy judge these and some others."""
     sound = [one for one in judged if not one.faults]

@@ -273,9 +273,7 @@ class BlockWatch:
                     yield begin, begin + sure
 
     def _rest_reports(self, script: Script, cycles: int) -> list[int]:
-        """Tell when bLoadAtRest rises; blocks of earlier versions have none."""
-        if "bLoadAtRest" not in self.inputs:
-            return []
+        """Tell when bLoadAtRest rises."""
         given = script.inputs[:, self.inputs.index("bLoadAtRest")]
         rows = np.flatnonzero(np.diff(given, prepend=0.0) > 0.0).tolist()
         return [begin for row in rows if (begin := script.start_cycles[row]) < cycles]
