@@ -188,9 +188,9 @@ def judged(
         for first in range(0, len(drawn), AT_ONCE):
             part = drawn[first : first + AT_ONCE]
             with loop.runs(part) as runs:
-                for number, (history, (run, faults)) in enumerate(zip(part, runs, strict=True), start=first):
+                for number, (history, run) in enumerate(zip(part, runs, strict=True), start=first):
                     known = {"cycle": loop.cycle, "number": number, "group": "draws"}
-                    yield number, judge_run(spec, run, history, faults, **known)
+                    yield number, judge_run(spec, run, history, **known)
 
 
 def kinds_of(spec: Spec, one: JudgedHistory) -> set[str]:

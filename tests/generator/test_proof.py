@@ -20,8 +20,8 @@ from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.judging import judge_run
-from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH, Numbering
+from gen_profile.proof.judging import WatchedRun, judge_run
+from gen_profile.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH, Numbering
 from gen_profile.proof.on_cluster import ProofRecipe, judge_part
 from gen_profile.proof.prove import prove, replay
 from gen_profile.spec.reading import parse_spec
@@ -93,7 +93,7 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
 @pytest.mark.slow
 def test_a_sound_block_is_proved(spec, proof):
     assert proof.passed
-    assert {one.group for one in proof.judged} == {CORNERS, DRAWS, SEARCH}
+    assert {one.group for one in proof.judged} == {CORNERS, DRAWS, SEARCH, RHYTHMS}
     assert [one.number for one in proof.judged] == list(range(40))
     assert 0.0 < proof.fraction(proof.worst) < 1.0
     assert proof.apart < 1e-12
@@ -131,11 +131,7 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
     monkeypatch.setattr(ClosedLoop, "watched", watched)
     histories = Histories.of(spec)
     many = [histories.history(choices) for choices in histories.drawn(4, seed=0)] * 1000
-    with (
-        ClosedLoop(spec, text, histories) as loop,
-        pytest.raises(KeyboardInterrupt),
-        loop.runs(many) as runs,
-    ):
+    with ClosedLoop(spec, text, histories) as loop, pytest.raises(KeyboardInterrupt), loop.runs(many) as runs:
         next(runs)
         raise KeyboardInterrupt
     assert 0 < len(begun) < len(many)
@@ -143,7 +139,7 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
 
 def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatch):
     broken = attrs.evolve(GOOD, fault=1, cycles=0, stands=-1)
-    monkeypatch.setattr(ClosedLoop, "watched", lambda *_: (broken, ()))
+    monkeypatch.setattr(ClosedLoop, "watched", lambda *_: WatchedRun(run=broken))
     (reason,) = prove(spec, text, histories=4).reasons()
     assert reason == ("In history 0 the block goes beyond the end of an array, and likewise in 3 others.")
 
@@ -182,7 +178,7 @@ def test_a_worker_gets_the_machine_s_file(tmp_path):
 def test_a_worker_with_other_libraries_judges_nothing(spec):
     recipe = attrs.evolve(ProofRecipe.of(spec, "", Histories.of(spec)), versions=(("numpy", "0.9"),))
     with pytest.raises(SpecError, match=r"a worker has gen-profile .*, and this proof needs numpy 0\.9"):
-        judge_part(recipe, [])
+        judge_part(recipe, (1, 0, (), [0]))
 
 
 def test_a_scheduler_that_nobody_runs_is_named(spec, text, monkeypatch):
@@ -312,7 +308,7 @@ def test_every_fault_of_a_run_is_told(spec, changed, words):
     run = attrs.evolve(GOOD, axes=(attrs.evolve(GOOD.axes[0], **axis),), **others)
     stop = Command(time=0.1, command="stop", live={})
     history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
-    faults = judge_run(spec, run, history, cycle=CYCLE, number=0, group=DRAWS).faults
+    faults = judge_run(spec, WatchedRun(run=run), history, cycle=CYCLE, number=0, group=DRAWS).faults
     assert faults == () if words is None else words in faults[0]
 
 
@@ -323,18 +319,15 @@ def test_of_several_axes_the_one_at_fault_is_named():
     run = attrs.evolve(GOOD, axes=(fast, attrs.evolve(fast, highest=12.5)))
     stop = Command(time=0.1, command="stop")
     history = History(live={}, parameters={}, places=(0.0, 0.0), commands=(stop,), axes=axes)
-    faults = judge_run(spec, run, history, cycle=CYCLE, number=0, group=DRAWS).faults
-    assert faults == (
-        "the velocity of y is above its limit by 20 %",
-        "the axis y leaves its travel by 0.5 m",
-    )
+    faults = judge_run(spec, WatchedRun(run=run), history, cycle=CYCLE, number=0, group=DRAWS).faults
+    assert faults == ("the velocity of y is above its limit by 20 %", "the axis y leaves its travel by 0.5 m")
 
 
 def test_after_a_quick_stop_nothing_is_promised(spec):
     stop = Command(time=0.1, command="quick-stop", live={})
     history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
     swaying = attrs.evolve(GOOD, promise=False, residual=np.array([1.0, 1.0]))
-    judged = judge_run(spec, swaying, history, cycle=CYCLE, number=0, group=DRAWS)
+    judged = judge_run(spec, WatchedRun(run=swaying), history, cycle=CYCLE, number=0, group=DRAWS)
     assert judged.faults == ()
     assert judged.fraction(spec.check.residual_sway, 0.0) == 0.0
 

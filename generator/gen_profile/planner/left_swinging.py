@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Self
 
 import attrs
@@ -14,6 +16,8 @@ from gen_profile.planner.machine import left_by_errors, linearized
 from gen_profile.spec.model import Spec
 
 ERRORS = (0.0, -1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated ones
+TURN = 0.7  # rad, at most, between what machines next to each other do after a history
+PIECE = 4096  # cycles that are integrated at once
 _AT_ONCE = 64  # cycles of a wave
 
 
@@ -35,8 +39,8 @@ class GivenModes:
     damped: bool
 
     @classmethod
-    def of(cls, spec: Spec, live: Mapping[str, float]) -> Self:
-        """Linearise a machine at the live parameters that a block is given."""
+    def of(cls, spec: Spec, live: Mapping[str, float], seconds: float = 0.0) -> Self:
+        """Linearise a machine at the live parameters of a block; with more errors the longer it moves."""
         point = [
             (2.0 * live[name] - low - high) / (high - low) for name, (low, high) in spec.planner.live.items()
         ]
@@ -44,14 +48,15 @@ class GivenModes:
         rates, ratios = at.distinct_frequencies, at.distinct_damping_ratios
         errors, *gains = left_by_errors(spec, point).reshape(-1, len(rates))
         damped = rates * np.sqrt(1.0 - ratios**2)
-        poles = 1j * damped[:, None] * (1.0 + np.outer(errors, ERRORS)) - (ratios * rates)[:, None]
+        between = math.ceil(0.25 * float((errors * damped).max()) * seconds / TURN)
+        finer = np.linspace(-1.0, 1.0, 8 * between + 1) if between > 1 else ()
+        shares = np.array([*ERRORS, *finer])
+        poles = 1j * damped[:, None] * (1.0 + np.outer(errors, shares)) - (ratios * rates)[:, None]
         return cls(
-            poles=np.asarray(poles, dtype=np.complex128),
-            gains=np.array(gains),
-            damped=bool(ratios.any()),
+            poles=np.asarray(poles, dtype=np.complex128), gains=np.array(gains), damped=bool(ratios.any())
         )
 
-    def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, Array]:
+    def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, ...]:
         """Find what sways on where axes stand.
 
         Parameters
@@ -65,23 +70,26 @@ class GivenModes:
 
         Returns
         -------
-        as_given, at_most : (ends,) arrays
-            Sum over axes and modes in m: of the machine as given, and of each mode at its worst error.
+        as_given, watched, at_most : (ends,) arrays
+            Sum over axes and modes in m: of the machine as given, and of each mode at its worst error, of
+            `ERRORS` and of all.
         """
         poles = self.poles.ravel()
-        starts = [0, *ends[:-1]]
-        wave = _wave(poles * cycle, 1 + max(end - begin for begin, end in zip(starts, ends, strict=True)))
+        marks = sorted({*ends, *range(0, ends[-1], PIECE)})
+        wave = _wave(poles * cycle, 1 + max(end - begin for begin, end in pairwise([0, *marks])))
         left, over_time = np.zeros((len(acceleration), len(poles)), dtype=np.complex128), []
-        for begin, end in zip(starts, ends, strict=True):
+        for begin, end in pairwise(marks):
             passed = acceleration[:, begin + 1 : end + 1][:, ::-1] @ wave[: end - begin].view(np.float64)
             left = left * wave[end - begin] + passed.view(np.complex128)
             over_time.append(left)
+        kept = [left for left, end in zip(over_time, marks[1:], strict=True) if end in {*ends}]
         half = (
             0.5 * poles * cycle
         )  # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
-        by_mode = np.abs(np.array(over_time) * cycle * (np.sinh(half) / half) ** 2 / poles)
+        by_mode = np.abs(np.array(kept) * cycle * (np.sinh(half) / half) ** 2 / poles)
         swings = self.gains[..., None] * by_mode.reshape(len(ends), *self.gains.shape, -1)
-        return swings[..., 0].sum(axis=(1, 2)), swings.max(axis=-1).sum(axis=(1, 2))
+        worst = (swings[..., 0], swings[..., : len(ERRORS)].max(axis=-1), swings.max(axis=-1))
+        return tuple(each.sum(axis=(1, 2)) for each in worst)
 
 
 def _wave(turns: NDArray[np.complex128], length: int) -> NDArray[np.complex128]:

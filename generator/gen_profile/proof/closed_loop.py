@@ -13,6 +13,7 @@ from typing import Self
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.evaluation.simulation import AT_REST
@@ -22,8 +23,11 @@ from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.progress import Progress, no_progress
-from gen_profile.proof.histories import SLOWEST, Histories, History
+from gen_profile.proof.histories import SHIFT, SLOWEST, Histories, History
+from gen_profile.proof.judging import WatchedRun, judge_run
+from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.sensing import sensor_faults
+from gen_profile.proof.verdict import JudgedHistory
 from gen_profile.proof.watching import BlockWatch
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
@@ -35,6 +39,7 @@ STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
 WATCHED = 2.2  # of the slowest periods in which the residual sway shows
 PATIENCE = 30.0  # of these periods that the axes have to come to rest, and the travel's time beside
 NOISY_ON = 6.0  # of these periods after the last command, in which live parameters go on being noisy
+TOLD = 50  # histories between two signs of life
 LONGEST = 10**9  # cycles, for ever
 MOST_MACHINES = 4  # at corners of the uncertain ranges
 HOIST_STARTS = 0.1  # of these periods, in which a hoist takes up its speed
@@ -62,14 +67,7 @@ class ClosedLoop:
         Something cannot be compiled or loaded.
     """
 
-    def __init__(
-        self,
-        spec: Spec,
-        text: str,
-        histories: Histories,
-        *,
-        workers: int = 1,
-    ) -> None:
+    def __init__(self, spec: Spec, text: str, histories: Histories, *, workers: int = 1) -> None:
         self._spec, self._histories = spec, histories
         self._block = BlockInstance(text)
         self.cycle = self._block.inputs["fCycleTime"]
@@ -95,7 +93,7 @@ class ClosedLoop:
         return self._block.outputs
 
     @contextmanager
-    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[tuple[BlockRun, tuple[str, ...]]]]:
+    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[WatchedRun]]:
         """Run histories on all workers, in their order; those not begun when it closes are left out."""
         pool = ThreadPoolExecutor(self._workers)
         try:
@@ -105,16 +103,29 @@ class ClosedLoop:
         finally:
             pool.shutdown(cancel_futures=True)
 
+    def judged(
+        self, numbering: Numbering, numbers: Sequence[int], progress: Progress = no_progress
+    ) -> list[JudgedHistory]:
+        """Run and judge the histories of some numbers."""
+        histories, judged = [numbering.history(number) for number in numbers], []
+        with self.runs(histories) as runs:
+            for number, history, watched in zip(numbers, histories, runs, strict=True):
+                group = numbering.group(number)
+                judged.append(
+                    judge_run(self._spec, watched, history, cycle=self.cycle, number=number, group=group)
+                )
+                if number % TOLD == 0:
+                    progress("proving", number, numbering.count)
+        return judged
+
     def known(self, history: History) -> tuple[float, GivenModes | None]:
         """Tell the slowest period in s and, where they stay the same, the modes of the machine as given."""
         spec = self._spec
-        steady = not (history.hoisting or spec.planner.live_noise or spec.planner.live_rate)
-        modes = GivenModes.of(spec, history.live) if steady else None
+        steady = not (history.hoisting or history.sensed or spec.planner.live_noise or spec.planner.live_rate)
+        modes = GivenModes.of(spec, history.live, history.commands[-1].time) if steady else None
         return self._histories.slowest(history), modes
 
-    def watched(
-        self, history: History, period: float, modes: GivenModes | None = None
-    ) -> tuple[BlockRun, tuple[str, ...]]:
+    def watched(self, history: History, period: float, modes: GivenModes | None = None) -> WatchedRun:
         """Let the machine of a history follow the block, and see whether the block obeys.
 
         Parameters
@@ -125,25 +136,21 @@ class ClosedLoop:
         modes : GivenModes, optional
             Of the machine that it is given.
 
-        Returns
-        -------
-        run : BlockRun
-        faults : tuple of str
-            What it did other than commanded, each in words that end a sentence.
-
         Raises
         ------
         ExportError, CosimulationError
         """
         script, block = self._script(history), self._block.called()
-        if history.sensed is not None:
-            run = self._followed(history, block, script, rows=_cycles(script))
-            own = () if run.fault else tuple(self._sensor_faults(history, run))
-            return attrs.evolve(run, trace=None), own
+        if history.commands[-1].time >= SHIFT:  # too long to be kept whole
+            return WatchedRun(run=self._followed(history, block, script, rows=0))
         orders = self._watch.orders(script)
-        run = self._followed(history, block, script, rows=orders[-1].end, marks=self._watch.marks(orders))
-        faults = () if run.fault else self._watch.faults((period, modes), script, orders, block, run)
-        return attrs.evolve(run, trace=None, copies=None), faults
+        marks = self._watch.marks(orders) if history.sensed is None else ()
+        run = self._followed(history, block, script, rows=orders[-1].end, marks=marks)
+        if run.fault:
+            return WatchedRun(run=run)
+        faults, left = self._watch.faults((period, modes), script, orders, block, run)
+        faults = (*faults, *self._sensor_faults(history, run))
+        return WatchedRun(run=attrs.evolve(run, trace=None, copies=None), faults=faults, left=left)
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.
@@ -203,9 +210,9 @@ class ClosedLoop:
         for number, axis in self._histories.axes.items():
             position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))] + pushed
         script = self._script(history)
-        row = np.searchsorted(script.start_cycles, np.arange(len(traced)), side="right") - 1
+        given = _rows_at(script.start_cycles, script.inputs, np.arange(len(traced)))
         for hoist in self._hoists(history):
-            position[1:, hoist.axis] = hoist.ratio * script.inputs[row, hoist.column]
+            position[1:, hoist.axis] = hoist.ratio * given[:, hoist.column]
         with PlantCosimulation(self._machine) as fmu:
             response = fmu.run(
                 SampledProfile(cycle_time=self.cycle, position=position),
@@ -251,19 +258,14 @@ class ClosedLoop:
         self, history: History, start_cycles: Sequence[int], inputs: Array
     ) -> tuple[Sequence[int], Array]:
         """Let the last row begin no sooner than what swings at first, or after a gust, was measured."""
-        ends = 0
-        if history.sensed:
-            ends = math.ceil((history.sensed.ends + self._histories.period) / self.cycle)
-        return (
-            (start_cycles, inputs)
-            if ends <= start_cycles[-1]
-            else ([*start_cycles, ends], np.vstack([inputs, inputs[-1]]))
-        )
+        ends = math.ceil((history.sensed.ends + self._histories.period) / self.cycle) if history.sensed else 0
+        if ends <= start_cycles[-1]:
+            return start_cycles, inputs
+        return [*start_cycles, ends], np.vstack([inputs, inputs[-1]])
 
     def _sensor_faults(self, history: History, run: BlockRun) -> Iterator[str]:
         """Judge how the block used its sensor; after a quick stop at the end it does not."""
-        assert history.sensed is not None
-        if not history.brakes:
+        if history.sensed is not None and not history.brakes:
             changed = [one.time + one.lasts for one in history.changes if math.isfinite(one.lasts)]
             last = max(history.commands[-1].time, *changed, 0.0)
             yield from sensor_faults(
@@ -294,7 +296,7 @@ class ClosedLoop:
         starting = math.ceil(HOIST_STARTS * self._histories.period / self.cycle)
         end = max(corners[-1][0] for corners in history.hoisting.values())
         cycles = np.arange(max(start_cycles[-1], math.ceil(end / self.cycle) + starting) + 1)
-        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+        inputs = _rows_at(start_cycles, inputs, cycles)
         for name, corners in history.hoisting.items():
             low, high = self._spec.planner.live[name]
             line = np.interp(np.arange(1 - starting, len(cycles)) * self.cycle, *np.transpose(corners))
@@ -309,7 +311,7 @@ class ClosedLoop:
         if not noise:
             return start_cycles, inputs
         cycles = np.arange(start_cycles[-1] + math.ceil(NOISY_ON * self._histories.period / self.cycle))
-        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+        inputs = _rows_at(start_cycles, inputs, cycles)
         for name, most in noise.items():
             reported = inputs[:, list(self._block.inputs).index(f"f{name}")]
             reported[:] = np.clip(
@@ -330,12 +332,11 @@ class ClosedLoop:
         ]
         edges = {edge for begin, end, _ in spans for edge in (begin, end) if edge < LONGEST}
         cycles = sorted({*start_cycles, *edges})
-        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+        inputs = _rows_at(start_cycles, inputs, cycles)
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
             for name, value in change.inputs.items():
-                if name in self._block.inputs:  # those of earlier versions have no bReset
-                    inputs[within, list(self._block.inputs).index(name)] = value
+                inputs[within, list(self._block.inputs).index(name)] = value
         return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:
@@ -361,6 +362,12 @@ class ClosedLoop:
         for axis, place in zip(self._machine.actuated, self._places(history), strict=True):
             values |= {f"{axis.name}.start": place, f"{axis.name}.setpoint": place}
         return values | dict(history.sensed.starts if history.sensed else {})
+
+
+def _rows_at(start_cycles: Sequence[int], inputs: Array, cycles: Sequence[int] | NDArray[np.int64]) -> Array:
+    """Give the rows that hold in some cycles."""
+    rows: Array = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
+    return rows
 
 
 def _cycles(script: Script) -> int:

@@ -19,11 +19,12 @@ EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated e
 # longest met in 6000 histories of twelve machines, but for faults of the block.
 FAR = 1.1  # of the way's time at full speed
 FROM_REST = 1.8  # (1.7)
-ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (3.5; without them 1.9)
+ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (4.0)
 TO_STICK = 3.4  # to its velocity, as a motion to a target is stopped first (3.2)
-MORE_AXES = 1.3  # for each further axis, as they are planned one after the other (1.1)
-TO_STOP = 3.4  # (3.1 where stated errors of the frequencies count, 2.3 elsewhere)
-TO_SLOW = 2.5  # below a new velocity limit: a new target is planned, or a motion stopped, first (2.1)
+AHEAD = 1.5  # before an end of the way, or a slow interval, in which a stick's velocity need not be reached
+MORE_AXES = 1.7  # for each further axis, as they are planned one after the other (1.5)
+TO_STOP = 2.8  # (2.4)
+TO_SLOW = 2.2  # below a new velocity limit: a new target is planned, or a motion stopped, first (1.5)
 TO_TURN = 1.9  # (1.6)
 RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
 CALMED = 3.0  # more where live parameters change on the way (2.1)
@@ -131,6 +132,19 @@ class Followed:
     def of(self, name: str) -> Array:
         """Give an output of all axes, (axes, cycles)."""
         return np.stack([self.issued[axis.of(name)] for axis in self.axes])
+
+    def slow_parts(self, axis: int, begin: float, end: float, beyond: float) -> list[tuple[float, float]]:
+        """Give lengths and velocity limits of slow intervals between two places, or a little beyond."""
+        low, high = min(begin, end) - beyond, max(begin, end) + beyond
+        return [
+            (min(zone.high, high) - max(zone.low, low), zone.limit)
+            for zone in self.zones
+            if zone.axis == axis and zone.limit and zone.low < high and zone.high > low
+        ]
+
+    def sensed(self, name: str) -> Flags:
+        """Tell when an output of a block with a sensor is set; never of one without."""
+        return np.asarray(self.issued.get(name, np.zeros(self.cycles)) != 0.0)
 
     @property
     def cycles(self) -> int:
@@ -257,14 +271,14 @@ def reaching(followed: Followed, before: Array, wanted: Sequence[float]) -> floa
 def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder) -> float:
     """Tell the time in s in which axes come from places and velocities, (axes,), to an order's targets."""
     periods = (ON_WAY if before.any() else FROM_REST) + calmed(followed)
-    usable, ways = 1.0 - followed.reserve, map(float, np.abs(place - order.values))
-    slow = followed.slowest
-    slowest = max(
-        FAR * way / (usable * min(top, slow))
-        + (top + abs(v)) / own.acceleration
-        + own.acceleration / own.jerk
-        for way, v, top, own in zip(ways, map(float, before), order.tops, followed.limits, strict=True)
-    )
+    usable, moves = 1.0 - followed.reserve, zip(place.tolist(), order.values, before.tolist(), strict=True)
+    slowest = 0.0
+    for k, ((begin, end, v), top, own) in enumerate(zip(moves, order.tops, followed.limits, strict=True)):
+        rise = (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
+        slow = followed.slow_parts(k, begin, end, abs(v) * (rise + followed.period))
+        time = abs(end - begin) / top + sum(way * max(0.0, 1.0 / limit - 1.0 / top) for way, limit in slow)
+        legs = len(slow) * (rise + FROM_REST * followed.period)
+        slowest = max(slowest, FAR * time / usable + rise + legs)
     return slowest + periods * followed.period + (0.0 if before.any() else followed.reaction)
 
 

@@ -16,6 +16,7 @@ CREEPING = 40
 LONGEST_WAIT = 0.6  # s, from one of them to the next
 SOON = 100  # cycles, in which a mind is changed
 STOPS = 4
+HELD = 0.15  # s, at most, in which the last good ones are held in place of values that cannot be
 WRONG = 0.5  # s, at least, in which values count that cannot be
 OUTSIDE = 10.0  # m (or rad) beyond the targets
 FAR = 1e6  # m (or rad)
@@ -91,26 +92,17 @@ class Surroundings:
 
     def zone(self, axis: int, place: float, width: float, number: int, *, slow: bool) -> dict[str, float]:
         """Choose an interval of an axis that is blocked, or slow."""
-        (low, high), (_, fastest), end = (
-            self.targets[axis],
-            self.speeds[axis],
-            f"{self.suffixes[axis]}[{number}]",
-        )
+        (low, high), (_, fastest) = self.targets[axis], self.speeds[axis]
+        kind, end = "Slow" if slow else "Blocked", f"{self.suffixes[axis]}[{number}]"
         begin = low + place * (high - low)
         until = begin + (0.02 + 0.15 * width) * (high - low)
-        if slow:
-            return {
-                f"aSlowLow{end}": begin,
-                f"aSlowHigh{end}": until,
-                f"aSlowLimit{end}": fastest * (0.2 + 0.6 * width),
-            }
-        return {f"aBlockedLow{end}": begin, f"aBlockedHigh{end}": until}
+        limit = {f"aSlowLimit{end}": fastest * (0.2 + 0.6 * width)} if slow else {}
+        return {f"a{kind}Low{end}": begin, f"a{kind}High{end}": until, **limit}
 
     def target(self, fraction: float) -> tuple[float, ...]:
         """Choose a place."""
-        return tuple(
-            low + _fraction(fraction, k) * (high - low) for k, (low, high) in enumerate(self.targets)
-        )
+        ends = enumerate(self.targets)
+        return tuple(low + _fraction(fraction, k) * (high - low) for k, (low, high) in ends)
 
     def speed(self, fraction: float) -> tuple[float, ...]:
         """Choose a velocity of at least a third of the greatest."""
@@ -118,6 +110,19 @@ class Surroundings:
             (high if _fraction(fraction, k) > 0.5 else low) * (0.3 + 0.7 * _fraction(fraction, k + 1))
             for k, (low, high) in enumerate(self.speeds)
         )
+
+    @property
+    def neutral(self) -> tuple[float, ...]:
+        """A stick that is let go."""
+        return (0.0,) * len(self.speeds)
+
+    def part(self, fraction: float, number: int) -> float:
+        """Choose a part of a period, in s."""
+        return self.period * _fraction(fraction, number)
+
+    def brief(self, fraction: float, periods: float) -> float:
+        """Choose a time in s, from a cycle to so many periods."""
+        return _log(self.cycle, periods * self.period, fraction)
 
 
 def manner(command: Command, which: float, how: float, around: Surroundings) -> Manner:
@@ -159,6 +164,23 @@ def _followed(first: Command, after: float, **changes: Any) -> Command:
     return attrs.evolve(first, time=first.time + after, **changes)
 
 
+def _stopped(first: Command, after: float, command: str = "stop") -> Command:
+    return _followed(first, after, command=command, values=())
+
+
+def _stick(command: Command, how: float, around: Surroundings) -> Command:
+    return attrs.evolve(command, command="velocity", values=around.speed(how))
+
+
+def _change(command: Command, after: float, lasts: float, inputs: Mapping[str, float]) -> Change:
+    return Change(time=command.time + after, lasts=lasts, inputs=inputs)
+
+
+def _inwards(value: float, ends: tuple[float, float]) -> float:
+    """Tell by its sign which way the middle is."""
+    return 1.0 if value < 0.5 * (ends[0] + ends[1]) else -1.0
+
+
 def _again(command: Command, how: float, around: Surroundings) -> Manner:
     """Give the same target cyclically, as a panel does."""
     wait = _log(2.0 * around.cycle, LONGEST_WAIT, how)
@@ -170,37 +192,27 @@ def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
     """Let a target creep towards the middle, every few cycles."""
     wait, first = _log(2.0 * around.cycle, 20.0 * around.cycle, how), _towards(command, how, around)
     step = _log(5e-6, 1e-3, _fraction(how, 5))
-    commands = []
-    for k in range(CREEPING):
-        values = tuple(
-            value + k * step * (high - low) * (1.0 if value < 0.5 * (low + high) else -1.0)
+
+    def crept(k: int) -> tuple[float, ...]:
+        return tuple(
+            min(max(value + k * step * (high - low) * _inwards(value, (low, high)), low), high)
             for value, (low, high) in zip(first.values, around.targets, strict=True)
         )
-        commands.append(
-            _followed(
-                first,
-                k * wait,
-                values=tuple(
-                    min(max(v, low), high) for v, (low, high) in zip(values, around.targets, strict=True)
-                ),
-            )
-        )
-    return Manner(commands=tuple(commands))
+
+    return Manner(commands=tuple(_followed(first, k * wait, values=crept(k)) for k in range(CREEPING)))
 
 
 def _tap(command: Command, how: float, around: Surroundings) -> Manner:
     """Tap the stick."""
-    lasts = _log(around.cycle, 0.5 * around.period, how)
-    stick = attrs.evolve(command, command="velocity", values=around.speed(how))
-    return Manner(commands=(stick, _followed(stick, lasts, values=(0.0,) * len(around.speeds))))
+    stick = _stick(command, how, around)
+    return Manner(commands=(stick, _followed(stick, around.brief(how, 0.5), values=around.neutral)))
 
 
 def _reversal(command: Command, how: float, around: Surroundings) -> Manner:
     """Throw the stick over for a short time."""
-    lasts = _log(around.cycle, 0.5 * around.period, how)
-    stick = attrs.evolve(command, command="velocity", values=around.speed(how))
-    back, again = around.period * (0.3 + _fraction(how, 4)), tuple(-value for value in stick.values)
-    return Manner(commands=(stick, _followed(stick, back, values=again), _followed(stick, back + lasts)))
+    stick, back = _stick(command, how, around), around.period * (0.3 + _fraction(how, 4))
+    over = _followed(stick, back, values=tuple(-value for value in stick.values))
+    return Manner(commands=(stick, over, _followed(stick, back + around.brief(how, 0.5))))
 
 
 def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
@@ -212,15 +224,11 @@ def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
         ("velocity", around.speed(how)),
         ("position", first.values),
     )
-    return Manner(
-        commands=(
-            first,
-            *(
-                _followed(first, (k + 1) * wait, command=kind, values=values)
-                for k, (kind, values) in enumerate(others)
-            ),
-        )[: 2 + int(3.0 * _fraction(how, 7))]
-    )
+    commands = [
+        _followed(first, (k + 1) * wait, command=kind, values=values)
+        for k, (kind, values) in enumerate(others)
+    ]
+    return Manner(commands=(first, *commands)[: 2 + int(3.0 * _fraction(how, 7))])
 
 
 def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
@@ -228,8 +236,7 @@ def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
     wait, first = _log(2.0 * around.cycle, around.period, how), _towards(command, how, around)
     commands = [first]
     for k in range(STOPS):
-        commands.append(_followed(first, (2 * k + 1) * wait, command="stop", values=()))
-        commands.append(_followed(first, (2 * k + 2) * wait))
+        commands += [_stopped(first, (2 * k + 1) * wait), _followed(first, (2 * k + 2) * wait)]
     return Manner(commands=tuple(commands))
 
 
@@ -239,11 +246,9 @@ def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Ma
     fraction = 0.3 + 0.5 * how
     inputs = {"rOverride": fraction}
     if _fraction(how, 5) < 0.5:
-        inputs = {
-            f"fVelocityLimit{end}": fraction * most
-            for end, (_, most) in zip(around.suffixes, around.speeds, strict=True)
-        }
-    slowed = Change(time=command.time + later, lasts=lasts, inputs=inputs)
+        limited = zip(around.suffixes, around.speeds, strict=True)
+        inputs = {f"fVelocityLimit{end}": fraction * most for end, (_, most) in limited}
+    slowed = _change(command, later, lasts, inputs)
     return Manner(commands=(command, _followed(command, later + lasts)), changes=(slowed,))
 
 
@@ -254,118 +259,87 @@ def _patient(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _held(command: Command, how: float, around: Surroundings) -> Manner:
     """Hold by an override of 0, and go on."""
-    later, lasts = around.period * _fraction(how, 3), _log(around.cycle, 3.0 * around.period, how)
-    return Manner(
-        commands=(command,),
-        changes=(Change(time=command.time + later, lasts=lasts, inputs={"rOverride": 0.0}),),
-    )
+    held = _change(command, around.part(how, 3), around.brief(how, 3.0), {"rOverride": 0.0})
+    return Manner(commands=(command,), changes=(held,))
 
 
 def _wild(command: Command, how: float, around: Surroundings) -> Manner:
-    """Give one cycle of a live parameter, override or velocity limit that cannot be, or a spike."""
-    values: list[dict[str, float]] = [
-        {"rOverride": nan},
-        {"rOverride": 1.5},
-        {f"fVelocityLimit{around.suffixes[0]}": -1.0},
-    ]
+    """Give shortly a live parameter, override or velocity limit that cannot be, or a spike for one cycle."""
+    lasts = _log(around.cycle, HELD, _fraction(how, 9))
+    values = [("rOverride", nan, lasts), ("rOverride", 1.5, lasts)]
+    values += [(f"fVelocityLimit{around.suffixes[0]}", -1.0, lasts)]
     for name, (low, high) in around.live.items():
-        spike = low + _fraction(how, 8) * (high - low)
-        values += [{f"f{name}": wild} for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high, spike, spike)]
-    inputs = values[int(how * len(values)) % len(values)]
-    later = around.period * _fraction(how, 3)
-    return Manner(commands=(command,), changes=(Change(time=command.time + later, lasts=0.0, inputs=inputs),))
+        values += [(f"f{name}", wild, lasts) for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high)]
+        values += [(f"f{name}", low + _fraction(how, 8) * (high - low), 0.0)] * 2
+    name, wild, lasts = values[int(how * len(values)) % len(values)]
+    return Manner(commands=(command,), changes=(_change(command, around.part(how, 3), lasts, {name: wild}),))
 
 
 def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
     """Give a live parameter, override or velocity limit that cannot be for long; acknowledge the error."""
-    later, lasts = around.period * _fraction(how, 3), WRONG * (1.0 + _fraction(how, 4))
-    values: list[dict[str, float]] = [
-        {"rOverride": -0.1},
-        {"rOverride": 1.01},
-        {f"fVelocityLimit{around.suffixes[-1]}": nan},
-        {f"fVelocityLimit{around.suffixes[-1]}": -1e-3},
-    ]
+    later, lasts = around.part(how, 3), WRONG * (1.0 + _fraction(how, 4))
+    limit = f"fVelocityLimit{around.suffixes[-1]}"
+    values = [("rOverride", -0.1), ("rOverride", 1.01), (limit, nan), (limit, -1e-3)]
     for name, (low, high) in around.live.items() if not around.hoists else ():  # then the promise is lost
-        values += [{f"f{name}": wrong} for wrong in (0.99 * low - 1e-3, 1.01 * high, nan)]
-    inputs = values[int(how * len(values)) % len(values)]
-    begin = command.time + later
-    reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
+        values += [(f"f{name}", wrong) for wrong in (0.99 * low - 1e-3, 1.01 * high, nan)]
+    name, wrong = values[int(how * len(values)) % len(values)]
+    reset = _change(command, later + lasts + 2.0 * around.cycle, 0.0, {"bReset": 1.0})
     commands = [command, _followed(command, later + lasts + 10.0 * around.cycle)]
     if command.command == "velocity":  # a stick must have been at 0 before it counts again
         wait = 0.3 * around.period
-        commands.append(_followed(commands[-1], wait, values=(0.0,) * len(around.speeds)))
+        commands.append(_followed(commands[-1], wait, values=around.neutral))
         commands.append(_followed(commands[1], 2.0 * wait))
-    return Manner(
-        commands=tuple(commands),
-        changes=(Change(time=begin, lasts=lasts, inputs=inputs), reset),
-    )
+    return Manner(commands=tuple(commands), changes=(_change(command, later, lasts, {name: wrong}), reset))
 
 
 def _correction(command: Command, how: float, around: Surroundings) -> Manner:
     """Give the last axis alone another target, not far away, on the way or after the arrival."""
     first, (low, high) = _towards(command, how, around), around.targets[-1]
-    step = (
-        _log(1e-4, 0.1, _fraction(how, 3))
-        * (high - low)
-        * (1.0 if first.values[-1] < 0.5 * (low + high) else -1.0)
-    )
-    other = (*first.values[:-1], first.values[-1] + step)
-    return Manner(
-        commands=(first, _followed(first, around.period * (1.0 + 8.0 * _fraction(how, 4)), values=other))
-    )
+    *others, last = first.values
+    step = _log(1e-4, 0.1, _fraction(how, 3)) * (high - low) * _inwards(last, (low, high))
+    wait = around.period * (1.0 + 8.0 * _fraction(how, 4))
+    return Manner(commands=(first, _followed(first, wait, values=(*others, last + step))))
 
 
 def _refused(command: Command, how: float, around: Surroundings) -> Manner:
     """Give a target that is none, on the way to another."""
-    first, wait = _towards(command, how, around), around.period * _fraction(how, 3)
+    first, wait = _towards(command, how, around), around.part(how, 3)
     low, high = around.targets[-1]
     wrong = (*first.values[:-1], (nan, inf, low - OUTSIDE, high + OUTSIDE)[int(4.0 * how) % 4])
-    return Manner(
-        commands=(first, _followed(first, wait, values=wrong), _followed(first, wait + 0.5 * around.period)),
-    )
+    again = _followed(first, wait + 0.5 * around.period)
+    return Manner(commands=(first, _followed(first, wait, values=wrong), again))
 
 
 def _denied(command: Command, how: float, around: Surroundings) -> Manner:
     """Command a position while the axis is to stop."""
-    stop = _followed(command, around.period * (0.2 + _fraction(how, 3)), command="stop", values=())
-    edge = stop.time + around.period * _fraction(how, 4)
-    return Manner(
-        commands=(command, stop, _followed(stop, 1.5 * around.period)),
-        changes=(
-            Change(time=edge, lasts=_log(around.cycle, 0.3 * around.period, how), inputs={"bExecute": 1.0}),
-        ),
-    )
+    stop = _stopped(command, around.period * (0.2 + _fraction(how, 3)))
+    edge = _change(stop, around.part(how, 4), around.brief(how, 0.3), {"bExecute": 1.0})
+    return Manner(commands=(command, stop, _followed(stop, 1.5 * around.period)), changes=(edge,))
 
 
 def _mistimed(command: Command, how: float, around: Surroundings) -> Manner:
     """Call the block in another task for a while."""
-    later, lasts = around.period * _fraction(how, 3), _log(around.cycle, 0.5 * around.period, how)
-    inputs = {"fCycleTime": around.cycle * (0.5 if how < 0.5 else 1.01)}
-    again = _followed(command, later + lasts + 10.0 * around.cycle, command="stop", values=())
+    later, lasts = around.part(how, 3), around.brief(how, 0.5)
+    wrong = _change(command, later, lasts, {"fCycleTime": around.cycle * (0.5 if how < 0.5 else 1.01)})
     return Manner(
-        commands=(command, again),
-        changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),),
+        commands=(command, _stopped(command, later + lasts + 10.0 * around.cycle)), changes=(wrong,)
     )
 
 
 def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
     """Let the last axis be elsewhere than its setpoint: with a limit of that, and before without one."""
-    first, suffix = _towards(command, how, around), around.suffixes[-1]
-    begin = first.time + around.period * (0.2 + _fraction(how, 3))
-    limit = 0.1 + how
-    away = {
-        f"fActPosition{suffix}": (nan, -FAR, FAR, -1.01 * limit, 1.01 * limit, 0.99 * limit)[
-            int(6.0 * how) % 6
-        ]
-    }
-    most, lasts = {f"fFollowingLimit{suffix}": limit}, around.period * _fraction(how, 4)
+    first, suffix, limit = _towards(command, how, around), around.suffixes[-1], 0.1 + how
+    begin, before = around.period * (0.2 + _fraction(how, 3)), 0.1 * around.period
+    places = (nan, -FAR, FAR, -1.01 * limit, 1.01 * limit, 0.99 * limit)
+    away = {f"fActPosition{suffix}": places[int(6.0 * how) % 6]}
+    most = {f"fFollowingLimit{suffix}": limit}
     within = around.period * (1.0 + _fraction(how, 5))
     return Manner(
-        commands=(first, _followed(first, begin - first.time + within, command="stop", values=())),
+        commands=(first, _stopped(first, begin + within)),
         changes=(
-            Change(time=begin - 0.1 * around.period, lasts=0.1 * around.period, inputs=away),
-            Change(time=begin, lasts=lasts, inputs=away | most),
-            Change(time=begin + within - 4.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0}),
+            _change(first, begin - before, before, away),
+            _change(first, begin, around.part(how, 4), away | most),
+            _change(first, begin + within - 4.0 * around.cycle, 0.0, {"bReset": 1.0}),
         ),
     )
 
@@ -373,56 +347,46 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
 def _braked(command: Command, how: float, around: Surroundings) -> Manner:
     """Brake at once, and say that the load hangs still, true or not."""
     first, wait = _towards(command, how, around), around.period * (0.3 + _fraction(how, 3))
-    rest_report = Change(time=first.time + 2.5 * wait, lasts=0.0, inputs={"bLoadAtRest": 1.0})
+    rest_report = _change(first, 2.5 * wait, 0.0, {"bLoadAtRest": 1.0})
     return Manner(
-        commands=(
-            first,
-            _followed(first, wait, command="quick-stop", values=()),
-            _followed(first, 3.0 * wait, command="stop", values=()),
-        ),
+        commands=(first, _stopped(first, wait, "quick-stop"), _stopped(first, 3.0 * wait)),
         changes=() if around.hoists else (rest_report,),  # one that calms by a model believes that
     )
 
 
 def _released(command: Command, how: float, around: Surroundings) -> Manner:
     """Drop bExecute, on the way or long before it rises again."""
-    later, lasts = 5.0 * around.period * how, _log(around.cycle, 3.0 * around.period, _fraction(how, 3))
-    dropped = Change(time=command.time + later, lasts=lasts, inputs={"bExecute": 0.0})
+    lasts = around.brief(_fraction(how, 3), 3.0)
+    dropped = _change(command, 5.0 * around.period * how, lasts, {"bExecute": 0.0})
     return Manner(commands=(_towards(command, how, around),), changes=(dropped,))
 
 
 def _contradicted(command: Command, how: float, around: Surroundings) -> Manner:
     """Give a stick that is none, or a position while it is deflected; then let it go."""
-    stick = attrs.evolve(command, command="velocity", values=around.speed(how))
-    lasts, gone = _log(around.cycle, 0.3 * around.period, how), 0.8 * around.period
+    stick, gone = _stick(command, how, around), 0.8 * around.period
     wrong = (
         {"bExecute": 1.0} if how < 0.5 else {f"fVelocityCommand{around.suffixes[-1]}": (nan, inf)[how > 0.75]}
     )
     return Manner(
-        commands=(
-            stick,
-            _followed(stick, gone, values=(0.0,) * len(around.speeds)),
-            _followed(stick, 1.2 * gone),
-        ),
-        changes=(Change(time=stick.time + around.period * _fraction(how, 4), lasts=lasts, inputs=wrong),),
+        commands=(stick, _followed(stick, gone, values=around.neutral), _followed(stick, 1.2 * gone)),
+        changes=(_change(stick, around.part(how, 4), around.brief(how, 0.3), wrong),),
     )
 
 
 def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
     """Block an interval for some time, or make it slow, wherever the axis is."""
-    later, lasts = around.period * _fraction(how, 3), around.period * (2.0 + 6.0 * _fraction(how, 4))
+    later, lasts = around.part(how, 3), around.period * (2.0 + 6.0 * _fraction(how, 4))
     k = int(how * len(around.suffixes)) % len(around.suffixes)
     zone = around.zone(k, _fraction(how, 5), _fraction(how, 6), ZONES - 1, slow=_fraction(how, 7) < 0.5)
-    begin = command.time + later
-    reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
+    reset = _change(command, later + lasts + 2.0 * around.cycle, 0.0, {"bReset": 1.0})
     again = _followed(command, later + lasts + 0.5 * around.period)
-    return Manner(commands=(command, again), changes=(Change(time=begin, lasts=lasts, inputs=zone), reset))
+    return Manner(commands=(command, again), changes=(_change(command, later, lasts, zone), reset))
 
 
 def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
     """Drop bEnable, mostly on the way; let the axis stand, or move it by hand, until it is set again."""
-    later, lasts = around.period * _fraction(how, 3), _log(around.cycle, around.period, _fraction(how, 4))
-    begin, taken = command.time + later, dict[str, float]()
+    later, lasts = around.part(how, 3), around.brief(_fraction(how, 4), 1.0)
+    taken = dict[str, float]()
     if how < 0.6:
         for k, ((_, most), suffix) in enumerate(zip(around.speeds, around.suffixes, strict=True)):
             speed = most * HAND * max(0.0, 1.5 * _fraction(how, 5 + k) - 0.5) * (1.0 if how < 0.45 else -1.0)
@@ -431,22 +395,20 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
     if how > 0.8 and not around.hoists:  # nowhere, and so not taken over yet
         name = "fActPosition" if how < 0.9 else "fActVelocity"
         taken = {f"{name}{around.suffixes[int(100.0 * how) % len(around.suffixes)]}": nan}
-    changes = [
-        Change(time=begin, lasts=lasts + 4.0 * around.cycle * (not goes), inputs={"bEnable": 0.0}),
-        Change(time=begin, lasts=lasts + 1.5 * around.cycle * goes, inputs=taken),
-    ]
-    rest_report = begin + lasts + 3.0 * around.period
-    changes.append(Change(time=rest_report, lasts=0.0, inputs={"bLoadAtRest": 1.0}))
+    changes = (
+        _change(command, later, lasts + 4.0 * around.cycle * (not goes), {"bEnable": 0.0}),
+        _change(command, later, lasts + 1.5 * around.cycle * goes, taken),
+        _change(command, later + lasts + 3.0 * around.period, 0.0, {"bLoadAtRest": 1.0}),
+    )
     again = _followed(command, later + lasts + around.period)
-    return Manner(commands=(command, again), changes=tuple(changes if not around.hoists else changes[:-1]))
+    return Manner(commands=(command, again), changes=changes[:-1] if around.hoists else changes)
 
 
 def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
     """Tell another live parameter on the way, faster than may be, and that of before later."""
-    later, lasts = around.period * _fraction(how, 3), _log(0.1, around.period, _fraction(how, 4))
     inputs = {f"f{name}": _between(ends, _fraction(how, 5)) for name, ends in around.live.items()}
-    changes = (Change(time=command.time + later, lasts=lasts, inputs=inputs),) if inputs else ()
-    return Manner(commands=(command,), changes=() if around.hoists else changes)
+    change = _change(command, around.part(how, 3), _log(0.1, around.period, _fraction(how, 4)), inputs)
+    return Manner(commands=(command,), changes=(change,) if inputs and not around.hoists else ())
 
 
 Habit = Callable[[Command, float, Surroundings], Manner]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, islice, pairwise, product
-from math import inf, isfinite
+from math import ceil, inf, isfinite
 from typing import Any, Self
 
 import attrs
@@ -28,6 +28,7 @@ from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
 from gen_profile.proof.habits import Change, Manner, Surroundings
 from gen_profile.proof.habits import manner as habit
+from gen_profile.proof.rhythms import rhythm
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
 
@@ -35,6 +36,7 @@ COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PER
 PERIODS = 5.0  # of the slowest mode, which they come in at least
 SOONEST = 0.5  # s until the first command, at most
 SHORTEST, LONGEST = 0.02, 3.0  # periods between two commands
+SHIFT, PAUSE = 8.0 * 3600.0, 30.0  # s; and periods between two commands of it
 MOST_COMMANDS = 16
 MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
 MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
@@ -199,13 +201,7 @@ class Histories:
             by_machine.append(linearize(spec.machine(), *_machine(spec, live_values, errors)).frequencies)
         slowest, fastest = float(np.min(by_machine)), float(np.max(by_machine))
         period = 2.0 * np.pi / slowest
-        return cls(
-            spec=spec,
-            axes=planned_axes(spec),
-            uncertain=ranges,
-            period=period,
-            fastest=fastest,
-        )
+        return cls(spec=spec, axes=planned_axes(spec), uncertain=ranges, period=period, fastest=fastest)
 
     def slowest(self, history: History) -> float:
         """Find the longest period in s of the machine that a block is given in a history."""
@@ -295,8 +291,15 @@ class Histories:
         every: int = 2 ** min(self._ends, MOST_CORNERS)
         return min(every, count // 2)
 
-    def history(self, choices: Array) -> History:
-        """Make the history of some choices, shape (choices,)."""
+    def history(self, choices: Array, lasts: float = 0.0) -> History:
+        """Make the history of some choices.
+
+        Parameters
+        ----------
+        choices : (choices,) array
+        lasts : float
+            s, of one that goes on in a rhythm, or by other choices each time for a `SHIFT`; else 0.
+        """
         axes, live, uncertain = len(self.axes), self.spec.planner.live, self.uncertain
         parts = np.split(choices[: self._first_command], np.cumsum([axes, self.box, 3]))
         starts, box, (first, manner, amount), ending = (part.tolist() for part in parts)
@@ -314,9 +317,13 @@ class Histories:
             places[number] = _between(travel, _widened(start))
         rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
         sensor = choices[self._first_sensed :].tolist()
-        is_sensed = sensed(self.spec, sensor)
-        rough = not is_sensed and manner * len(MANNERS) % 1.0 < ROUGH
-        manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending, rough=rough)]
+        is_sensed = not lasts and sensed(self.spec, sensor)
+        rough = not (is_sensed or lasts) and manner * len(MANNERS) % 1.0 < ROUGH
+        if 0.0 < lasts < SHIFT:
+            manners = [rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=False), lasts)]
+        else:
+            rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
+            manners = [*self._manners(rows, first, manner, ending, rough=rough, lasts=lasts)]
         commands = tuple(command for one in manners for command in one.commands)
         return History(
             live=live_values,
@@ -358,10 +365,10 @@ class Histories:
         return _machine(self.spec, history.live, errors)[0]
 
     def _manners(
-        self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: bool
+        self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: bool, lasts: float
     ) -> Iterator[Manner]:
         """Follow the rows until their time is over, then come to rest."""
-        within = max(COMMANDED, PERIODS * self.period)
+        within, longest = lasts or max(COMMANDED, PERIODS * self.period), PAUSE if lasts else LONGEST
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time, last = first * SOONEST, 1 + len(self.axes)
         around, earliest = self._surroundings(rough=rough), 0.0
@@ -373,7 +380,7 @@ class Histories:
             behaviour = habit(self._slowed(command, slowed), which, how, around)
             earliest = behaviour.commands[-1].time + 2.0 * around.cycle
             yield behaviour
-            time = behaviour.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
+            time = behaviour.commands[-1].time + self.period * SHORTEST * (longest / SHORTEST) ** row[last]
         time = max(min(time, within), earliest)
         how, *others = ending
         if how < 0.05:
@@ -449,6 +456,12 @@ def written(value: float) -> float | str:
 def _between(ends: tuple[float, float], fraction: float) -> float:
     low, high = ends
     return float(low + fraction * (high - low)) if fraction < 1.0 else high
+
+
+def _turned(rows: Array, lasts: float) -> Array:
+    """Repeat rows of choices, other ones each time, so many that each may last a second."""
+    times = ceil(lasts / len(rows))
+    return (np.tile(rows, (times, 1)) + _MORE * np.repeat(np.arange(times), len(rows))[:, None]) % 1.0
 
 
 def _widened(fraction: float, margin: float = 0.05) -> float:

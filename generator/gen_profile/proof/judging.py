@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+import attrs
+
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.proof.histories import History
@@ -19,26 +21,35 @@ STEADY = 1e-9  # m, by which setpoints may move while the axis stands
 Judge = Callable[[Numbering, Sequence[int]], list[JudgedHistory]]
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class WatchedRun:
+    """What became of a history.
+
+    Attributes
+    ----------
+    run : BlockRun
+    faults : tuple of str
+        What the block did other than commanded, in words that end a sentence.
+    left : float
+        m, that stated errors leave at most on the linear machine, as long as the block promises.
+    """
+
+    run: BlockRun
+    faults: tuple[str, ...] = ()
+    left: float = 0.0
+
+
 def judge_run(
-    spec: Spec,
-    run: BlockRun,
-    history: History,
-    disobeyed: Sequence[str] = (),
-    *,
-    cycle: float,
-    number: int,
-    group: str,
+    spec: Spec, watched: WatchedRun, history: History, *, cycle: float, number: int, group: str
 ) -> JudgedHistory:
     """Judge what became of a history.
 
     Parameters
     ----------
     spec : Spec
-    run : BlockRun
+    watched : WatchedRun
     history : History
         Of that run.
-    disobeyed : sequence of str
-        What the block did other than commanded, in words that end a sentence.
     cycle : float
         s.
     number : int
@@ -46,6 +57,7 @@ def judge_run(
     """
     loads = spec.machine().loads
     last = max(command.time for command in history.commands)
+    run = watched.run
     limits = _shares(spec, history, run)
     return JudgedHistory(
         number=number,
@@ -57,7 +69,8 @@ def judge_run(
         residual=dict(zip(loads, run.residual.tolist(), strict=True)),
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
-        faults=(*_faults(history, run, limits), *disobeyed),
+        left=watched.left,
+        faults=(*_faults(history, run, limits), *watched.faults),
     )
 
 

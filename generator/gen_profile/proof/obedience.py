@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
 
 from gen_profile.proof.followed import (
+    AHEAD,
     ENABLED,
     EXACT,
     FROM_REST,
     IN_VELOCITY,
     RUN_OUT,
     TO_SLOW,
-    TO_STICK,
     TO_STOP,
     TO_TURN,
     Allowance,
@@ -66,11 +66,9 @@ WORDS = {
     "vanished": "none of bBusy, bDone, bCommandAborted and bError tells of a command",
     "in velocity": "bInVelocity is set without the velocity of the command",
     "not in velocity": "bInVelocity is not set at the velocity of the command",
-    "aborted": "bCommandAborted is set though no command was replaced",
-    "not aborted": "bCommandAborted is not set though a command was replaced",
+    "aborted": "bCommandAborted does not tell what became of the command",
     "error": "bError and nErrorId contradict each other",
-    "refused": "nErrorId does not tell an error, or not as long as stated",
-    "wrong error": "nErrorId tells an error without a cause, or another one",
+    "wrong error": "nErrorId does not tell the error that there is, or one without a cause",
     "disabled": "bEnabled is not what bEnable asks for",
     "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
     "zone": "nZone is not the number of the blocked interval",
@@ -82,6 +80,7 @@ WORDS = {
     "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
     "swings": "a motion leaves the machine as given swinging by {needed:.3g} m",
     "sway left": "fSwayLeft is wrong by {needed:.3g} m",
+    "understated": "errors leave more than fSwayLeft states by {needed:.3g} m",
     "event": "the events that are kept are not those that happened",
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
@@ -89,17 +88,17 @@ WORDS = {
 }
 
 
-def faults(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[str]:
+def faults(measurements: Iterable[Allowance], cycle: float) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence; each kind once, where it is worst."""
     worst: dict[str, Allowance] = {}
-    for met in measured(followed, reactions):
+    for met in measurements:
         if not met.needed <= met.allowed:
             known = worst.get(met.what)
             if known is None or met.needed - met.allowed > known.needed - known.allowed:
                 worst[met.what] = met
     for what, met in worst.items():
         words = WORDS[what].format(needed=met.needed, over=met.needed - met.allowed)
-        yield f"{words}, at {met.cycle * followed.cycle:.2f} s"
+        yield f"{words}, at {met.cycle * cycle:.2f} s"
 
 
 def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
@@ -149,8 +148,6 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 allowed = arriving(followed, place, before, order)
                 there = (motion.away[own] <= EXACT) & motion.stands[own]
             case "velocity":
-                if max(map(abs, order.values)) > followed.slowest:
-                    continue
                 tops = [(1.0 - followed.reserve) * top for top in order.tops]
                 wanted = [min(max(w, -top), top) for w, top in zip(order.values, tops, strict=True)]
                 allowed = reaching(followed, before, wanted)
@@ -169,11 +166,26 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         elif end > latest:
             yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
         if first < end and order.kind == POSITION:
-            yield Allowance("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
+            yield from _left(followed, motion, (first, end), allowed)
+
+
+def _left(
+    followed: Followed, motion: IssuedMotion, cycles: tuple[int, int], arriving_again: float
+) -> Iterator[Allowance]:
+    """Judge that a target is left but to damp what was measured, and then reached again."""
+    first, last = cycles
+    damps, away = followed.sensed("bDamping"), motion.away[first:last]
+    for begin, end in runs_of(away > max(EXACT, followed.wander)):
+        damped = np.flatnonzero(damps[first + begin : first + end])
+        if damped.size and damped[0] <= 1:
+            returns = (end - begin - int(damped[-1])) * followed.cycle
+            yield Allowance(POSITION, first + begin, returns, arriving_again)
+        else:
+            yield Allowance("left", first + begin, float(away[begin:end].max()), EXACT)
 
 
 def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice) -> Flags:
-    """Whether an axis has a velocity, or is at the end of its way."""
+    """Whether an axis has a velocity, or is near the end of its way or a slow interval."""
     limits = followed.limits[axis]
     reached = (
         np.abs(motion.velocity[axis, own] - wanted)
@@ -181,12 +193,13 @@ def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, ow
     )
     if not wanted or reached[-1]:
         return reached
-    room, speed = followed.room(axis, motion.position[axis, own], np.array(wanted)), abs(wanted)
-    return reached | (
-        room
-        <= speed
-        * (speed / limits.acceleration + limits.acceleration / limits.jerk + TO_STICK * followed.period)
-    )
+    position, speed = motion.position[axis, own], abs(wanted)
+    near = speed * (speed / limits.acceleration + limits.acceleration / limits.jerk + AHEAD * followed.period)
+    reached |= followed.room(axis, position, np.array(wanted)) <= near
+    for zone in followed.zones:
+        if zone.axis == axis and 0.0 < zone.limit < speed:
+            reached |= np.maximum(zone.low - position, position - zone.high) <= near
+    return reached
 
 
 def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
@@ -240,22 +253,15 @@ def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         begin, end = order.begin, order.end
         if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
             continue
-        if before.kind == VELOCITY:
-            continue  # whose last tap still counts
+        if before.kind == VELOCITY or followed.sensed("bDamping")[begin - 1 : end].any():
+            continue  # its last tap still counts, or what was measured
         for k, way in enumerate(motion.way[:, begin].tolist()):
             velocity = motion.velocity[k, begin:end]
             if not way:
                 yield from greatest("unasked", np.abs(velocity), 0.0, begin)
-        if order.kind == VELOCITY:
-            yield from _beyond(followed, motion, order, begin)
-
-
-def _beyond(followed: Followed, motion: IssuedMotion, order: TimedOrder, begin: int) -> Iterator[Allowance]:
-    """Judge that no axis goes faster than its stick, from a cycle on, but to calm."""
-    for k, (wanted, own) in enumerate(zip(order.values, followed.limits, strict=True)):
-        if wanted and not followed.reserve:
-            top = abs(wanted) + MORE * own.velocity
-            yield from greatest("beyond", motion.velocity[k, begin : order.end] * np.sign(wanted), top, begin)
+            elif order.kind == VELOCITY:
+                top = abs(way) + MORE * followed.limits[k].velocity
+                yield from greatest("beyond", velocity * np.sign(way), top, begin)
 
 
 def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

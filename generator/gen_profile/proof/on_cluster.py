@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import attrs
-import numpy as np
 
 from gen_profile.artefacts.manifest import versions
 from gen_profile.cluster import client_of, processes, require_versions, unable
@@ -18,7 +17,7 @@ from gen_profile.errors import GenProfileError
 from gen_profile.progress import Progress
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.judging import Judge, judge_run
+from gen_profile.proof.judging import Judge
 from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.verdict import JudgedHistory
 from gen_profile.spec.model import Spec
@@ -52,10 +51,7 @@ class ProofRecipe:
     def of(cls, spec: Spec, text: str, histories: Histories) -> ProofRecipe:
         """Pack a proof's block and machine."""
         return cls(
-            spec=json.dumps(spec.to_dict()),
-            files=tuple(spec.files().items()),
-            text=text,
-            versions=versions(),
+            spec=json.dumps(spec.to_dict()), files=tuple(spec.files().items()), text=text, versions=versions()
         )
 
     def read_spec(self) -> Spec:
@@ -81,11 +77,9 @@ def judged_on_cluster(
         recipe = client.scatter(ProofRecipe.of(spec, text, histories), broadcast=True)
 
         def judge(numbering: Numbering, numbers: Sequence[int]) -> list[JudgedHistory]:
-            rows = [
-                (number, numbering.group(number), numbering.choices(number).tolist()) for number in numbers
-            ]
-            each = min(MOST_AT_ONCE, ceil(len(rows) / processes(client)) or 1)
-            parts = [rows[begin : begin + each] for begin in range(0, len(rows), each)]
+            drawn = (numbering.count, numbering.seed, numbering.parents)
+            each = min(MOST_AT_ONCE, ceil(len(numbers) / processes(client)) or 1)
+            parts = [(*drawn, numbers[begin : begin + each]) for begin in range(0, len(numbers), each)]
             judged = list[JudgedHistory]()
             try:
                 for done in client.map(judge_part, [recipe] * len(parts), parts, pure=False):
@@ -100,13 +94,16 @@ def judged_on_cluster(
         yield judge
 
 
-def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]) -> list[JudgedHistory]:
+def judge_part(
+    recipe: ProofRecipe, part: tuple[int, int, Sequence[Sequence[int]], Sequence[int]]
+) -> list[JudgedHistory]:
     """Judge some histories, on a worker.
 
     Parameters
     ----------
     recipe : ProofRecipe
-    rows : sequence of (number, group, choices)
+    part : (count, seed, parents, numbers)
+        Of the numbering, and which of its histories.
 
     Raises
     ------
@@ -116,12 +113,7 @@ def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]
         Something cannot be compiled or loaded here.
     """
     require_versions(recipe.versions, "this proof")
-    spec = recipe.read_spec()
-    histories = Histories.of(spec)
-    with ClosedLoop(spec, recipe.text, histories) as loop:
-        made = [(number, group, histories.history(np.array(choices))) for number, group, choices in rows]
-        return [
-            judge_run(spec, run, history, disobeyed, cycle=loop.cycle, number=number, group=group)
-            for number, group, history in made
-            for run, disobeyed in [loop.watched(history, *loop.known(history))]
-        ]
+    spec, (count, seed, parents, numbers) = recipe.read_spec(), part
+    numbering = Numbering.of(Histories.of(spec), count, seed, parents)
+    with ClosedLoop(spec, recipe.text, numbering.histories) as loop:
+        return loop.judged(numbering, numbers)

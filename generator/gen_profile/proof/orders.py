@@ -7,6 +7,7 @@ and none is taken while a quick stop lasts. Before a run nothing is known of tha
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from math import inf
 
 import attrs
@@ -201,6 +202,7 @@ class _Reader:
         self._since = {LIVE: -1, LIMITS: -1}  # cycles from which values are wrong
         self._goal, self._kind = tuple[float, ...](), STOP
         self._tops = tuple(own.velocity for own in inputs.limits)
+        self._names = cache(lambda name: [axis.of(name) for axis in inputs.axes])
 
     def step(self, cycle: int, row: Mapping[str, float]) -> TimedOrder:
         before, goal = self._kind, self._goal
@@ -211,16 +213,11 @@ class _Reader:
             self._edge = cycle
         self._execute, self._velocity = bool(row["bExecute"]), bool(row["bVelocity"])
         return TimedOrder(
-            begin=cycle,
-            end=cycle,
-            kind=self._kind,
-            values=self._goal,
-            tops=self._tops,
-            edge=self._edge,
+            begin=cycle, end=cycle, kind=self._kind, values=self._goal, tops=self._tops, edge=self._edge
         )
 
     def _of(self, row: Mapping[str, float], name: str) -> tuple[float, ...]:
-        return tuple(row[axis.of(name)] for axis in self._inputs.axes)
+        return tuple(row[given] for given in self._names(name))
 
     def _read(self, cycle: int, row: Mapping[str, float]) -> str:
         facts = self._facts
@@ -239,7 +236,7 @@ class _Reader:
             if self.error:
                 return DISABLED
             self._enabled = True
-            self._braking = any(row.get(axis.of("fActVelocity")) for axis in self._inputs.axes)
+            self._braking = any(map(row.get, self._names("fActVelocity")))
         fault = self._fault(cycle, row)
         self._neutral = self._neutral or not row["bVelocity"]
         rises = bool(row["bExecute"]) and not self._execute
@@ -265,7 +262,7 @@ class _Reader:
 
     def _hinders(self, row: Mapping[str, float]) -> int:
         """Give the error for which axes are not taken over; 0 for none."""
-        names = [axis.of(name) for axis in self._inputs.axes for name in ("fActPosition", "fActVelocity")]
+        names = (*self._names("fActPosition"), *self._names("fActVelocity"))
         if not all(abs(row.get(name, 0.0)) <= NUMBERS for name in names):
             return NO_NUMBER
         return MISTIMED * self._mistimed(row)
@@ -306,8 +303,6 @@ class _Reader:
 
     def _strays(self, row: Mapping[str, float]) -> bool:
         """Whether an axis is farther from its setpoint than its limit allows."""
-        if self._inputs.axes[0].of("fFollowingLimit") not in row:
-            return False
         pairs = zip(self._of(row, "fFollowingLimit"), self._of(row, "fActPosition"), strict=True)
         return any(limit > 0.0 and not abs(apart) <= limit for limit, apart in pairs)
 
@@ -342,11 +337,11 @@ class _Reader:
 
     def _closed(self, row: Mapping[str, float], axis: int) -> list[Interval]:
         """Blocked intervals of an axis."""
-        of = self._inputs.axes[axis].of
-        if f"{of('aBlockedLow')}[0]" not in row:
+        low, high = (self._names(name)[axis] for name in ("aBlockedLow", "aBlockedHigh"))
+        if f"{low}[0]" not in row:
             return []
-        ends = [(row[f"{of('aBlockedLow')}[{k}]"], row[f"{of('aBlockedHigh')}[{k}]"]) for k in range(ZONES)]
-        return [(low, high) for low, high in ends if low < high]
+        ends = [(row[f"{low}[{k}]"], row[f"{high}[{k}]"]) for k in range(ZONES)]
+        return [(begin, end) for begin, end in ends if begin < end]
 
     def _is_closed(self, axis: int, target: float, row: Mapping[str, float], cycle: int) -> bool:
         """Whether a target lies within or behind a blocked interval."""

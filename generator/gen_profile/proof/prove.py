@@ -13,8 +13,8 @@ from gen_profile.plugins import require_installed
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.judging import Judge, judge_run
-from gen_profile.proof.numbering import KEPT, Numbering
+from gen_profile.proof.judging import Judge
+from gen_profile.proof.numbering import KEPT, LONG, RHYTHMS, Numbering
 from gen_profile.proof.verdict import JudgedHistory, Proof
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import ERROR_FLOOR
@@ -23,7 +23,6 @@ from gen_profile.verification.monte_carlo import CURVATURE
 HISTORIES = 200
 BY_FMPY = 100  # of so many histories, one is judged by FMPy
 FEWEST_BY_FMPY = 2
-TOLD = 50  # histories between two signs of life
 
 
 def prove(
@@ -69,10 +68,12 @@ def prove(
             on_cluster = _on_cluster(spec, text, numbering.histories, scheduler, progress)
             judge = stack.enter_context(on_cluster)
         loop = stack.enter_context(closed_loop(spec, text, numbering.histories, workers, progress))
-        judge = judge or partial(_judge, spec, loop, progress)
+        judge = judge or partial(loop.judged, progress=progress)
         judged = judge(numbering, range(len(numbering.drawn)))
         for numbers in numbering.rounds:
-            worst = sorted(judged, key=lambda one: _fraction(spec, one), reverse=True)[:KEPT]
+            climbs = numbering.group(numbers[0]) == RHYTHMS
+            among = [one for one in judged if (one.group == RHYTHMS) == climbs]
+            worst = sorted(among, key=lambda one: _height(spec, one), reverse=True)[:KEPT]
             numbering = numbering.after_round([one.number for one in worst])
             judged += judge(numbering, numbers)
         return _verdict(spec, loop, numbering, judged, progress)
@@ -96,7 +97,7 @@ def replay(
         That judges nothing else, with the history's trace.
     """
     with closed_loop(spec, text, numbering.histories, 1, progress) as loop:
-        judged = _judge(spec, loop, progress, numbering, [number])
+        judged = loop.judged(numbering, [number])
         return _verdict(spec, loop, numbering, judged, progress)
 
 
@@ -106,23 +107,6 @@ def closed_loop(
     """Load block and machine for that many processors."""
     progress("compiling block and machine, once")
     return ClosedLoop(spec, text, histories, workers=workers or os.cpu_count() or 1)
-
-
-def _judge(
-    spec: Spec, loop: ClosedLoop, progress: Progress, numbering: Numbering, numbers: Sequence[int]
-) -> list[JudgedHistory]:
-    """Run the histories of some numbers."""
-    histories = [numbering.history(number) for number in numbers]
-    judged = []
-    with loop.runs(histories) as runs:
-        for number, history, watched in zip(numbers, histories, runs, strict=True):
-            group = numbering.group(number)
-            judged.append(
-                judge_run(spec, watched[0], history, watched[1], cycle=loop.cycle, number=number, group=group)
-            )
-            if number % TOLD == 0:
-                progress("proving", number, numbering.count)
-    return judged
 
 
 def _on_cluster(
@@ -140,12 +124,14 @@ def _fraction(spec: Spec, judged: JudgedHistory) -> float:
     return np.inf if judged.faults else judged.fraction(spec.check.residual_sway, 0.0)
 
 
+def _height(spec: Spec, judged: JudgedHistory) -> float:
+    """Tell by what the search climbs: in a rhythm by what any stated error would leave."""
+    by_errors = judged.left / min(spec.check.residual_sway.values())
+    return max(_fraction(spec, judged), by_errors * (judged.group == RHYTHMS))
+
+
 def _verdict(
-    spec: Spec,
-    loop: ClosedLoop,
-    numbering: Numbering,
-    judged: Sequence[JudgedHistory],
-    progress: Progress,
+    spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory], progress: Progress
 ) -> Proof:
     """Bound the error at the worst histories, and let FMPy judge these and some others."""
     sound = [one for one in judged if not one.faults]
@@ -157,9 +143,10 @@ def _verdict(
         coarse = np.array(list(one.residual.values()))
         between = CURVATURE * (numbering.histories.fastest * loop.cycle) ** 2 / 8.0 * coarse.max()
         error = max(error, ERROR_FLOOR + float(np.abs(finer - coarse).max() + between))
-    chosen = np.random.default_rng(numbering.seed).permutation(len(sound))
-    some = [sound[k] for k in chosen[: max(FEWEST_BY_FMPY, len(sound) // BY_FMPY)]]
-    by_fmpy = {one.number: one for one in (*worst[:1], *some)}
+    short = [one for one in worst + sound if one.group not in (RHYTHMS, LONG)]  # others take it too long
+    chosen = np.random.default_rng(numbering.seed).permutation(len(short))
+    some = [short[k] for k in chosen[: max(FEWEST_BY_FMPY, len(sound) // BY_FMPY)]]
+    by_fmpy = {one.number: one for one in (*short[:1], *some)}
     apart = [0.0]
     for done, one in enumerate(by_fmpy.values()):
         progress("co-simulating some by FMPy", done, len(by_fmpy))

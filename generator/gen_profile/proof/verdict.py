@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.proof.histories import History
-from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH
+from gen_profile.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
 from gen_profile.summary import Summarised
 from gen_profile.verification.verdict import Examination
 
@@ -18,6 +18,8 @@ GROUPS = {
     CORNERS: "ends of all live and uncertain ranges at once",
     DRAWS: "drawn from all ranges and commands",
     SEARCH: "steps that climb from the worst of these",
+    RHYTHMS: "many commands in one rhythm, and steps that climb from the worst",
+    LONG: "eight hours of commands",
 }
 QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
@@ -47,6 +49,8 @@ class JudgedHistory:
         much, in m (or rad), the travel was left.
     faults : tuple of str
         What else is wrong, in words that end a sentence.
+    left : float
+        m, that stated errors leave at most on the linear machine, as long as the block promises.
     """
 
     number: int
@@ -59,6 +63,7 @@ class JudgedHistory:
     on_the_way: Mapping[str, float]
     limits: Mapping[str, float]
     faults: tuple[str, ...]
+    left: float = 0.0
 
     def fraction(self, limit: Mapping[str, float], error_bound: float) -> float:
         """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""

@@ -18,7 +18,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.obedience import faults
+from gen_profile.proof.obedience import faults, measured
 from gen_profile.proof.orders import (
     DISABLED,
     QUICK_STOP,
@@ -30,6 +30,7 @@ from gen_profile.proof.orders import (
     TimedOrder,
     read_orders,
 )
+from gen_profile.proof.statements import LEFT
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
@@ -37,6 +38,7 @@ from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block does not know
 ADDED_UP = 5.0  # nPromise: errors left more than is allowed
 STATED = 1.05  # sway by what the block states: between the machines that it watches
+MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 SURELY = 3  # times that the block needs to see a live parameter change
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
@@ -116,13 +118,14 @@ class BlockWatch:
     def marks(self, orders: Sequence[TimedOrder]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
         least = self.reaction / self.cycle
-        return [
+        starts = [
             one.begin
             for one in orders
             if 0 < one.begin == one.edge
             and one.end - one.begin > least
             and one.kind not in (QUICK_STOP, DISABLED)
         ]
+        return starts[:MOST_COPIES]
 
     def faults(
         self,
@@ -131,8 +134,8 @@ class BlockWatch:
         expected: Sequence[TimedOrder],
         block: CalledBlock,
         run: BlockRun,
-    ) -> tuple[str, ...]:
-        """Say what is wrong, each in words that end a sentence.
+    ) -> tuple[tuple[str, ...], float]:
+        """Say what is wrong, each in words that end a sentence, and how much errors leave at most.
 
         Parameters
         ----------
@@ -148,12 +151,15 @@ class BlockWatch:
         """
         followed, reactions = self.followed(given[0], script, expected, block, run)
         followed = attrs.evolve(followed, modes=given[1])
-        return (*faults(followed, reactions), *self._understated(run, followed))
+        met = [*measured(followed, reactions)]
+        left = max((one.needed for one in met if one.what == LEFT), default=0.0)
+        return (*faults(met, followed.cycle), *self._understated(run, followed)), left
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""
         states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
         known = followed.issued["nPromise"][-1] in (0.0, ADDED_UP)
+        known = known and not followed.sensed("bSensorUsed").any()
         if states is None or not known or any(one.kind in (QUICK_STOP, DISABLED) for one in followed.orders):
             return  # it is not known how the load swings
         stated = float(states[run.stands :].max(initial=0.0))  # a damped load's falls
@@ -267,9 +273,7 @@ class BlockWatch:
                     yield begin, begin + sure
 
     def _rest_reports(self, script: Script, cycles: int) -> list[int]:
-        """Tell when bLoadAtRest rises; blocks of earlier versions have none."""
-        if "bLoadAtRest" not in self.inputs:
-            return []
+        """Tell when bLoadAtRest rises."""
         given = script.inputs[:, self.inputs.index("bLoadAtRest")]
         rows = np.flatnonzero(np.diff(given, prepend=0.0) > 0.0).tolist()
         return [begin for row in rows if (begin := script.start_cycles[row]) < cycles]
