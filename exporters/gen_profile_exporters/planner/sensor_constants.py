@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
 KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
 NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
-ALIKE = 0.15  # of what else may differ, that is a misreading where nothing differs otherwise for a period
+CORRELATED = (
+    0.15  # of what else may differ, that is a misreading where nothing differs otherwise for a period
+)
 MEMORY = 1.0  # slow periods, over which what it shows of the axis's own motions is
 ROWS_BEFORE = 4  # of the model by mode, where one axis is planned: frequency, decay, error and sway
 
@@ -135,7 +137,7 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cSensorOffset": sensor.offset,
         "cSensorScale": sensor.misread,
         "cSensorOthers": sensor.others,
-        "cSensorAlike": ALIKE,
+        "cSensorAlike": CORRELATED,
         "cSensorForgets": 1.0 / (2.0 * np.pi * MEMORY),
         "cSensorFloor": sensor.floor,
         "cSwing": sensor.swing,

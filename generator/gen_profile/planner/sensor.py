@@ -35,7 +35,7 @@ OFFSET_TIME = 0.7  # slow periods, in which an offset is learnt
 NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cycles are shorter
 LIGHT = 0.02  # damping that modes are taken to have at least, so that one that is not shown is no obstacle
 ROOM = 1.25  # of the stated swing: how far damping may lead
-# Of the allowed sway: where damping begins as the axis arrives, later at rest, and after a period of rest; and ends.
+# Of the allowed sway: where damping begins on arrival, later at rest, and after a period of that; and ends.
 BEGIN, AGAIN, ROUSED, END = 0.4, 0.7, 0.85, 0.2
 SURE = 4.0  # standard deviations of what is estimated, that lie between the first two
 NOISES = 8.0  # standard deviations of the noise that no value is off by
@@ -252,8 +252,8 @@ def _floor(sensor: SensorSpec, one: SensedModes) -> float:
 def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
     """Find how much of what differs comes from gusts, wrong frequencies and noise at most.
 
-    The root of its square's integral over the phase in the memory, which by Cauchy and Schwarz bounds how much of it looks
-    like what the axis's own motions show.
+    The root of its square's integral over the phase in the memory, which by Cauchy and Schwarz bounds how
+    much of it looks like what the axis's own motions show.
     """
     state, measured, gain = _filter(sensor, one)
     slowest, corrected = float(one.frequencies[0]), state - np.outer(gain, measured[0])

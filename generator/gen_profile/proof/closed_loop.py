@@ -251,7 +251,7 @@ class ClosedLoop:
     def _until_calm(
         self, history: History, start_cycles: Sequence[int], inputs: Array
     ) -> tuple[Sequence[int], Array]:
-        """Let the last row begin no sooner than what swings at first, or after a gust or a fault, was measured."""
+        """Let the last row begin once what swings at first, or after a gust or a fault, was measured."""
         ends = 0
         if history.sensed:
             periods = FAILED if history.sensed.fault else 1.0

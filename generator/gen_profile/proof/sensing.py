@@ -111,10 +111,10 @@ class SensedHistory:
         for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True):
             if disturbance.gust is not None:
                 lasts = SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST)
-                begins = share * (latest - lasts if fault else latest)  # none that no sensor would show
+                start = share * (latest - lasts if fault else latest)  # none that no sensor would show
                 acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
-                if begins >= 0.0:
-                    gusts.append(Gust(time=begins, lasts=lasts, acceleration=acceleration))
+                if start >= 0.0:
+                    gusts.append(Gust(time=start, lasts=lasts, acceleration=acceleration))
         return cls(
             starts=_starts(spec, max(0.0, _stretched(swing)), 2.0 * np.pi * phase, *machine),
             gusts=tuple(gusts),
