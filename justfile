@@ -81,3 +81,7 @@ mutants *arguments:
 # Random programs of Structured Text: do the C made of them and the tests' interpreter agree?
 interpreters *arguments:
     python tests/exporters/interpreters.py {{ arguments }}
+
+# A planner block with a sensor beside the baselines of cranebench, as the table in docs/planner-algorithm.md.
+crane-bench *arguments:
+    python tests/other_systems/crane_bench.py {{ arguments }}

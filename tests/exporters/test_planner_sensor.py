@@ -93,8 +93,11 @@ def test_after_a_quick_stop_the_promise_comes_back_by_itself(compiled):
     swung.run(3.0, bQuickStop=1.0, bVelocity=0.0)
     assert swung.rows["nPromise"][-1] == 2.0 or swung.rows["nPromise"][-1] == 6.0
     issued = swung.run(28.0, bQuickStop=0.0)
-    assert issued["bDamping"].any() and issued["bPromise"][-1]
+    dropped = round(9.0 / CYCLE)
+    assert np.argmax(issued["bDamping"][dropped:] > 0.0) <= 1
+    assert issued["bPromise"][-1]
     assert np.abs(issued["sway"][-1000:]).max() < ALLOWED
+    assert np.abs(issued["hook"][-1000:]).max() < ALLOWED  # the fast mode, too
 
 
 FAULTS = {
@@ -121,6 +124,48 @@ def test_a_sensor_that_fails_is_left_out_and_the_axis_comes_to_rest(compiled, nu
     else:
         assert swung.run(1.0)["nSensorFault"][-1] == number
         assert not swung.run(1.0, bReset=1.0)["nSensorFault"][-1]
+
+
+MISREADS = {
+    "sign": lambda _, value: -value,
+    "scale": lambda _, value: 2.0 * value,
+    "dead": lambda number, _: 0.002 * np.sin(37.0 * number * number),
+}
+
+
+@pytest.mark.parametrize("name", MISREADS)
+def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compiled, name):
+    swung = crane(compiled)
+    swung.run(6.0, sensor=MISREADS[name])
+    issued = swung.run(14.0, sensor=MISREADS[name], fTarget=STANDS + 6.0, bExecute=1.0)
+    assert issued["nSensorFault"][-1] == 7.0 and issued["nPromise"][-1] == 2.0
+    assert not issued["bDamping"].any()  # so the load does as without a sensor
+    assert np.abs(issued["sway"][-500:]).max() < 1e-3
+    require_limits(issued)
+    swung.run(0.1, bReset=1.0, bLoadAtRest=1.0)  # mended
+    again = swung.run(16.0, bReset=0.0, bExecute=0.0, noise=0.002, random=np.random.default_rng(3))
+    assert not again["nSensorFault"][-1] and again["bSensorUsed"][-1] and again["bPromise"][-1]
+
+
+def test_what_it_shows_of_the_axis_s_own_motion_is_told(compiled):
+    for scale in (1.0, 1.3):
+        swung = crane(compiled)
+        swung.run(6.0)
+        issued = swung.run(7.0, sensor=lambda _, value, by=scale: by * value, fTarget=30.0, bExecute=1.0)
+        farthest = np.abs(issued["fSensorScale"] - 1.0).max()  # it fades where the axis coasts
+        assert abs(farthest - (scale - 1.0)) < 0.07
+        assert not issued["nSensorFault"].any()
+
+
+def test_after_disable_and_enable_it_is_damped_at_once_and_promised_again(compiled):
+    swung = crane(compiled, swing=(0.4, 1.0))
+    swung.run(5.0)
+    swung.run(2.0, bEnable=0.0, fActPosition=swung.rows["fPosition"][-1])
+    enabled = len(swung.rows["sway"])
+    issued = swung.run(20.0, bEnable=1.0)
+    assert np.argmax(issued["bDamping"][enabled:] > 0.0) * CYCLE <= 0.05
+    assert issued["nPromise"][enabled + 100] == 2.0 and issued["bPromise"][-1]
+    assert np.abs(issued["sway"][-1000:]).max() < ALLOWED
 
 
 def test_the_kernel_leaves_the_fast_mode_alone():

@@ -12,7 +12,7 @@ from gen_profile.planner.sensor_log import read_sensor_log
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import prove
-from gen_profile.proof.sensing import Gust, sensor_faults
+from gen_profile.proof.sensing import FAULTS, Gust, sensor_faults
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.running.block_run import BlockRun
 
@@ -41,8 +41,10 @@ def test_histories_have_sensors_of_every_kind_and_old_ones_stay(spec):
     sensed = [histories.history(choices).sensed for choices in drawn]
     kinds = [one.fault for one in sensed if one is not None]
     assert 0.3 < sensed.count(None) / len(sensed) < 0.4
-    assert {*kinds} == {"", "silent", "no number", "out of range", "frozen", "jump", "noise"}
-    assert all(not one.gusts for one in sensed if one is not None and one.fault)
+    assert {*kinds} == {"", *FAULTS}
+    failing = [one for one in sensed if one is not None and one.fault]
+    assert any(one.gusts for one in failing)
+    assert all(gust.time + gust.lasts <= one.fails for one in failing for gust in one.gusts)
     plain = Histories.of(preset_spec("bay-crane", MEASURED[:1]))
     assert histories.choices > plain.choices
 
@@ -97,7 +99,14 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     assert not faults(gusty, *followed(0.2 * (times < 14.0)))
     silent = attrs.evolve(sound, fault="silent", fails=3.0)
     assert "not noticed" in faults(silent, *followed(0.0))[0]
-    assert not faults(silent, *followed(0.2, fault=1.0))
+    late = faults(silent, *followed(0.2, fault=1.0 * (times > 4.1)))
+    assert "not noticed" in late[0]
+    assert not faults(silent, *followed(0.2, fault=1.0 * (times > 3.4)))
+    scaled, (run, outputs) = attrs.evolve(sound, fault="scale"), followed(0.2)
+    assert not faults(scaled, run, outputs)  # as long as the promise tells
+    assert "neither noticed nor harmless" in faults(scaled, attrs.evolve(run, promise=False), outputs)[0]
+    swings = attrs.evolve(run, residual=np.array([0.0, 2.0]))
+    assert "makes the load swing by 2 m" in faults(scaled, swings, outputs)[0]
 
 
 @pytest.mark.slow

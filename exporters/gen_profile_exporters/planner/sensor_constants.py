@@ -16,6 +16,11 @@ Array = NDArray[np.float64]
 LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
 KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
 NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
+CORRELATED = (
+    0.15  # of what else may differ, that is a misreading where nothing differs otherwise for a period
+)
+STEADY = 0.03  # share by which a live parameter may be another than planned with, while motions are judged
+MEMORY = 1.0  # slow periods, over which what it shows of the axis's own motions is
 ROWS_BEFORE = 4  # of the model by mode, where one axis is planned: frequency, decay, error and sway
 
 
@@ -34,11 +39,14 @@ class SensorConstants:
     most, step, gate, frozen, noisy, offset : float
         In its unit: what it may show; change from cycle to cycle; difference from what is expected, and
         the change of that while the value stays the same; mean square change; offset.
-    swing, floor, begin, again, end : float
+    swing, floor, begin, again, roused, end : float
         m, of the slowest mode: what is unknown at first and later; where damping begins as the axis arrives,
-        where later at rest, and where it ends.
+        where later at rest, where once it hung still, and where it ends.
     gains : (3,) sequence of float
         Of sway, its rate and position, in pulses of a slot.
+    misread, others : float
+        By which share the axis's own motions may show otherwise than expected; and how much else that differs
+        may look like them, in its unit, the root of an integral over the phase of the slowest mode.
     room : float
         m, by which damping may lead away.
     """
@@ -60,8 +68,11 @@ class SensorConstants:
     floor: float
     begin: float
     again: float
+    roused: float
     end: float
     gains: Sequence[float]
+    misread: float
+    others: float
     room: float
 
 
@@ -125,10 +136,16 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cSensorNoisy": sensor.noisy,
         "cSensorSmoothing": min(1.0, cycle / NOISE_WATCHED),
         "cSensorOffset": sensor.offset,
+        "cSensorScale": sensor.misread,
+        "cSensorOthers": sensor.others,
+        "cSensorAlike": CORRELATED,
+        "cSensorSteady": STEADY,
+        "cSensorForgets": 1.0 / (2.0 * np.pi * MEMORY),
         "cSensorFloor": sensor.floor,
         "cSwing": sensor.swing,
         "cDampFrom": sensor.begin,
         "cDampAgain": sensor.again,
+        "cDampRoused": sensor.roused,
         "cDampTo": sensor.end,
         "cDampRoom": sensor.room,
         "cDampLength": KERNEL_PERIODS,
@@ -142,7 +159,7 @@ def _expected(sensor: SensorConstants, cycle: float) -> int:
 
 def cycle_work(sensor: SensorConstants | None, modes: int) -> int:
     """Floating-point operations of every cycle."""
-    return 0 if sensor is None else 60 + 40 * modes
+    return 0 if sensor is None else 120 + 40 * modes
 
 
 def other(sensor: SensorConstants | None) -> list[str]:

@@ -145,6 +145,9 @@ def deployment(outcome: Deployment) -> str:
     """Tell what planner block was written, and how it was judged."""
     count = outcome.block.modes
     rows = [("machine", f"{outcome.spec.plant.type}, {count} {'mode' if count == 1 else 'modes'}")]
+    if outcome.margins is not None:
+        later, times = outcome.margins.delay, outcome.margins.gain
+        rows.append(("sensor margins", f"{later:.2g} s later than stated, {times:.2g} times too much"))
     rows += [] if outcome.proof is None else _proof(outcome.proof)
     if outcome.proof is None:
         rows.append(("proof", "skipped"))

@@ -17,6 +17,7 @@ from gen_profile.errors import Suggestion
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.planner.full_speed import slow_axes
+from gen_profile.planner.margins import Margins, sensor_margins
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
@@ -42,6 +43,8 @@ class Deployment(Drawable):
         Changes of a refused spec with which its block passes.
     warnings : tuple of str
         Sentences on axes that never reach the velocity of their limits; none where nothing was proved.
+    margins : Margins or None
+        Of the damping, where there is a sensor.
     """
 
     spec: Spec
@@ -51,6 +54,7 @@ class Deployment(Drawable):
     files: tuple[Artefact, ...]
     suggestions: tuple[Suggestion, ...] = ()
     warnings: tuple[str, ...] = ()
+    margins: Margins | None = None
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -73,6 +77,7 @@ class Deployment(Drawable):
             "modes": self.block.modes,
             "live": {name: list(ends) for name, ends in self.spec.planner.live.items()},
             "frequency_error": self.block.frequency_error,
+            "sensor_margins": None if self.margins is None else self.margins.to_dict(),
             "proof": None if self.proof is None else self.proof.to_dict(),
             "cures": [one.to_dict() for one in self.suggestions],
             "warnings": list(self.warnings),
@@ -143,6 +148,7 @@ def deploy_planner(
         files=kept,
         suggestions=suggestions,
         warnings=warnings,
+        margins=sensor_margins(spec, block.text),
     )
 
 

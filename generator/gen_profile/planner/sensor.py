@@ -17,12 +17,17 @@ from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, 
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
-from gen_profile.planner.machine import linearized, planned_axes
+from gen_profile.planner.machine import frequency_errors, linearized, planned_axes
 from gen_profile.problem.linearization import Linearization
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile_exporters.planner.block import KERNEL_SLOTS, SLOTS_PER_PERIOD
-from gen_profile_exporters.planner.sensor_constants import SensorConstants, damping_rows, damping_slots
+from gen_profile_exporters.planner.sensor_constants import (
+    MEMORY,
+    SensorConstants,
+    damping_rows,
+    damping_slots,
+)
 
 BANDWIDTH = 1.0  # of the observer at most, by the slowest frequency: what ropes and delays are wrong by
 FAST = 0.1  # how much other modes are expected to be excited, by what the sensor shows of them
@@ -30,10 +35,13 @@ OFFSET_TIME = 0.7  # slow periods, in which an offset is learnt
 NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cycles are shorter
 LIGHT = 0.02  # damping that modes are taken to have at least, so that one that is not shown is no obstacle
 ROOM = 1.25  # of the stated swing: how far damping may lead
-BEGIN, AGAIN, END = 0.4, 0.7, 0.2  # of the allowed sway: where damping begins, at rest again, and ends
+# Of the allowed sway: where damping begins on arrival, later at rest, and after a period of that; and ends.
+BEGIN, AGAIN, ROUSED, END = 0.4, 0.7, 0.85, 0.2
 SURE = 4.0  # standard deviations of what is estimated, that lie between the first two
 NOISES = 8.0  # standard deviations of the noise that no value is off by
 STUCK = 4.0  # of them, by which what is expected may change while the value stays the same
+MISREAD = 0.5  # share by which what it shows of the axis's own motions may differ from what is expected
+SURE_OTHERS = 6.0  # standard deviations of the noise that look like own motions
 UPDATE = 0.1  # s between new values at most, from which steps are judged
 POSITION_WEIGHT, PULSE_WEIGHT = 0.05, 3.0  # of the law, beside a weight of 1 of the sway
 LEAST_EFFECT = 0.3  # of damping pulses on the slowest mode, by what one without a kernel would do
@@ -140,8 +148,11 @@ def _constants(
         floor=floor,
         begin=BEGIN * allowed,
         again=AGAIN * allowed,
+        roused=ROUSED * allowed,
         end=END * allowed,
         gains=_law().tolist(),
+        misread=MISREAD,
+        others=max(_others(spec, sensor, disturbance, one) for one in sensed),
         room=damping_room(spec),
     )
 
@@ -236,6 +247,31 @@ def _floor(sensor: SensorSpec, one: SensedModes) -> float:
     kicks = np.outer(gain, gain) * sensor.noise**2 * NOISE_TIME
     spread = solve_continuous_lyapunov(state - np.outer(gain, measured[0]), -kicks)
     return hypot(np.sqrt(spread[0, 0]), np.sqrt(spread[1, 1]) / float(one.frequencies[0]))
+
+
+def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
+    """Find how much of what differs comes from gusts, wrong frequencies and noise at most.
+
+    The root of its square's integral over the phase in the memory, which by Cauchy and Schwarz bounds how
+    much of it looks like what the axis's own motions show.
+    """
+    state, measured, gain = _filter(sensor, one)
+    slowest, corrected = float(one.frequencies[0]), state - np.outer(gain, measured[0])
+    pushed, freed = np.zeros(len(state)), np.zeros((len(state), 2))
+    pushed[1:-1:2] = one.push
+    freed[0, 0], freed[1, 1] = one.swing, slowest * one.swing
+    peak = max(
+        abs(measured[0] @ np.linalg.solve(1j * frequency * np.eye(len(state)) - corrected, pushed))
+        for frequency in slowest * np.geomspace(0.1, 10.0, 100)
+    )
+    accelerations = disturbance.gust.acceleration if disturbance.gust else 0.0
+    accelerations += 2.0 * float(frequency_errors(spec)[0]) * slowest**2 * one.swing / abs(float(one.push[0]))
+    period = 2.0 * np.pi / slowest
+    later = expm(corrected * period) @ freed
+    energy = later.T @ solve_continuous_lyapunov(corrected.T, -measured.T @ measured) @ later
+    noise = SURE_OTHERS * sensor.noise * np.sqrt(max(NOISE_TIME, spec.export.cycle_time))
+    seen = peak * accelerations * np.sqrt(0.5 * MEMORY * period) + np.sqrt(np.linalg.norm(energy, 2)) + noise
+    return float(seen * np.sqrt(slowest))
 
 
 def _rows(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]) -> Array:

@@ -42,6 +42,7 @@ NOISY_ON = 6.0  # of these periods after the last command, in which live paramet
 TOLD = 50  # histories between two signs of life
 LONGEST = 10**9  # cycles, for ever
 MOST_MACHINES = 4  # at corners of the uncertain ranges
+FAILED = 4.0  # of these periods, in which the axis may move as a sensor that failed shows
 HOIST_STARTS = 0.1  # of these periods, in which a hoist takes up its speed
 
 
@@ -257,8 +258,11 @@ class ClosedLoop:
     def _until_calm(
         self, history: History, start_cycles: Sequence[int], inputs: Array
     ) -> tuple[Sequence[int], Array]:
-        """Let the last row begin no sooner than what swings at first, or after a gust, was measured."""
-        ends = math.ceil((history.sensed.ends + self._histories.period) / self.cycle) if history.sensed else 0
+        """Let the last row begin once what swings at first, or after a gust or a fault, was measured."""
+        ends = 0
+        if history.sensed:
+            periods = FAILED if history.sensed.fault else 1.0
+            ends = math.ceil((history.sensed.ends + periods * self._histories.period) / self.cycle)
         if ends <= start_cycles[-1]:
             return start_cycles, inputs
         return [*start_cycles, ends], np.vstack([inputs, inputs[-1]])

@@ -151,9 +151,9 @@ class History:
         return self._has("fActVelocity")
 
     @property
-    def reassured(self) -> bool:
+    def misinformed(self) -> bool:
         """Whether the block gets the report that the load hangs still, true or not."""
-        return self._has("bLoadAtRest")
+        return self._has("bLoadAtRest") or (self.sensed is not None and self.sensed.blind)
 
     def _has(self, name: str) -> bool:
         """Whether an input differs for some time from what the commands say."""

@@ -65,7 +65,7 @@ def judge_run(
         history=history,
         cycles=run.cycles,
         rests_after=max(0.0, run.stands * cycle - last) if run.stands >= 0 else None,
-        promise=run.promise and not history.reassured,
+        promise=run.promise and not history.misinformed,
         residual=dict(zip(loads, run.residual.tolist(), strict=True)),
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,

@@ -18,14 +18,27 @@ from gen_profile_fmu.running.block_run import BlockRun, Measurement
 
 CHOICES = 14
 NONE, SOUND = 0.35, 0.8  # up to which choice there is no sensor, or a sound one; beyond, one that fails
-FAULTS = ("silent", "no number", "out of range", "frozen", "jump", "noise")
-NOTICED = ("silent", "no number", "out of range", "jump")  # others are noticed where they do harm
+FAULTS = (
+    "silent",
+    "no number",
+    "out of range",
+    "frozen",
+    "jump",
+    "noise",
+    "sign",
+    "scale",
+    "dead",
+    "late",
+    "drop-outs",
+)
+NOTICED = ("silent", "no number", "out of range")  # others are noticed where they do harm
 GUSTS = 2
 SHORTEST = 0.5  # s, of a gust
 LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
-NOISIER = 10.0
-JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing
+NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
+JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
 FAR_OUT = 1e3  # of the same
+HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
 
 
@@ -93,15 +106,15 @@ class SensedHistory:
         if kind >= SOUND:
             fault = FAULTS[min(int((kind - SOUND) / (1.0 - SOUND) * len(FAULTS)), len(FAULTS) - 1)]
         until = last + 0.5 * disturbance.settle
-        gusts = [
-            Gust(
-                time=share * until,
-                lasts=SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST),
-                acceleration=_stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration,
-            )
-            for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True)
-            if disturbance.gust is not None and not fault
-        ]
+        latest = fails * until if fault else until
+        gusts = list[Gust]()
+        for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True):
+            if disturbance.gust is not None:
+                lasts = SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST)
+                start = share * (latest - lasts if fault else latest)  # none that no sensor would show
+                acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
+                if start >= 0.0:
+                    gusts.append(Gust(time=start, lasts=lasts, acceleration=acceleration))
         return cls(
             starts=_starts(spec, max(0.0, _stretched(swing)), 2.0 * np.pi * phase, *machine),
             gusts=tuple(gusts),
@@ -115,9 +128,14 @@ class SensedHistory:
         )
 
     @property
+    def blind(self) -> bool:
+        """Whether its sensor shows a load that hangs still, and nothing tells that it does not."""
+        return self.fault == "dead"
+
+    @property
     def ends(self) -> float:
-        """When the last gust does, in s."""
-        return max((gust.time + gust.lasts for gust in self.gusts), default=0.0)
+        """When the last gust does, or the sensor fails, in s."""
+        return max([self.fails if self.fault else 0.0, *(gust.time + gust.lasts for gust in self.gusts)])
 
     def pushed(self, times: Array) -> Array:
         """Tell by how much in m an axis would have to move to push the loads alike, at some times in s."""
@@ -154,9 +172,19 @@ class SensedHistory:
                 age[first:] += np.arange(cycles - first)
                 added[first:] = added[first]
             case "jump":
-                added[first:] += JUMP * self.innovation
+                added[first:] += JUMP * self.innovation * (self.seed / 2**32)
             case "noise":
                 added[first:] = self.offset + NOISIER * (added[first:] - self.offset)
+            case "sign":
+                gain[first:] = -1.0
+            case "scale":
+                gain[first:] = GREATER
+            case "dead":  # but for its noise
+                gain[first:] = 0.0
+            case "late":
+                age[first:] = round(LATER * self.delay / cycle)
+            case "drop-outs":
+                valid[first:] = _coming_and_going(LOST * sensor.drop_out / cycle, cycles - first, random)
         rate = sensor.quantity == "rate"
         return Measurement(
             quantity=f"{sensor.of}.rate" if rate else sensor.of,
@@ -193,13 +221,16 @@ def sensor_faults(
     assert run.trace is not None
     issued = dict(zip(outputs, run.trace.T, strict=False))
     noticed = issued["nSensorFault"]
-    if not one.fault and noticed.any():
-        at = int(np.argmax(noticed != 0.0))
-        when = f"at {at * cycle:.2f} s"
-        yield f"a sound sensor is taken for a faulty one (nSensorFault {noticed[at]:.0f}), {when}"
-    if one.fault in NOTICED and not noticed[-1]:
-        yield f"the sensor's fault is not noticed ({one.fault}, at {one.fails:.2f} s)"
-    if one.fault or run.stands < 0:
+    at = int(np.argmax(noticed != 0.0)) * cycle
+    if one.fault:
+        yield from _faults_of_a_faulty_one(spec, one, run, at if noticed.any() else None)
+        return
+    if noticed.any():
+        yield (
+            f"a sound sensor is taken for a faulty one (nSensorFault {noticed[noticed != 0.0][0]:.0f}), "
+            f"at {at:.2f} s"
+        )
+    if run.stands < 0:
         return
     rests = (issued["bDamping"] != 0.0) | (issued["bBusy"] == 0.0)
     first = min(round(last / cycle) + TAKEN_UP, len(rests) - 1)
@@ -214,6 +245,32 @@ def sensor_faults(
                 f"the {load} is damped to check.residual_sway later than allowed by {late:.3g} s, at "
                 f"{settled * cycle:.2f} s"
             )
+
+
+def _faults_of_a_faulty_one(
+    spec: Spec, one: SensedHistory, run: BlockRun, noticed: float | None
+) -> Iterator[str]:
+    """Say what is wrong where the sensor is: noticed too late, or the load made to swing."""
+    sensor, disturbance = _stated(spec)
+    late = (noticed if noticed is not None else np.inf) - one.fails - sensor.drop_out
+    if one.fault in NOTICED and late > sensor.drop_out:  # as much later, where news failed to come before
+        yield f"the sensor's fault is not noticed ({one.fault}, at {one.fails:.2f} s)"
+    if noticed is None and not run.promise:
+        yield f"the sensor's fault is neither noticed nor harmless ({one.fault}, at {one.fails:.2f} s)"
+    swing = min(disturbance.swing.values())
+    if run.residual[spec.machine().end_load.start] > HARM * swing:
+        yield (
+            f"a faulty sensor ({one.fault}) makes the load swing by {run.residual.max():.3g} m, "
+            f"at {one.fails:.2f} s"
+        )
+
+
+def _coming_and_going(lost: float, cycles: int, random: np.random.Generator) -> Array:
+    """Let news fail to come for so many cycles, and come for fewer, again and again."""
+    pieces = [np.zeros(0)]
+    while sum(map(len, pieces)) < cycles:
+        pieces += [np.zeros(max(1, round(lost))), np.ones(1 + round(lost * random.random()))]
+    return np.concatenate(pieces)[:cycles]
 
 
 def _starts(
