@@ -35,17 +35,8 @@ BUSY = ("late at cycle", "cannot hold a cycle")  # a busy machine says so, and i
 @pytest.fixture(scope="module")
 def deployed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("deploy")
-    options = (
-        "--set",
-        "can.timeout=0.5",
-        "--set",
-        "can.sync_period=0.02",
-        "--export",
-        "can",
-        "--out",
-        folder,
-    )
-    assert run_here("--preset", "paper", *options).code == 0
+    own = ("--set", "can.timeout=0.5", "--set", "can.sync_period=0.02")
+    assert run_here("--preset", "paper", *own, "--export", "can", "--out", folder).code == 0
     return folder
 
 
@@ -410,7 +401,6 @@ class TestSlowMotions:
     def streamed(self, deployed, *options):
         return run_here("stream", deployed / "paper.log", *AWAY, *options, "--json")
 
-    @pytest.mark.slow
     @pytest.mark.slow
     def test_to_the_start_and_then_the_motion(self, deployed, drive_away):
         refused = self.streamed(deployed)
