@@ -125,7 +125,7 @@ class Surroundings:
         return _log(self.cycle, periods * self.period, fraction)
 
 
-def manner(command: Command, which: float, how: float, around: Surroundings) -> Manner:
+def habit(command: Command, which: float, how: float, around: Surroundings) -> Manner:
     """Give a command as it is, in half of all cases, or by one of the habits.
 
     Parameters

@@ -1,9 +1,8 @@
 """Histories of commands that a planner block is proved on.
 
-A history is made of *choices*, shares from 0 to 1: where it starts, the live parameters that the block is
-given, by how much the machine differs from them, what is commanded when, and how ropes change on the way. So
-histories are drawn as a Latin hypercube, corners are choices of 0 and 1, and a search moves through the same
-cube.
+A history is made of *choices*, shares from 0 to 1: where it starts, live parameters, how much the machine
+differs from them, what is commanded when, and how ropes change on the way. So histories are drawn as a Latin
+hypercube, corners are choices of 0 and 1, and a search moves through the same cube.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
-from gen_profile.proof.habits import Change, Manner, Surroundings
-from gen_profile.proof.habits import manner as habit
+from gen_profile.proof.habits import Change, Manner, Surroundings, habit
 from gen_profile.proof.rhythms import rhythm
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
@@ -490,14 +488,13 @@ def _bouncing(
 
 
 def _machine(
-    spec: Spec, live_values: Mapping[str, float], errors: Mapping[str, float]
+    spec: Spec, live: Mapping[str, float], errors: Mapping[str, float]
 ) -> tuple[dict[str, float], list[float]]:
     """Parameters of a machine and places of its axes: as the block is given, but for the errors."""
     plant, parameters = spec.machine(), dict(spec.plant.parameters)
     for known in plant.parameters:
-        value = live_values.get(known.name, parameters[known.name])
-        if known.name in errors:
-            value = errors[known.name] * (value if known.name in live_values else 1.0)
-        parameters[known.name] = min(max(value, known.lower), known.upper)
+        name, value = known.name, live.get(known.name, parameters[known.name])
+        value = errors[name] * (value if name in live else 1.0) if name in errors else value
+        parameters[name] = min(max(value, known.lower), known.upper)
     axes = zip(plant.actuated, spec.move.start, strict=True)
-    return parameters, [live_values.get(axis.name, start) for axis, start in axes]
+    return parameters, [live.get(axis.name, start) for axis, start in axes]

@@ -32,7 +32,6 @@ FAULTS = (
     "drop-outs",
 )
 NOTICED = ("silent", "no number", "out of range")  # others are noticed where they do harm
-GUSTS = 2
 SHORTEST = 0.5  # s, of a gust
 LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
 NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
