@@ -8,6 +8,8 @@ from command_line import run_here
 from documentation import PAGES, ROOT, blocks, run
 from end_to_end.studios import studio
 
+from gen_profile.proof import prove
+
 README = PAGES[0]
 
 
@@ -27,6 +29,7 @@ def test_the_first_blocks_install_and_test():
 @pytest.mark.parametrize("page", [page for page in PAGES if tour(page)], ids=lambda page: page.stem)
 def test_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(prove, "HISTORIES", 24)  # what the pages' commands do is the same
     scope = {}
     for block in tour(page):
         if block.title == "until Ctrl-C":
