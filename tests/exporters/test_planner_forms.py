@@ -194,6 +194,12 @@ class TestInPython:
         assert planner.hold(20.0, target=0.7).position[-1] == 0.7
         assert planner.step(target=0.7).done
 
+    def test_a_live_parameter_that_comes_with_the_first_command_is_no_change_of_it(self):
+        planner = gp.Planner(SPEC)
+        assert planner.hold(20.0, target=3.0, live={"L1": 5.5}).promise[-1]
+        planner.restart(3.0)
+        assert planner.hold(20.0, target=6.0, live={"L1": 8.0}).promise[-1]
+
     def test_it_goes_on_after_a_quick_stop(self):
         planner = gp.Planner(SPEC, position=4.0)
         planner.hold(4.0, target=9.0)

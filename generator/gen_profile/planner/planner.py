@@ -35,6 +35,7 @@ OF_AXES: dict[
     "velocity": "fVelocityCommand",
     "velocity_limit": "fVelocityLimit",
 }
+IDLE = dict.fromkeys(("bExecute", "bVelocity", "bStop", "bQuickStop"), 0.0)  # no command
 ZONES = ("aBlockedLow", "aBlockedHigh", "aSlowLow", "aSlowHigh", "aSlowLimit")
 KINDS = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
 
@@ -183,17 +184,14 @@ class Planner:
         """
         stands = _columns_of("fActPosition", "position", position, self._axes, 1)
         self._block = BlockInstance(self._text)
-        idle = dict.fromkeys(("bVelocity", "bStop", "bQuickStop"), 0.0)
         self._inputs |= {
             "bEnable": 1.0,
             **{name: float(column[0]) for name, column in stands.items()},
-            **idle,
+            **IDLE,
         }
         self._target: list[float] | None = None  # of the command that holds
         self._is_due = self._was_given = False  # the rising edge of bExecute; whether it is high
-        self._block.call(
-            np.array([list((self._inputs | {"bExecute": 0.0}).values())])
-        )  # enabled, no command yet
+        self._is_enabled = False
 
     def restrict(
         self,
@@ -297,6 +295,10 @@ class Planner:
         for name, column in columns.items():
             rows[:, list(self._inputs).index(name)] = column
         self._inputs |= {name: float(column[-1]) for name, column in columns.items()}
+        if not self._is_enabled:  # a cycle without a command, with the live parameters of the first one
+            first = dict(zip(self._inputs, rows[0], strict=True))
+            self._block.call(np.array([list((first | IDLE).values())]))
+            self._is_enabled = True
         issued = self._block.call(rows).T
         return {
             name: column.astype(KINDS.get(name[0], np.float64))
