@@ -290,13 +290,9 @@ class Histories:
         return min(every, count // 2)
 
     def history(self, choices: Array, lasts: float = 0.0) -> History:
-        """Make the history of some choices.
+        """Make the history of some choices, shape (choices,).
 
-        Parameters
-        ----------
-        choices : (choices,) array
-        lasts : float
-            s, of one that goes on in a rhythm, or by other choices each time for a `SHIFT`; else 0.
+        One that `lasts` so many seconds goes on in a rhythm, or by other choices each time for a `SHIFT`.
         """
         axes, live, uncertain = len(self.axes), self.spec.planner.live, self.uncertain
         parts = np.split(choices[: self._first_command], np.cumsum([axes, self.box, 3]))
