@@ -157,10 +157,10 @@ def _model(spec: Spec, written: Mapping[str, Array], point: Sequence[float]) -> 
     """Evaluate the text's polynomials at a point of the live ranges, for all but its frequencies."""
     lives = len(spec.planner.live)
     exponents = written["cExponent"].astype(np.int64).reshape(max(lives, 1), -1)
-    bends = written["cLiveBend"].reshape(2, -1)[1]
+    curvatures = written["cLiveBend"].reshape(2, -1)[1]
     values = np.ones(exponents.shape[1])
     for live, t in enumerate(point):
-        bent = (t + bends[live]) / (1.0 + bends[live] * t)
+        bent = (t + curvatures[live]) / (1.0 + curvatures[live] * t)
         powers = [chebyshev.chebval(bent, np.eye(n + 1)[n]) for n in range(exponents.max() + 1)]
         values = values * np.array(powers)[exponents[live]]
     return np.asarray(written["cModel"].reshape(-1, exponents.shape[1]) @ values)
