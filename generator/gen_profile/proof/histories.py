@@ -25,8 +25,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
-from gen_profile.proof.habits import Change, Manner, Surroundings, habit
-from gen_profile.proof.rhythms import rhythm
+from gen_profile.proof.habits import Change, Manner, Surroundings, habit, rhythm
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
 

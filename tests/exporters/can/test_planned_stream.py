@@ -264,8 +264,8 @@ def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     assert termios.tcgetattr(theirs) == before
     assert record.reason == ""
     steps = np.diff(source.at_sync[:, 0])
-    assert steps.min() == 0
     assert steps.max() == pytest.approx(0.15 * COUNTS * CYCLE, rel=0.01)
+    assert steps.min() > -0.02 * steps.max()  # it may wait for the load, and back up by a hair for it
     assert any("stick at 0.15 m/s" in words for words in bench.phases)
 
 
