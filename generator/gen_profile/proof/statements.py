@@ -44,6 +44,7 @@ ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
 BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
 AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
+OVERSTATED = 0.12  # likewise, by which it may be too large
 BESIDE, MOST_BESIDE = 1e-4, 500.0  # of the allowed sway, likewise; and how often that may be after long
 EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
@@ -368,7 +369,8 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             np.array(ends) * followed.cycle / (EXACTLY * followed.period)
         )  # by frequencies that are rounded
         beside = BESIDE * limit * np.clip(long**2, 1.0, MOST_BESIDE)
-        wrong = np.abs(stated[ends] - BETWEEN * watched) - AS_STATED * watched - beside
+        apart = stated[ends] - BETWEEN * watched
+        wrong = np.maximum(apart - OVERSTATED * watched, -apart - AS_STATED * watched) - beside
         worst = int(np.argmax(wrong))
         yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
