@@ -198,7 +198,7 @@ class TestInPython:
         planner = gp.Planner(SPEC)
         assert planner.hold(20.0, target=3.0, live={"L1": 5.5}).promise[-1]
         planner.restart(3.0)
-        assert planner.hold(20.0, target=6.0, live={"L1": 8.0}).promise[-1]
+        assert planner.hold(20.0, target=6.0, live={"L1": 6.8}).promise[-1]
 
     def test_it_goes_on_after_a_quick_stop(self):
         planner = gp.Planner(SPEC, position=4.0)
