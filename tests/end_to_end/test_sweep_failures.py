@@ -317,8 +317,7 @@ def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["paper.csv", "manifest.json"])
-@pytest.mark.parametrize("content", [None, b"garbage"])
+@pytest.mark.parametrize(("name", "content"), [("paper.csv", None), ("manifest.json", b"garbage")])
 def test_a_damaged_case_is_worked_out_again(tmp_path, name, content):
     words = ["sweep", "--preset", "paper", "--vary", "move.duration=3,4", "--out", tmp_path, "--json"]
     first = run_here(*words)
