@@ -10,7 +10,6 @@ is the spec's.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
@@ -24,12 +23,12 @@ from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.machine import linearized, planned_axes
 from gen_profile.planner.sensor import damping_kernel
 from gen_profile.spec.model import Spec
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.sensor_constants import ROWS_BEFORE
 
 POINTS = 3  # of each live range
 FREQUENCIES = np.geomspace(0.02, 9.0, 2001)  # of the slowest mode's
-NUMBERS = re.compile(r"(?s)\b(c\w+) : ARRAY \[[^]]*\] OF \w+ := \[(.*?)\]")
 
 Complex = NDArray[np.complex128]
 
@@ -70,7 +69,11 @@ def sensor_margins(spec: Spec, text: str) -> Margins | None:
     """
     if spec.planner.sensor is None:
         return None
-    written = {name: _numbers(values) for name, values in NUMBERS.findall(text)}
+    written = {
+        variable.name: np.array([float(value) for value in variable.elements])
+        for variable in parse_function_block(text).variables
+        if variable.array and variable.initial
+    }
     found = [
         _margins(_loop(spec, written, point), float(linearized(spec, point).distinct_frequencies[0]))
         for point in product(np.linspace(-1.0, 1.0, POINTS).tolist(), repeat=len(spec.planner.live))
@@ -79,10 +82,6 @@ def sensor_margins(spec: Spec, text: str) -> Margins | None:
         delay=min(one.delay for one in found),
         gain=min(one.gain for one in found),
     )
-
-
-def _numbers(values: str) -> Array:
-    return np.array([float(value) for value in values.replace("\n", " ").split(",")])
 
 
 def _margins(open_loop: Complex, slowest: float) -> Margins:

@@ -265,7 +265,7 @@ class BlockWatch:
             if name in self.spec.planner.live_rate or name in self.spec.planner.live_noise:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")]
-            rows = (np.flatnonzero(np.diff(value) != 0.0) + 1).tolist()
+            rows = (np.flatnonzero(value[1:] != value[:-1]) + 1).tolist()  # which may be infinite
             ends = [*first[rows[1:]].tolist(), cycles]
             for row, begin, end in zip(rows, first[rows].tolist(), ends, strict=False):
                 good = low <= value[row] <= high and abs(value[row] - value[0]) > SURELY * STEADY * high
