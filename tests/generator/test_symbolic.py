@@ -1,5 +1,7 @@
 """Functions of many points, which NumPy evaluates operation by operation, against CasADi's own machine."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import casadi
 import numpy as np
 import pytest
@@ -75,3 +77,11 @@ def test_inputs_that_are_alike_along_an_axis_are_given_once(count):
     pairs = np.repeat(other[:, 0], 4, axis=0), np.tile(one, (count, 1))
     due = function(pairs[1], pairs[0]).reshape(count, 4, 2, 1)
     np.testing.assert_array_equal(function(one, other), due)
+
+
+def test_threads_do_not_disturb_one_another():
+    function = Function("f", {"x": x}, a**3 + casadi.sin(b))
+    points = np.random.default_rng(2).uniform(0.1, 2.0, (2000, 1, 2))
+    with ThreadPoolExecutor(4) as threads:
+        found = np.array(list(threads.map(function, points))).ravel()
+    np.testing.assert_allclose(found, points[:, 0, 0] ** 3 + np.sin(points[:, 0, 1]), rtol=1e-14)

@@ -5,6 +5,7 @@ Typing stops at `Symbol`; everything that comes out is a NumPy array or C text.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 from math import prod
@@ -175,8 +176,15 @@ def _operation_names() -> dict[int, str]:
     return {getattr(casadi, name): name.removeprefix("OP_") for name in codes}
 
 
+class _Evaluators(threading.local):
+    """Evaluators by the number of points: each has buffers of its own, and each thread its own evaluators."""
+
+    def __init__(self) -> None:
+        self.by_points: dict[int, Callable[[Sequence[Array]], Array]] = {}
+
+
 class Function:
-    """A compiled expression, evaluated at many points in one call.
+    """A compiled expression, evaluated at many points in one call; several threads may share it.
 
     Parameters
     ----------
@@ -197,7 +205,7 @@ class Function:
             {"cse": True},
         )
         self._shape: tuple[int, int] = outputs[0].shape
-        self._evaluators: dict[int, Callable[[Sequence[Array]], Array]] = {}
+        self._evaluators = _Evaluators()
 
     @cached_property
     def _operations(self) -> list[_Operation]:
@@ -239,12 +247,13 @@ class Function:
         points = prod(shape)
         if points >= _MANY and self._operations:
             return self._by_operations(shape, arguments)
-        if points not in self._evaluators:
-            self._evaluators[points] = self._evaluator(points)
+        evaluators = self._evaluators.by_points
+        if points not in evaluators:
+            evaluators[points] = self._evaluator(points)
         if len(shape) > 1:
             whole = [np.broadcast_to(argument, (*shape, argument.shape[-1])) for argument in arguments]
             arguments = tuple(argument.reshape(points, -1) for argument in whole)
-        return self._evaluators[points](arguments).reshape(*shape, *self._shape)
+        return evaluators[points](arguments).reshape(*shape, *self._shape)
 
     def _by_operations(self, shape: tuple[int, ...], arguments: Sequence[Array]) -> Array:
         """Carry out every operation for all points; along an axis that no input of it has, once."""
