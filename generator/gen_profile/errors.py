@@ -38,6 +38,14 @@ class GenProfileError(Exception):
     sentences : str
     values
         Of a single sentence, which is then a template, as `gen_profile.phrase.Phrase` takes them.
+
+    Examples
+    --------
+    >>> try:
+    ...     gp.plan("nowhere.toml")
+    ... except gp.GenProfileError as error:  # whatever was wrong with what was asked
+    ...     print(type(error).__name__)
+    OutputError
     """
 
     exit_code: ClassVar[int] = 1
@@ -62,6 +70,12 @@ class SpecError(GenProfileError):
     ----------
     faults : str
         One sentence each, every one beginning with the place (``plant.m1: must be positive …``).
+
+    Examples
+    --------
+    >>> gp.preset_spec("paper", move={"duration": -1.0})
+    Traceback (most recent call last):
+    gen_profile.errors.SpecError: move.duration: must be at least 0.001 ...
     """
 
     exit_code = 2
@@ -73,7 +87,14 @@ class SpecError(GenProfileError):
 
 
 class OutputError(GenProfileError):
-    """A file or folder cannot be read or written."""
+    """A file or folder cannot be read or written.
+
+    Examples
+    --------
+    >>> gp.read_spec("nowhere.toml")
+    Traceback (most recent call last):
+    gen_profile.errors.OutputError: ...
+    """
 
     exit_code = 2
 
@@ -155,6 +176,14 @@ class NoMotion(GenProfileError):
     reasons : iterable of Reason
     suggestions : iterable of Suggestion
         Each by itself gives a motion; those come first that the check is to pass.
+
+    Examples
+    --------
+    >>> try:
+    ...     gp.plan(gp.preset_spec("paper", ["solver.method=zvd"], limits={"velocity": 0.2}))
+    ... except gp.NoMotion as error:
+    ...     print(error.reasons[0])
+    Reason(...place='limits.velocity', found=0.2436..., allowed=0.2)
     """
 
     exit_code = 3
@@ -204,37 +233,89 @@ def _suggested(suggestions: Sequence[Suggestion]) -> Iterator[str]:
 
 
 class InfeasibleProblem(NoMotion):
-    """No motion meets the requirements."""
+    """No motion meets the requirements.
+
+    Examples
+    --------
+    >>> try:
+    ...     gp.plan(gp.preset_spec("paper", limits={"acceleration": 0.2}))
+    ... except gp.InfeasibleProblem as error:
+    ...     print(error.suggestions[0].values)
+    {'move.duration': ...}
+    """
 
 
 class SolverDiverged(NoMotion):
-    """The solver did not find a motion."""
+    """The solver did not find a motion.
+
+    Examples
+    --------
+    >>> issubclass(gp.SolverDiverged, gp.NoMotion)  # so that ``except gp.NoMotion`` takes it, too
+    True
+    """
 
 
 class LimitViolation(NoMotion):
-    """The motion found breaks a limit."""
+    """The motion found breaks a limit.
+
+    Examples
+    --------
+    >>> issubclass(gp.LimitViolation, gp.NoMotion)  # so that ``except gp.NoMotion`` takes it, too
+    True
+    """
 
 
 class CheckFailed(GenProfileError):
-    """The artefact, replayed on the plant FMU, leaves more sway than allowed."""
+    """The artefact, replayed on the plant FMU, leaves more sway than allowed.
+
+    Examples
+    --------
+    >>> spec = gp.preset_spec("paper", ["robustness.method=none"])
+    >>> loose = gp.design(spec, "csv", "unsafe", keep_failed=True)
+    >>> loose.check.raise_for_failure()
+    Traceback (most recent call last):
+    gen_profile.errors.CheckFailed: ...
+    """
 
     exit_code = 4
 
 
 class CosimulationError(GenProfileError):
-    """The plant FMU could not be built, loaded or stepped."""
+    """The plant FMU could not be built, loaded or stepped.
+
+    Examples
+    --------
+    >>> issubclass(gp.CosimulationError, gp.GenProfileError)
+    True
+    """
 
     exit_code = 4
 
 
 class CertificateError(GenProfileError):
-    """A proof cannot be carried out, or a certificate does not prove what it says."""
+    """A proof cannot be carried out, or a certificate does not prove what it says.
+
+    Examples
+    --------
+    >>> gp.check_certificate("deploy/paper.csv", "deploy/manifest.json")
+    Traceback (most recent call last):
+    gen_profile.errors.CertificateError: ...
+    """
 
     exit_code = 4
 
 
 class ExportError(GenProfileError):
-    """The target format cannot take the motion, or an artefact cannot be read back."""
+    r"""The target format cannot take the motion, or an artefact cannot be read back.
+
+    Examples
+    --------
+    >>> with open("damaged.csv", "w") as file:
+    ...     _ = file.write("time_s,position_m\n0.0,none\n")
+    >>> gp.check_artefact("damaged.csv", gp.preset_spec("paper"))
+    Traceback (most recent call last):
+    gen_profile.errors.ExportError: ...
+    """
 
     exit_code = 5
 

@@ -8,6 +8,8 @@ from html import escape
 from importlib import import_module
 from typing import Any
 
+import attrs
+
 from gen_profile.errors import OutputError
 from gen_profile.plugins import require_installed
 
@@ -32,6 +34,18 @@ class Summarised:
             for name, value in self.summary().items()
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+
+
+class Sampled(Summarised):
+    """Arrays, each named with its shape in place of its numbers."""
+
+    __slots__ = ()
+
+    def summary(self) -> Mapping[str, object]:
+        """Name what attrs would print."""
+        kind: Any = type(self)
+        printed = [field.name for field in attrs.fields(kind) if field.repr]
+        return {name: getattr(value, "shape", value) for name in printed for value in [getattr(self, name)]}
 
 
 class Drawable(Summarised):

@@ -19,7 +19,8 @@ def typed_names():
     """What a type checker sees, as (name, module)."""
     stub = Path(inspect.getsourcefile(gp)).with_suffix(".pyi").read_text("utf-8")
     imports = (node for node in ast.parse(stub).body if isinstance(node, ast.ImportFrom))
-    return {alias.asname: (f"gen_profile.{node.module}", alias.name) for node in imports for alias in node.names}
+    named = ((node.module, alias) for node in imports for alias in node.names)
+    return {alias.asname: (f"gen_profile.{module}", alias.name) for module, alias in named}
 
 
 def test_every_name_leads_to_what_a_type_checker_sees():

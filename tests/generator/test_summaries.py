@@ -11,6 +11,7 @@ from gen_profile.certificate.document import Certificate
 from gen_profile.comparison.robustness import Robustness
 from gen_profile.designs.planner import Deployment
 from gen_profile.identification.identify import Identification
+from gen_profile.identification.measurements import SwingLog
 from gen_profile.proof.verdict import Proof
 from gen_profile.summary import Drawable, Summarised
 
@@ -27,6 +28,14 @@ def results(tmp_path_factory):
     found = [spec, made, plan, plan.motion, plan.solution, plan.solution.optimum, plan.evaluation]
     found += [judgement, judgement.check, gp.sample(plan.command, 0.01)]
     found += [gp.robustness(spec, "L1", methods="zvd", points=3)]
+    found += [plan.motion(np.linspace(0.0, 3.0, 999)), gp.cosimulate(spec, gp.sample(plan.command, 0.01))]
+    planner = gp.Planner(gp.preset_spec("bay-crane"))
+    found += [planner, planner.hold(1.0, target=3.0)]
+    found += [
+        SwingLog(
+            times=range(999), values=range(999), quantity="angle", load="hook", resolution=0.0, logged=999
+        )
+    ]
     return {type(one).__name__: one for one in found}
 
 

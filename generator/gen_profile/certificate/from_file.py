@@ -74,6 +74,11 @@ def certify_artefact(
         No proof is written for this machine, or what the spec asks; or setpoints break limits of the axes.
     OutputError, ExportError, SpecError, CosimulationError
         As of `gen_profile.check_artefact`.
+
+    Examples
+    --------
+    >>> gp.certify_artefact("deploy/paper.csv").proved  # what gp.design wrote
+    True
     """
     artefact = _read(Path(path), spec)
     asked = asked_of_axes(artefact.spec, artefact.setpoints)
@@ -108,6 +113,12 @@ def check_certificate(
         It is damaged, is about something else, or proves less than it says.
     OutputError, ExportError, SpecError
         As of `gen_profile.check_artefact`.
+
+    Examples
+    --------
+    >>> _ = gp.certify_artefact("deploy/paper.csv")
+    >>> gp.check_certificate("deploy/paper.csv", "deploy/paper.csv.certificate.json").proved
+    True
     """
     artefact = _read(Path(path), spec)
     claimed = parse(read_artefact(Path(certificate)))

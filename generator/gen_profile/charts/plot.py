@@ -57,6 +57,10 @@ def plot(result: Drawn, path: Path | str | None = None) -> Picture | None:
     ------
     OutputError
         The file cannot be written, Matplotlib is not installed, or there is nothing to draw.
+
+    Examples
+    --------
+    >>> gp.plot(gp.plan(gp.preset_spec("paper")), "motion.svg")
     """
     if path is None:
         with TemporaryDirectory() as folder:

@@ -142,6 +142,11 @@ def compare(
         Told what is being done.
     own : sequence of Profile
         Further motions of the axes, each of a ``method`` of its own.
+
+    Examples
+    --------
+    >>> gp.compare(gp.preset_spec("paper"))
+    <Comparison name: paper, methods: nzv, zv, ... fastest: optimal-beta0, gentlest: optimal-beta50>
     """
     spec = as_spec(spec)
     rows: list[ComparedMethod] = []

@@ -193,6 +193,11 @@ def robustness(
     ------
     SpecError
         A parameter or method is unknown.
+
+    Examples
+    --------
+    >>> gp.robustness(gp.preset_spec("paper"), "L1", methods=["zv", "optimal-beta50"], points=5)
+    <Robustness name: paper, errors: L1 -30 to +30 %, zv: 17.72 mm at worst, optimal-beta50: 4.781 mm ...>
     """
     spec, parameters, methods = as_spec(spec), as_names(parameters), as_names(methods)
     errors = error_grid(spec, parameters, points, half_range)

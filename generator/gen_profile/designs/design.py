@@ -47,6 +47,12 @@ class Design(Drawable):
     artefacts : tuple of Artefact
         What was delivered, paths relative to `folder`; empty when the check failed.
     folder : Path
+
+    Examples
+    --------
+    >>> written = gp.design(gp.preset_spec("paper"), ["csv", "plc"], "deploy")
+    >>> written.passed, [artefact.path for artefact in written.artefacts]
+    (True, ...)
     """
 
     spec: Spec
@@ -150,6 +156,11 @@ def design(
     ------
     GenProfileError
         Nothing was written.
+
+    Examples
+    --------
+    >>> gp.design(gp.preset_spec("paper"), "csv", "deploy").passed
+    True
     """
     spec, folder = as_spec(spec), Path(folder)
     verify = partial(_check, by_fmpy=by_fmpy, progress=progress) if check else None

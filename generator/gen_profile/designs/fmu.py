@@ -110,6 +110,11 @@ def export_fmu(
     ------
     GenProfileError
         Nothing was written.
+
+    Examples
+    --------
+    >>> gp.export_fmu(gp.preset_spec("paper"), "plant", "crane.fmu").path.name
+    'crane.fmu'
     """
     spec = as_spec(spec)
     if kind not in KINDS:

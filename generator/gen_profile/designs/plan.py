@@ -78,6 +78,12 @@ def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
     Raises
     ------
     InfeasibleProblem, SolverDiverged, LimitViolation
+
+    Examples
+    --------
+    >>> plan = gp.plan(gp.preset_spec("paper"))
+    >>> plan.motion.duration
+    3.0
     """
     spec = as_spec(spec)
     try:

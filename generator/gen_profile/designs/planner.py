@@ -119,6 +119,11 @@ def deploy_planner(
     ------
     GenProfileError
         Nothing was written.
+
+    Examples
+    --------
+    >>> gp.deploy_planner(gp.preset_spec("bay-crane"), "plc", "block", histories=10).proof.passed
+    True
     """
     spec = as_spec(spec)
     folder = Path(folder)

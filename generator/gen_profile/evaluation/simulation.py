@@ -19,6 +19,7 @@ from gen_profile.problem.dynamics import dynamics, parameter_rows
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import eigenvalues, eigenvalues_at, linear_terms, linearize
 from gen_profile.problem.symbolic import Function
+from gen_profile.summary import Sampled
 from gen_profile.work import spend
 
 RELATIVE_TOLERANCE = 1e-10
@@ -32,8 +33,8 @@ RATE, POINT = 2e-5, 2e-7  # s of work to evaluate the equations in a step, and m
 AT_REST: Mapping[str, float] = MappingProxyType({})
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Sway:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Sway(Sampled):
     """How the loads of a machine sway.
 
     Attributes
@@ -48,7 +49,7 @@ class Sway:
     sway: Array
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(kw_only=True, eq=False, repr=False)
 class Response(Sway):
     """What the machine does.
 

@@ -171,6 +171,14 @@ def read_swing(
         The machine has no such signal.
     OutputError
         The file cannot be read.
+
+    Examples
+    --------
+    >>> times = np.arange(0.0, 20.0, 0.05)
+    >>> swing = 3.0 * np.cos(1.278 * times + 0.3)
+    >>> np.savetxt("swing.csv", np.c_[times, swing], delimiter=",", header="time_s,angle_deg", comments="")
+    >>> gp.read_swing("swing.csv", gp.preset_spec("bay-crane"), columns=("time_s", "angle_deg"))
+    <SwingLog times: (400,), values: (400,), quantity: angle, load: hook, ...>
     """
     loads = spec.machine().loads
     quantity, _, named = signal.partition(":")
@@ -235,6 +243,12 @@ def identify(
         A measurement or parameter does not belong to the machine.
     InfeasibleProblem
         The measurements do not determine the parameters, or not well enough to be of use.
+
+    Examples
+    --------
+    >>> timed = gp.parse_period("49.2±0.2/10")  # ten swings, with a stop watch
+    >>> gp.identify(gp.preset_spec("bay-crane"), [timed], "L1")
+    <Identification name: bay-crane, L1: 4.68921>
     """
     spec = as_spec(spec)
     plant = spec.machine()

@@ -15,6 +15,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.identification.log_table import read_table
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.phrase import Phrase
+from gen_profile.summary import Sampled
 from gen_profile.units import units_of
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
@@ -52,8 +53,8 @@ class Period:
     uncertainty: float
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class SwingLog:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class SwingLog(Sampled):
     """A free swing, logged while the axes stood still.
 
     Attributes
@@ -115,6 +116,11 @@ def parse_reading(text: str) -> DirectReading:
     Raises
     ------
     SpecError
+
+    Examples
+    --------
+    >>> gp.parse_reading("L1=0.47±0.005")
+    DirectReading(parameter='L1', value=0.47, uncertainty=0.005)
     """
     match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
     if match is None:
@@ -136,6 +142,11 @@ def parse_period(text: str) -> Period:
     Raises
     ------
     SpecError
+
+    Examples
+    --------
+    >>> gp.parse_period("17.3±0.2/10")
+    Period(mode=1, seconds=1.73, uncertainty=0.02)
     """
     match = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
     if match is None:

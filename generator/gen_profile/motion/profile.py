@@ -14,7 +14,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from gen_profile.errors import GenProfileError
-from gen_profile.summary import Drawable, Summarised, Tabled
+from gen_profile.summary import Drawable, Sampled, Summarised, Tabled
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,8 @@ class PiecewisePolynomial(Protocol):
     c: Any
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Motion:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Motion(Sampled):
     """Position and its derivatives at given times.
 
     Attributes
@@ -76,6 +76,13 @@ class Profile(Drawable):
         What designed it, such as ``"optimal"`` or ``"zvd"``.
     final_velocity : (axes,) array
         m/s (or rad/s) at the end and after it; 0 by default.
+
+    Examples
+    --------
+    >>> spline = CubicSpline([0.0, 1.0, 2.0], [0.0, 0.2, 0.3], bc_type="clamped")  # of SciPy
+    >>> motion = gp.Profile.from_ppoly(spline, "mine")
+    >>> motion(np.array([1.0])).position
+    array([[0.2]])
     """
 
     knots: Array = attrs.field(converter=read_only, validator=_finite)
@@ -240,6 +247,12 @@ class SampledProfile(Summarised, Tabled):
         What the artefact carries beside positions.
     resolution : (axes,) array
         Spacing of the values that the artefact can represent; 0 where it carries doubles.
+
+    Examples
+    --------
+    >>> setpoints = gp.SampledProfile(cycle_time=0.5, position=[[0.0], [0.1], [0.2]])
+    >>> setpoints.position.shape
+    (3, 1)
     """
 
     cycle_time: float
@@ -307,6 +320,11 @@ def sample(profile: Profile, cycle_time: float) -> SampledProfile:
     ------
     GenProfileError
         The cycle time in s is not positive, or too short for a motion so long.
+
+    Examples
+    --------
+    >>> gp.sample(gp.plan(gp.preset_spec("paper")).motion, cycle_time=0.01).position.shape
+    (301, 1)
     """
     _require_cycle(cycle_time)
     if profile.duration / cycle_time > MOST_SAMPLES:

@@ -65,7 +65,7 @@ class PlannerBlock:
     """
 
     filename: str
-    text: str
+    text: str = attrs.field(repr=False)
     modes: int
     frequency_error: float
     period: float

@@ -20,6 +20,7 @@ from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
+from gen_profile.summary import Sampled, Summarised
 
 OWN = {  # of each axis
     "position": "fPosition",
@@ -69,8 +70,8 @@ class Setpoint:
     outputs: Mapping[str, Any] = attrs.field(repr=False)
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class SetpointHistory:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class SetpointHistory(Sampled):
     """What a planner issued in many cycles: as `Setpoint`, each a (cycles,) array, or (cycles, axes)."""
 
     position: Array
@@ -124,7 +125,7 @@ class Orders(TypedDict, total=False):
     sensor: ArrayLike | None
 
 
-class Planner:
+class Planner(Summarised):
     """Plan motions that leave no sway, by the planner block of a spec.
 
     A command holds until the next one; a target may change on the way, and so may the kind of command. Where
@@ -145,6 +146,13 @@ class Planner:
         The file holds no planner block, or cannot be read.
     CosimulationError
         There is no C compiler.
+
+    Examples
+    --------
+    >>> planner = gp.Planner(gp.preset_spec("bay-crane"))
+    >>> history = planner.hold(20.0, target=3.0)  # s, m
+    >>> bool(history.done[-1]), float(history.position[-1])
+    (True, 3.0)
     """
 
     def __init__(self, source: Spec | Path | str, position: ArrayLike | None = None) -> None:
@@ -158,6 +166,11 @@ class Planner:
         self._live = live_inputs(self._inputs, self._axes)
         stands = [self._inputs[axis.of("fActPosition")] for axis in self._axes]
         self.restart(position if position is not None else stands if len(stands) > 1 else stands[0])
+
+    def summary(self) -> Mapping[str, object]:
+        """Name what it is for, and where it stands."""
+        stands = {axis.name or "axis": self._inputs[axis.of("fActPosition")] for axis in self._axes}
+        return {"cycle": f"{1e3 * self.cycle_time:g} ms", "live": self.live, "enabled at": stands}
 
     @property
     def cycle_time(self) -> float:

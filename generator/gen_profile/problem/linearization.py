@@ -85,6 +85,12 @@ def linearize(
         A parameter is missing, or no finite number.
     InfeasibleProblem
         A mode has no restoring force, so the machine has no natural frequency to speak of.
+
+    Examples
+    --------
+    >>> spec = gp.preset_spec("paper")
+    >>> gp.linearize(spec.machine(), spec.plant.parameters).frequencies.round(2)  # rad/s
+    array([3.64, 9.02])
     """
     for name in plant.nominal():
         if not math.isfinite(parameters.get(name, math.nan)):

@@ -312,7 +312,14 @@ class ExportSpec(Checked, table="export"):
 
 @attrs.frozen(kw_only=True, repr=False)
 class Spec(Drawable, Checked):
-    """One motion task, complete: nothing downstream looks anything else up."""
+    """One motion task, complete: nothing downstream looks anything else up.
+
+    Examples
+    --------
+    >>> spec = gp.preset_spec("paper")
+    >>> spec.move.duration, spec.plant.parameters["L1"]  # s, m
+    (3.0, 0.47)
+    """
 
     name: Name = "profile"
     plant: PlantSpec

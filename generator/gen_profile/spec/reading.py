@@ -33,7 +33,7 @@ SLIPS = {
 
 
 def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) -> Spec:
-    """Read a TOML file.
+    r"""Read a TOML file.
 
     Parameters
     ----------
@@ -49,6 +49,13 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
         The file cannot be read.
     SpecError
         The text is no TOML, or its content has faults: all of them are listed.
+
+    Examples
+    --------
+    >>> with open("tank.toml", "w") as file:
+    ...     _ = file.write("plant.type = 'slosh-tank'\nmove = { distance = 0.5, duration = 2.0 }")
+    >>> gp.read_spec("tank.toml", move={"duration": 2.2}).move.duration
+    2.2
     """
     path = Path(path)
     return parse_spec(read_text(path), overrides, str(path), path.parent, **tables)
@@ -87,7 +94,7 @@ def read_text(path: Path) -> str:
 def parse_spec(
     text: str, overrides: Sequence[str] = (), source: str = "spec", folder: Path = HERE, **tables: Any
 ) -> Spec:
-    """Read TOML text, apply overrides such as ``plant.L1=0.5`` and validate the whole.
+    r"""Read TOML text, apply overrides such as ``plant.L1=0.5`` and validate the whole.
 
     Parameters
     ----------
@@ -104,6 +111,11 @@ def parse_spec(
     ------
     SpecError
         The text is no TOML (with line and column), or its content has faults: all of them are listed.
+
+    Examples
+    --------
+    >>> gp.parse_spec("plant.type = 'slosh-tank'\nmove = { distance = 0.5, duration = 2.0 }").plant.type
+    'slosh-tank'
     """
     document = _document(text, source)
     if not document and not overrides and not tables:
@@ -120,6 +132,11 @@ def make_spec(**tables: Any) -> Spec:
     ------
     SpecError
         With one sentence for every fault found.
+
+    Examples
+    --------
+    >>> gp.make_spec(plant={"type": "double-pendulum-crane"}, move={"distance": 1.0, "duration": 5.0})
+    <Spec name: profile, machine: double-pendulum-crane, move: [0.0] to [1.0], duration: 5 s, ...>
     """
     return evolve_spec({}, **tables)
 
@@ -137,6 +154,12 @@ def evolve_spec(spec: Spec | Mapping[str, Any] | Path | str, **tables: Any) -> S
     ------
     SpecError
         With one sentence for every fault found.
+
+    Examples
+    --------
+    >>> longer = gp.evolve_spec(gp.preset_spec("paper"), move={"duration": 3.2}, limits={"velocity": 0.3})
+    >>> longer.move.duration
+    3.2
     """
     document = copy.deepcopy(dict(spec) if isinstance(spec, Mapping) else as_spec(spec).to_dict())
     _fill(document, tables)
@@ -158,7 +181,13 @@ def overridden(document: Document, overrides: Sequence[str]) -> Document:
 
 
 def presets() -> dict[str, str]:
-    """List every preset's name with its summary (the first comment line of its TOML file), sorted."""
+    """List every preset's name with its summary (the first comment line of its TOML file), sorted.
+
+    Examples
+    --------
+    >>> sorted(gp.presets())[:2]
+    ['bay-crane', 'double-pendulum-crane']
+    """
     folder = files("gen_profile") / "presets"
     texts = {item.name.removesuffix(".toml"): item.read_text("utf-8") for item in folder.iterdir()}
     return {name: text.partition("\n")[0].lstrip("# ") for name, text in sorted(texts.items())}
@@ -171,6 +200,11 @@ def preset_spec(name: str, overrides: Sequence[str] = (), **tables: Any) -> Spec
     ------
     SpecError
         There is no such preset, or the overrides have faults.
+
+    Examples
+    --------
+    >>> gp.preset_spec("paper", ["plant.L1=0.5"]).plant.parameters["L1"]
+    0.5
     """
     return parse_spec(preset_text(name), overrides, name, **tables)
 

@@ -48,6 +48,12 @@ def run_sweep(
         A key or all of its values make no sense, or the scheduler does not answer.
     OutputError
         Dask or PyArrow are not installed, or the folder holds another sweep or cannot be written.
+
+    Examples
+    --------
+    >>> sweep = gp.run_sweep(gp.preset_spec("paper"), {"plant.L1": [0.45, 0.5]}, "plc", "ropes", workers=1)
+    >>> sweep.statuses
+    {'passed': 2}
     """
     require_libraries()
     spec = as_spec(spec)

@@ -88,6 +88,11 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
         The sweep's files were altered, or the library cannot be written.
     ExportError
         The profiles do not fit into one block.
+
+    Examples
+    --------
+    >>> gp.write_library("ropes", "crane.st").block  # of what gp.run_sweep wrote
+    'FB_crane'
     """
     folder, path = Path(folder), Path(path)
     format_ = container_of(path)

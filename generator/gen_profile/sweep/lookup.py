@@ -130,6 +130,11 @@ def lookup(
         There is no finished sweep, or its files were altered.
     CheckFailed
         No profile near is safe there, or what was asked for lies beyond the grid.
+
+    Examples
+    --------
+    >>> gp.lookup("ropes", {"plant.L1": 0.49}).used  # of what gp.run_sweep wrote
+    {'plant.L1': 0.5}
     """
     folder = Path(folder)
     grid = grid_of(folder)

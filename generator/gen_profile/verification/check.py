@@ -112,6 +112,11 @@ def check_artefact(
     ExportError
         The file is damaged.
     CosimulationError
+
+    Examples
+    --------
+    >>> gp.check_artefact("deploy/paper.csv").passed  # what gp.design wrote
+    True
     """
     path = Path(path)
     content, format_ = read_artefact(path), format_of(path)

@@ -41,6 +41,14 @@ def cosimulate(
         The machine has no such parameter, or does not take this value.
     CosimulationError
         The FMU cannot be built or run.
+
+    Examples
+    --------
+    >>> spec = gp.preset_spec("paper")
+    >>> setpoints = gp.sample(gp.plan(spec).command, cycle_time=0.01)
+    >>> response = gp.cosimulate(spec, setpoints, {"L1": 0.5})  # a longer rope than the spec's
+    >>> float(abs(response.sway).max()) < 0.2
+    True
     """
     spec = as_spec(spec)
     values, *others = _machines(spec, parameters).tolist()
@@ -75,6 +83,13 @@ def residual_sways(
         The machine has no such parameter, does not take a value, or there are not as many values of each.
     CosimulationError
         The FMU cannot be built or run.
+
+    Examples
+    --------
+    >>> spec = gp.preset_spec("paper")
+    >>> setpoints = gp.sample(gp.plan(spec).command, cycle_time=0.01)
+    >>> gp.residual_sways(spec, setpoints, {"L1": np.linspace(0.4, 0.5, 5)}).shape
+    (5, 2)
     """
     spec = as_spec(spec)
     plant, tau = spec.machine(), spec.actuator.tau or 0.0
