@@ -146,14 +146,14 @@ def test_a_broken_stream_in_an_fmu_is_said_to_be_one(tmp_path, method):
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("a.st", "FUNCTION_BLOCK a\n" + "(*" * 2_000_000),
-        ("a.scl", "(*" * 2_000_000),
-        ("a.scl", 'FUNCTION_BLOCK "a" {' * 200_000),
-        ("a.scl", SCL * 200_000),
-        ("a.scl", f"{SCL}VAR\n{' ' * 2_000_000}END_VAR BEGIN END_FUNCTION_BLOCK\n"),
-        ("a.scl", f"{SCL}VAR\na:{' ' * 2_000_000}END_VAR BEGIN END_FUNCTION_BLOCK\n"),
-        ("a.scl", f"{SCL}VAR\n{'a:b:=' * 400_000} END_VAR BEGIN END_FUNCTION_BLOCK\n"),
-        ("a.scl", f"{SCL}VAR\n{'a:b; (*' * 400_000} END_VAR BEGIN END_FUNCTION_BLOCK\n"),
+        ("a.st", "FUNCTION_BLOCK a\n" + "(*" * 500_000),
+        ("a.scl", "(*" * 500_000),
+        ("a.scl", 'FUNCTION_BLOCK "a" {' * 50_000),
+        ("a.scl", SCL * 50_000),
+        ("a.scl", f"{SCL}VAR\n{' ' * 500_000}END_VAR BEGIN END_FUNCTION_BLOCK\n"),
+        ("a.scl", f"{SCL}VAR\na:{' ' * 500_000}END_VAR BEGIN END_FUNCTION_BLOCK\n"),
+        ("a.scl", f"{SCL}VAR\n{'a:b:=' * 100_000} END_VAR BEGIN END_FUNCTION_BLOCK\n"),
+        ("a.scl", f"{SCL}VAR\n{'a:b; (*' * 100_000} END_VAR BEGIN END_FUNCTION_BLOCK\n"),
         ("a.xml", '<?xml version="1.0"?>' + "<a>" * 300_000),
     ],
 )

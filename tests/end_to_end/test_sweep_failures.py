@@ -317,14 +317,14 @@ def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "content"), [("paper.csv", None), ("manifest.json", b"garbage")])
-def test_a_damaged_case_is_worked_out_again(tmp_path, name, content):
+def test_damaged_cases_are_worked_out_again(tmp_path):
     words = ["sweep", "--preset", "paper", "--vary", "move.duration=3,4", "--out", tmp_path, "--json"]
     first = run_here(*words)
-    file = tmp_path / "cases" / "0000" / "001" / name
-    before = file.read_bytes()
-    file.unlink() if content is None else file.write_bytes(content)
+    lost, garbled = (tmp_path / "cases" / "0000" / name for name in ("000/paper.csv", "001/manifest.json"))
+    before = [file.read_bytes() for file in (lost, garbled)]
+    lost.unlink()
+    garbled.write_bytes(b"garbage")
     again = run_here(*words)
     assert (first.code, again.code) == (0, 0)
-    assert file.read_bytes() == before
+    assert [file.read_bytes() for file in (lost, garbled)] == before
     assert run_here("lookup", tmp_path, "--move.duration", "4").code == 0

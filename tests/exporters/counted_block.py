@@ -3,6 +3,7 @@
 import ctypes
 import subprocess
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,12 @@ from gen_profile_exporters.st_to_c import translate
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
+@cache
 def compile_counting(text):
-    """The library of a block, its inputs with their initial values, and its outputs."""
+    """The library of a block, its inputs with their initial values, and its outputs.
+
+    Without optimisation, which takes gcc five times as long as these tests then run.
+    """
     translation = translate(text)
     name = translation.name
     taken = "".join(f"fb->{v.name} = *in++; " for v in translation.inputs)
@@ -41,7 +46,7 @@ void play({name} *fb, const double *in, long cycles, double *out) {{
             ("loop.c", loop),
         ):
             Path(folder, file).write_text(content)
-        options = ["-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC", "-o", "loop.so"]
+        options = ["-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-o", "loop.so"]
         subprocess.run(["gcc", *options, "loop.c", "-lm"], cwd=folder, check=True)
         library = ctypes.CDLL(str(Path(folder, "loop.so")))
     library.size.restype = ctypes.c_long

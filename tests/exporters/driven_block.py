@@ -1,7 +1,5 @@
 """The planner block of a bay crane, driven: what it issues, its limits, and what it leaves swinging."""
 
-from functools import cache
-
 import numpy as np
 from exporters.counted_block import CountedBlock, compile_counting
 
@@ -18,14 +16,11 @@ export = {{ cycle_time = {CYCLE} }}
 """
 
 
-compiled = cache(compile_counting)
-
-
 class Driver:
     """An instance that is given inputs by name, and all that it issued."""
 
     def __init__(self, text, **inputs):
-        self.block = CountedBlock(compiled(text), **inputs)
+        self.block = CountedBlock(compile_counting(text), **inputs)
         self.parts = []
 
     def hold(self, seconds, **inputs):

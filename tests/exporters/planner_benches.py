@@ -2,8 +2,8 @@
 
 import attrs
 import numpy as np
-from exporters.counted_block import CountedBlock
-from exporters.driven_block import CYCLE, compiled
+from exporters.counted_block import CountedBlock, compile_counting
+from exporters.driven_block import CYCLE
 from exporters.st_interpreter import FunctionBlock
 from exporters.vendor_axes import Bench
 
@@ -19,7 +19,7 @@ class Compiled:
     """The planner block in place of its interpreted instance."""
 
     def __init__(self, source):
-        self.block = CountedBlock(compiled(source.text()), bEnable=0.0)
+        self.block = CountedBlock(compile_counting(source.text()), bEnable=0.0)
         self.names = {name.lower(): name for name in self.block.inputs}
         self.outputs = dict.fromkeys((name.lower() for name in self.block.outputs), 0)
 

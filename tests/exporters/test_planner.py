@@ -16,7 +16,6 @@ from driven_block import (
     VELOCITY,
     Driver,
     G,
-    compiled,
     frequencies,
     require_limits,
     residual,
@@ -89,7 +88,7 @@ SLOW = ["limits.acceleration=0.05", "export.cycle_time=0.04"]  # pulses that gro
 @pytest.mark.parametrize(("changes", "orders"), [([], ORDERS), (FOLLOWING, ORDERS), (SLOW, STICK)])
 def test_it_computes_what_the_text_says(changes, orders):
     text = planner_block(parse_spec(BAY, changes)).text
-    last = require_interpreted(text, CountedBlock(compiled(text)), orders)
+    last = require_interpreted(text, CountedBlock(compile_counting(text)), orders)
     assert not last["bPromise"]
     assert last["fVelocity"] != 0.0
 

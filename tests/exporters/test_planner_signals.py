@@ -9,8 +9,8 @@ import re
 
 import numpy as np
 import pytest
-from exporters.counted_block import CountedBlock
-from exporters.driven_block import BAY, compiled
+from exporters.counted_block import CountedBlock, compile_counting
+from exporters.driven_block import BAY
 
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec
@@ -182,7 +182,7 @@ class Signals:
     """A block, and what it shows."""
 
     def __init__(self, text):
-        self.block = CountedBlock(compiled(text), bEnable=0.0, fActPosition=START)
+        self.block = CountedBlock(compile_counting(text), bEnable=0.0, fActPosition=START)
         self.play({}, 1)
         self.play({"bEnable": 1}, 600)
 

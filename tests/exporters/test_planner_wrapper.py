@@ -6,8 +6,8 @@ from collections import Counter
 import attrs
 import numpy as np
 import pytest
-from exporters.counted_block import CountedBlock
-from exporters.driven_block import ACCELERATION, BAY, CYCLE, JERK, VELOCITY, compiled
+from exporters.counted_block import CountedBlock, compile_counting
+from exporters.driven_block import ACCELERATION, BAY, CYCLE, JERK, VELOCITY
 from exporters.planner_benches import ON, START, UNITS, Converter, PlannerBench
 from exporters.st_interpreter import FunctionBlock
 from exporters.vendor_axes import VENDORS
@@ -97,7 +97,7 @@ class TestOneAxis:
         begin = len(bench.commanded)
         for _ in range(2000):
             bench.cycle(**ON, bExecute=True, fTarget=9.0)
-        alone = CountedBlock(compiled(bay.text()), bEnable=0.0, fActPosition=START)
+        alone = CountedBlock(compile_counting(bay.text()), bEnable=0.0, fActPosition=START)
         alone.hold(sum(1 for _ in range(begin)))
         alone.hold(1, bEnable=1.0)
         issued = alone.hold(2000, bExecute=1.0, fTarget=9.0)
@@ -157,7 +157,7 @@ class TestOneAxis:
             outputs = bench.cycle(**left)
         assert not outputs["benabled"]
         require_smooth(bench.positions())
-        alone = CountedBlock(compiled(bay.text()), bEnable=0.0, fActPosition=START)
+        alone = CountedBlock(compile_counting(bay.text()), bEnable=0.0, fActPosition=START)
         alone.hold(100)
         alone.hold(1, bEnable=1.0)
         alone.hold(round(6.0 / CYCLE), bExecute=1.0, fTarget=30.0)

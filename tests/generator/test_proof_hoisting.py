@@ -157,7 +157,6 @@ def test_a_rope_that_changes_faster_than_stated_ends_the_promise(hoisting):
 @pytest.mark.parametrize(
     ("written", "changes"),
     [
-        (BAY, ["planner.live_rate={L1=0.1}", "robustness.uncertain={L1=0.01}"]),
         (HOIST, ["planner.live_rate={hoist=0.1}"]),
         (GANTRY, ["planner.live_rate={L=0.1}", "robustness.uncertain={L=0.01}", "export.cycle_time=0.004"]),
     ],

@@ -65,12 +65,15 @@ def fields(template):
     return sorted(part[1] for part in PART.finditer(template) if part[1])
 
 
-@pytest.mark.parametrize(("template", "file"), sorted(set(templates())))
-def test_every_template_has_a_translation_with_the_same_fields(template, file):
-    assert template in WORDS["messages"], file
-    translated = WORDS["messages"][template]
-    assert set(fields(translated)) <= set(fields(template))
-    assert translated == template or not ENGLISH.search(PART.sub("", translated).removeprefix("at:"))
+def test_every_template_has_a_translation_with_the_same_fields():
+    found = set(templates())
+    assert len(found) > 100
+    for template, file in sorted(found):
+        assert template in WORDS["messages"], file
+        translated = WORDS["messages"][template]
+        assert set(fields(translated)) <= set(fields(template)), template
+        english = ENGLISH.search(PART.sub("", translated).removeprefix("at:"))
+        assert translated == template or not english, template
 
 
 def sentences_of(document):
