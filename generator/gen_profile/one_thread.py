@@ -8,14 +8,36 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from functools import cache
+from threading import Lock
 
 from threadpoolctl import ThreadpoolController
 
 
-def one_thread() -> AbstractContextManager[object]:
-    """Let BLAS and LAPACK use one thread in the context."""
-    context: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
-    return context
+class _OneThread(AbstractContextManager[None]):
+    """The limit of the whole process, from the first context that begins to the last one that ends."""
+
+    def __init__(self) -> None:
+        self._lock, self._open = Lock(), 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._open == 0:
+                self._limit = _libraries().limit(limits=1, user_api="blas")
+            self._open += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._open -= 1
+            if self._open == 0:
+                self._limit.restore_original_limits()
+
+
+_ONE_THREAD = _OneThread()
+
+
+def one_thread() -> AbstractContextManager[None]:
+    """Let BLAS and LAPACK use one thread in the context, and in all others that are open at the same time."""
+    return _ONE_THREAD
 
 
 @cache
