@@ -25,5 +25,4 @@ def main(folder: Path) -> None:
     print(f"{library.path.name}: {library.block} plays any of {len(library.profiles)}, by nProfile")
 
 
-if __name__ == "__main__":  # the sweep's processes read this file, too
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "profile-library"))
+main(Path(sys.argv[1] if len(sys.argv) > 1 else "profile-library"))

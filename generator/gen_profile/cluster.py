@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
 import dask
 from distributed import Client, LocalCluster
@@ -38,6 +39,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
     try:
         cluster: LocalCluster | str
         if scheduler is None:
+            stack.enter_context(_script_hidden())
             with interrupts_collected():  # Dask cannot end processes that are about to start
                 cluster = stack.enter_context(_local_cluster(workers))
             _keep_up(cluster, workers, stack)
@@ -54,6 +56,18 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
     finally:
         with interrupts_collected():
             stack.close()
+
+
+@contextmanager
+def _script_hidden() -> Iterator[None]:
+    """Let processes start without the script that is running, which each of them would run once more."""
+    main = vars(sys.modules["__main__"])
+    hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if name in main}
+    main.update(dict.fromkeys(hidden))
+    try:
+        yield
+    finally:
+        main.update(hidden)
 
 
 def _local_cluster(workers: int) -> LocalCluster:

@@ -37,8 +37,7 @@ def run_sweep(
     folder : Path or str
         To write to.
     workers : int, optional
-        Processes of this computer; by default one for each of its processors. They import the script that
-        calls this, which must not start another sweep then: ``if __name__ == "__main__":``.
+        Processes of this computer; by default one for each of its processors.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers to use instead.
 
