@@ -43,7 +43,8 @@ fix:
 site:
     sphinx-build -q -E -W --keep-going -c docs . build/site
 
-# Wheel and source archive in dist, built twice to the same bytes and tried from the built file, with their hashes.
+# Wheel and source archive in dist, built twice to the same bytes and tried from the built file, with their hashes
+# and a bill of materials (CycloneDX) of what that file installs.
 distributions:
     rm -rf dist build/again build/fresh
     uv build --quiet --out-dir dist
@@ -54,7 +55,8 @@ distributions:
     uv pip install --quiet --python build/fresh dist/*.whl
     build/fresh/bin/gen-profile --version
     build/fresh/bin/gen-profile --export plc --out build/fresh/tried
-    cd dist && sha256sum *.whl *.tar.gz | tee SHA256SUMS
+    uvx --quiet --from cyclonedx-bom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file dist/sbom.cdx.json build/fresh/bin/python
+    cd dist && sha256sum *.whl *.tar.gz *.json | tee SHA256SUMS
 
 # The same of a version that CHANGELOG.md dates, from a checkout without changes.
 release:
