@@ -367,6 +367,13 @@ class TestZones:
         assert stopped.outputs["bCommandAborted"][-1]
         assert (stopped.velocity[-1], stopped.position[-1] <= 20.0) == (0.0, True)
 
+    def test_a_stick_that_changes_while_it_slows_down_goes_no_faster(self, planner):
+        """It held 0.8 m/s, as what was committed was too fast anyway."""
+        planner.hold(10.0, velocity=1.0)
+        planner.restrict(slow=[(0.0, 40.0, 0.25)])
+        planner.hold(1.0, velocity=1.0)
+        assert planner.hold(10.0, velocity=0.8).velocity[2000:].max() <= 0.25 + 1e-9
+
     def test_within_a_blocked_one_an_axis_may_only_leave(self):
         planner = gp.Planner(ZONED, position=22.0)
         planner.restrict(blocked=[(20.0, 24.0)])
