@@ -14,6 +14,10 @@ FORMER = {  # machine: how many are drawn, seed, number
         (400, 12, 237),  # error 8, where a plan began beside a blocked interval
         (400, 7, 167),  # 19 mm beyond the stated ends of a stop
     ],
+    "hoisted": [
+        (300, 5, 172),  # 15 mm beyond them
+        (300, 5, 192),  # at a fifth of full speed, as calming broke the pulses' rise off
+    ],
 }
 
 
