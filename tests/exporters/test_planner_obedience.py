@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from command_line import run_here
 from counted_block import CountedBlock, compile_counting
-from driven_block import CYCLE, Driver, require_limits
+from driven_block import CYCLE, Driver, compiled, require_limits
 from generator.planned_machines import swing
 
 import gen_profile as gp
@@ -294,6 +294,19 @@ def test_from_beyond_its_travel_an_axis_only_comes_back(text):
     assert (last(straight, "fPosition"), last(straight, "nErrorId")) == (5.0, 0)
 
 
+@pytest.mark.parametrize("again", [False, True])
+def test_a_damped_machine_obeys_soon_after_it_is_enabled(again):
+    """It measured for 2.4 s how far motions go, and only then took live parameters over that it had before."""
+    limits = "limits={velocity=3.0, acceleration=10.0, jerk=200.0, travel=[-3.0, 3.0]}"
+    joint = planner_block(preset_spec("flexible-joint", [limits])).text
+    block = CountedBlock(compiled(joint), fActPosition=0.0)
+    block.hold(100)
+    for enabled in (0.0, 1.0) * again:
+        block.hold(100, bEnable=enabled)
+    moves = block.hold(1000, bExecute=1.0, fTarget=2.5)["fVelocity"] != 0.0
+    assert 0.0 < np.argmax(moves) * 1e-3 < 0.42  # cReaction
+
+
 @pytest.mark.parametrize("spike", [3.0, 9.0])
 def test_a_spike_of_a_live_parameter_costs_nothing(text, spike):
     plain, spiked = standing(text, 2.0), standing(text, 2.0)
@@ -366,6 +379,13 @@ class TestZones:
         assert stopped.error_id[-1] == 8
         assert stopped.outputs["bCommandAborted"][-1]
         assert (stopped.velocity[-1], stopped.position[-1] <= 20.0) == (0.0, True)
+
+    def test_a_stick_that_changes_while_it_slows_down_goes_no_faster(self, planner):
+        """It held 0.8 m/s, as what was committed was too fast anyway."""
+        planner.hold(10.0, velocity=1.0)
+        planner.restrict(slow=[(0.0, 40.0, 0.25)])
+        planner.hold(1.0, velocity=1.0)
+        assert planner.hold(10.0, velocity=0.8).velocity[2000:].max() <= 0.25 + 1e-9
 
     def test_within_a_blocked_one_an_axis_may_only_leave(self):
         planner = gp.Planner(ZONED, position=22.0)

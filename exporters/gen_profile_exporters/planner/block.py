@@ -411,7 +411,7 @@ def _cycle_work(c: PlannerConstants) -> int:
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    left = _work(c) - _cycle_work(c) - 20 - conditions * conditions - 100
+    left = _work(c) - _cycle_work(c) - 20 - 100
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 

@@ -244,11 +244,13 @@ def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
-    """Stop on the way to one target, and go on."""
+    """Stop on the way to one target, by a button or a stick at 0, and go on."""
     wait, first = _log(2.0 * around.cycle, around.period, how), _towards(command, how, around)
+    kind, values = ("stop", ()) if _fraction(how, 3) < 0.5 else ("velocity", around.neutral)
     commands = [first]
     for k in range(STOPS):
-        commands += [_stopped(first, (2 * k + 1) * wait), _followed(first, (2 * k + 2) * wait)]
+        commands.append(_followed(first, (2 * k + 1) * wait, command=kind, values=values))
+        commands.append(_followed(first, (2 * k + 2) * wait))
     return Manner(commands=tuple(commands))
 
 

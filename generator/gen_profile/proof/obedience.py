@@ -253,6 +253,8 @@ def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         begin, end = order.begin, order.end
         if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
             continue
+        if followed.issued["fTimeToGo"][begin - 1] > 0.0:
+            continue  # a motion has just begun
         if before.kind == VELOCITY or followed.sensed("bDamping")[begin - 1 : end].any():
             continue  # its last tap still counts, or what was measured
         for k, way in enumerate(motion.way[:, begin].tolist()):

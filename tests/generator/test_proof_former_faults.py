@@ -1,0 +1,31 @@
+"""Histories in which a planner block failed once, by the numbers that they have as long as they are drawn alike."""
+
+import pytest
+from generator.mutants import MACHINES, judged, kinds_of
+
+from gen_profile.planner.design import planner_block
+from gen_profile.proof.histories import Histories
+from gen_profile.proof.numbering import Numbering
+
+FORMER = {  # machine: how many are drawn, seed, number
+    "zones": [
+        (400, 5, 58),  # a stick that exceeded a slow interval by 0.115 m/s
+        (400, 12, 233),  # a pulse beyond the ends that were stated meanwhile, by 0.5 mm
+        (400, 12, 237),  # error 8, where a plan began beside a blocked interval
+        (400, 7, 167),  # 19 mm beyond the stated ends of a stop
+    ],
+    "hoisted": [
+        (300, 5, 172),  # 15 mm beyond them
+        (300, 5, 192),  # at a fifth of full speed, as calming broke the pulses' rise off
+    ],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORMER)
+def test_a_block_obeys_where_it_once_did_not(name):
+    spec = MACHINES[name]
+    histories = Histories.of(spec)
+    drawn = [Numbering.of(histories, count, seed).history(number) for count, seed, number in FORMER[name]]
+    found = [kinds_of(spec, one) for _, one in judged(spec, planner_block(spec).text, histories, drawn)]
+    assert found == [set()] * len(drawn)
