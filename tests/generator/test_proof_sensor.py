@@ -1,5 +1,7 @@
 """The proof of a block with a sensor, and what gives it the sensor's values."""
 
+from itertools import pairwise
+
 import attrs
 import numpy as np
 import pytest
@@ -46,6 +48,9 @@ def test_histories_have_sensors_of_every_kind_and_old_ones_stay(spec):
     failing = [one for one in sensed if one is not None and one.fault]
     assert any(one.gusts for one in failing)
     assert all(gust.time + gust.lasts <= one.fails for one in failing for gust in one.gusts)
+    pairs = [pair for one in sensed if one is not None for pair in pairwise(one.gusts)]
+    assert pairs
+    assert all(before.time + before.lasts <= after.time for before, after in pairs)  # no more than stated
     plain = Histories.of(preset_spec("bay-crane", MEASURED[:1]))
     assert histories.choices > plain.choices
 

@@ -113,9 +113,10 @@ class SensedHistory:
         for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True):
             if disturbance.gust is not None:
                 lasts = SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST)
-                start = share * (latest - lasts if fault else latest)  # likewise
+                begin = gusts[-1].time + gusts[-1].lasts if gusts else 0.0  # together they push no more than stated
+                start = begin + share * (latest - (lasts if fault else 0.0) - begin)  # likewise
                 acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
-                if start >= 0.0:
+                if start >= begin:
                     gusts.append(Gust(time=start, lasts=lasts, acceleration=acceleration))
         return cls(
             starts=_starts(spec, max(0.0, _stretched(swing)), 2.0 * np.pi * phase, *machine),
