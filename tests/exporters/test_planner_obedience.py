@@ -48,6 +48,13 @@ def require_within(driver, start):
     return stated
 
 
+def test_a_target_where_it_stands_drops_the_plan_for_one_that_was_given_just_before(text):
+    driver = standing(text, 10.0).hold(2 * CYCLE, bExecute=1, fTarget=10.03).hold(CYCLE, bExecute=0)
+    out = driver.hold(2.0, bExecute=1, fTarget=10.0).outputs
+    assert not out["fVelocity"].any()
+    assert last(driver, "bDone") and not last(driver, "bBusy")
+
+
 def test_a_stop_while_turning_round_passes_no_end_that_was_stated(text):
     """From 0.6 m/s forwards it runs 0.8 m on, to rest a few millimetres away."""
     driver = (

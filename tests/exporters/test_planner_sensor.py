@@ -126,6 +126,20 @@ def test_a_sensor_that_fails_is_left_out_and_the_axis_comes_to_rest(compiled, nu
         assert not swung.run(1.0, bReset=1.0)["nSensorFault"][-1]
 
 
+def test_a_sensor_that_fails_before_it_showed_anything_withdraws_the_promise(compiled):
+    swung = crane(compiled, swing=(0.4, 0.5))
+    issued = swung.run(2.0, sensor=lambda _, value: np.nan)
+    assert issued["nSensorFault"][-1] == 2.0 and issued["nPromise"][-1] == 2.0
+    assert not swung.run(0.1, bLoadAtRest=1.0)["nPromise"][-1]  # who knows may say so
+
+
+def test_an_override_of_0_holds_while_the_load_swings(compiled):
+    swung = crane(compiled, swing=(0.4, 0.5))
+    issued = swung.run(6.0, rOverride=0.0)
+    assert not issued["fVelocity"].any() and issued["nPromise"][-1] == 6.0
+    assert swung.run(1.0, rOverride=1.0)["bDamping"][-1]
+
+
 MISREADS = {
     "sign": lambda _, value: -value,
     "scale": lambda _, value: 2.0 * value,

@@ -1,5 +1,7 @@
 """The proof of a block with a sensor, and what gives it the sensor's values."""
 
+from itertools import pairwise
+
 import attrs
 import numpy as np
 import pytest
@@ -9,10 +11,11 @@ from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.planner import Planner
 from gen_profile.planner.sensor_log import read_sensor_log
+from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import prove
-from gen_profile.proof.sensing import FAULTS, Gust, sensor_faults
+from gen_profile.proof.sensing import FAULTS, JUMP, Gust, sensor_faults
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.running.block_run import BlockRun
 
@@ -45,6 +48,9 @@ def test_histories_have_sensors_of_every_kind_and_old_ones_stay(spec):
     failing = [one for one in sensed if one is not None and one.fault]
     assert any(one.gusts for one in failing)
     assert all(gust.time + gust.lasts <= one.fails for one in failing for gust in one.gusts)
+    pairs = [pair for one in sensed if one is not None for pair in pairwise(one.gusts)]
+    assert pairs
+    assert all(before.time + before.lasts <= after.time for before, after in pairs)  # no more than stated
     plain = Histories.of(preset_spec("bay-crane", MEASURED[:1]))
     assert histories.choices > plain.choices
 
@@ -107,6 +113,22 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     assert "neither noticed nor harmless" in faults(scaled, attrs.evolve(run, promise=False), outputs)[0]
     swings = attrs.evolve(run, residual=np.array([0.0, 2.0]))
     assert "makes the load swing by 2 m" in faults(scaled, swings, outputs)[0]
+
+
+@pytest.mark.parametrize("jump", [0.05, 0.055, 0.06])
+def test_a_jump_that_counts_as_an_offset_leaves_the_axis_at_rest(spec, text, jump):
+    histories, half = Histories.of(spec), 2**31
+    drawn = [histories.history(choices) for choices in Numbering.of(histories, 30, 0).drawn]
+    with ClosedLoop(spec, text, histories) as loop:
+        for one in drawn:
+            if one.sensed is not None and not one.sensed.fault:
+                failing = attrs.evolve(
+                    one.sensed, fault="jump", fails=1.0, innovation=2.0 * jump / JUMP, seed=half, gusts=()
+                )
+                alone = attrs.evolve(one, commands=one.commands[-1:], changes=(), sensed=failing)
+                watched = loop.watched(alone, *loop.known(alone))
+                assert not watched.faults
+                assert watched.run.stands >= 0
 
 
 @pytest.mark.slow

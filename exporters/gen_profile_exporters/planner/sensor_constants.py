@@ -36,9 +36,9 @@ class SensorConstants:
         Whether it measures a rate.
     age, oldest, drop_out : float
         s: usual age of a value, the greatest, and for how long there may be none.
-    most, step, gate, frozen, noisy, offset : float
+    most, step, gate, frozen, noisy : float
         In its unit: what it may show; change from cycle to cycle; difference from what is expected, and
-        the change of that while the value stays the same; mean square change; offset.
+        the change of that while the value stays the same; mean square change.
     swing, floor, begin, again, roused, end : float
         m, of the slowest mode: what is unknown at first and later; where damping begins as the axis arrives,
         where later at rest, where once it hung still, and where it ends.
@@ -63,7 +63,6 @@ class SensorConstants:
     gate: float
     frozen: float
     noisy: float
-    offset: float
     swing: float
     floor: float
     begin: float
@@ -135,7 +134,6 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cSensorFrozen": sensor.frozen,
         "cSensorNoisy": sensor.noisy,
         "cSensorSmoothing": min(1.0, cycle / NOISE_WATCHED),
-        "cSensorOffset": sensor.offset,
         "cSensorScale": sensor.misread,
         "cSensorOthers": sensor.others,
         "cSensorAlike": CORRELATED,

@@ -143,7 +143,6 @@ def _constants(
         gate=_gate(sensor, disturbed),
         frozen=STUCK * noise,
         noisy=(NOISES * noise) ** 2 + slope**2 * UPDATE * spec.export.cycle_time,
-        offset=2.0 * sensor.offset + 0.25 * disturbed,
         swing=max(one.swing for one in sensed),
         floor=floor,
         begin=BEGIN * allowed,

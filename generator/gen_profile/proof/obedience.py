@@ -156,7 +156,7 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                     there &= _near(followed, motion, k, w, own)
             case "stop":
                 allowed = slowing(followed, before, TO_STOP)
-                there = motion.stands[own]
+                there = motion.stands[own] | followed.sensed("bDamping")[own]
             case _:
                 continue
         latest = begin + followed.after(allowed)

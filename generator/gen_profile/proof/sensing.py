@@ -32,6 +32,7 @@ FAULTS = (
     "drop-outs",
 )
 NOTICED = ("silent", "no number", "out of range")  # others are noticed where they do harm
+SHOW_NOTHING = ("frozen",)  # from the first value on, and nothing is promised then
 SHORTEST = 0.5  # s, of a gust
 LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
 NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
@@ -106,13 +107,16 @@ class SensedHistory:
             fault = FAULTS[min(int((kind - SOUND) / (1.0 - SOUND) * len(FAULTS)), len(FAULTS) - 1)]
         until = last + 0.5 * disturbance.settle
         latest = fails * until if fault else until
+        if fault == "silent" and latest <= sensor.drop_out:  # none that no sensor would show
+            swing = 0.0
         gusts = list[Gust]()
         for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True):
             if disturbance.gust is not None:
                 lasts = SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST)
-                start = share * (latest - lasts if fault else latest)  # none that no sensor would show
+                begin = gusts[-1].time + gusts[-1].lasts if gusts else 0.0  # together they push no more than stated
+                start = begin + share * (latest - (lasts if fault else 0.0) - begin)  # likewise
                 acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
-                if start >= 0.0:
+                if start >= begin:
                     gusts.append(Gust(time=start, lasts=lasts, acceleration=acceleration))
         return cls(
             starts=_starts(spec, max(0.0, _stretched(swing)), 2.0 * np.pi * phase, *machine),
@@ -190,6 +194,7 @@ class SensedHistory:
             shows=list(inputs).index("fSensor"),
             valid=list(inputs).index("bSensorValid"),
             cycles=rows,
+            rests_again=bool(self.fault),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -254,7 +259,7 @@ def _faults_of_a_faulty_one(
     late = (noticed if noticed is not None else np.inf) - one.fails - sensor.drop_out
     if one.fault in NOTICED and late > sensor.drop_out:  # as much later, where news failed to come before
         yield f"the sensor's fault is not noticed ({one.fault}, at {one.fails:.2f} s)"
-    if noticed is None and not run.promise:
+    if noticed is None and not run.promise and one.fault not in SHOW_NOTHING:
         yield f"the sensor's fault is neither noticed nor harmless ({one.fault}, at {one.fails:.2f} s)"
     swing = min(disturbance.swing.values())
     if run.residual[spec.machine().end_load.start] > HARM * swing:

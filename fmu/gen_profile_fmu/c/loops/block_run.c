@@ -50,6 +50,7 @@ typedef struct {
     unsigned quantity;                   /* what it shows */
     size_t shows, valid;                 /* places of two inputs */
     double *shown;                       /* n_measured values, to be written */
+    bool rests_again;                    /* the axes may move on after they stood: the rest that lasts counts */
 } History;
 
 /* Of an axis; gap: by how far the position is not the velocity's integral, nor this the acceleration's. */
@@ -152,6 +153,12 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         if (found->fault != 0) return;
         take_states(block, now, found);
         const bool guides = now[block->enabled] != 0.0;
+        if (history->rests_again && found->stands >= 0 && !standing(block, now)) {
+            found->stands = -1;
+            end = last + history->longest;
+            for (size_t i = 0; i < block->n_axes; i++) found->axes[i].creep = 0.0;
+            memset(found->residual, 0, history->n_loads * sizeof(double));
+        }
         if (k >= last && found->stands < 0 && standing(block, now)) {
             found->stands = k;
             end = k + history->settle + history->watch;
