@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from command_line import run_here
 from counted_block import CountedBlock, compile_counting
-from driven_block import CYCLE, Driver, compiled, require_limits
+from driven_block import CYCLE, Driver, require_limits
 from generator.planned_machines import swing
 
 import gen_profile as gp
@@ -306,7 +306,7 @@ def test_a_damped_machine_obeys_soon_after_it_is_enabled(again):
     """It measured for 2.4 s how far motions go, and only then took live parameters over that it had before."""
     limits = "limits={velocity=3.0, acceleration=10.0, jerk=200.0, travel=[-3.0, 3.0]}"
     joint = planner_block(preset_spec("flexible-joint", [limits])).text
-    block = CountedBlock(compiled(joint), fActPosition=0.0)
+    block = CountedBlock(compile_counting(joint), fActPosition=0.0)
     block.hold(100)
     for enabled in (0.0, 1.0) * again:
         block.hold(100, bEnable=enabled)
