@@ -1,4 +1,4 @@
-"""Histories in which a planner block failed once, by the numbers that they have as long as they are drawn alike."""
+"""Histories in which a planner block failed once, by their numbers as long as they are drawn alike."""
 
 import pytest
 from generator.mutants import MACHINES, judged, kinds_of
