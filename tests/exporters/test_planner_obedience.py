@@ -303,7 +303,7 @@ def test_from_beyond_its_travel_an_axis_only_comes_back(text):
 
 @pytest.mark.parametrize("again", [False, True])
 def test_a_damped_machine_obeys_soon_after_it_is_enabled(again):
-    """It measured for 2.4 s how far motions go, and only then took live parameters over that it had."""
+    """It measured for 2.4 s how far motions go, and got ready only then where it was enabled again."""
     limits = "limits={velocity=3.0, acceleration=10.0, jerk=200.0, travel=[-3.0, 3.0]}"
     joint = planner_block(preset_spec("flexible-joint", [limits])).text
     block = CountedBlock(compile_counting(joint), fActPosition=0.0)

@@ -465,11 +465,14 @@ def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
         orders=(),
         sway_limit=0.05,
         sensed=lambda _: np.zeros(4, dtype=bool),
+        drifts=np.zeros(4, dtype=bool),
     )
     for left, found in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
         run = SimpleNamespace(residual=np.array([left]), stands=1)
         assert list(BlockWatch._understated(None, run, followed)) == found
     followed.issued["nPromise"][-1] = 1.0  # the rope changed on the way
+    assert list(BlockWatch._understated(None, run, followed)) == []
+    followed.issued["nPromise"][-1], followed.drifts[1] = 0.0, True  # another rope was given at rest
     assert list(BlockWatch._understated(None, run, followed)) == []
 
 

@@ -25,7 +25,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
-from gen_profile.proof.habits import Change, Manner, Surroundings, habit, rhythm
+from gen_profile.proof.habits import HELD, Change, Manner, Surroundings, habit, rhythm
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
 
@@ -149,8 +149,10 @@ class History:
 
     @property
     def misinformed(self) -> bool:
-        """Whether the block gets the report that the load hangs still, true or not."""
-        return self._has("bLoadAtRest") or (self.sensed is not None and self.sensed.blind)
+        """Whether it is reported, true or not, that the load hangs still or that a rope is another."""
+        given = {name[1:] for change in self.changes if change.lasts > HELD for name in change.inputs}
+        blind = self.sensed is not None and self.sensed.blind
+        return blind or self._has("bLoadAtRest") or not given.isdisjoint(self.live)
 
     def _has(self, name: str) -> bool:
         """Whether an input differs for some time from what the commands say."""

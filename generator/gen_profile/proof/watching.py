@@ -159,7 +159,7 @@ class BlockWatch:
         """Tell where more sways on than the block states that errors may leave."""
         states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
         known = followed.issued["nPromise"][-1] in (0.0, ADDED_UP)
-        known = known and not followed.sensed("bSensorUsed").any()
+        known = known and not (followed.sensed("bSensorUsed").any() or followed.drifts.any())
         if states is None or not known or any(one.kind in (QUICK_STOP, DISABLED) for one in followed.orders):
             return  # it is not known how the load swings
         stated = float(states[run.stands :].max(initial=0.0))  # a damped load's falls
