@@ -182,6 +182,19 @@ def test_after_disable_and_enable_it_is_damped_at_once_and_promised_again(compil
     assert np.abs(issued["sway"][-1000:]).max() < ALLOWED
 
 
+def test_what_errors_may_have_left_is_forgotten_once_the_load_was_damped(compiled):
+    swung = crane(compiled)
+    swung.run(0.5)
+    swung.run(5.0, bVelocity=1.0, fVelocityCommand=1.0)
+    swung.run(5.0, bVelocity=0.0)
+    swung.gust = 0.15
+    swung.run(1.5)
+    swung.gust = 0.0
+    issued = swung.run(9.0)
+    (ends,) = np.flatnonzero(np.diff(issued["bDamping"]) < 0.0)
+    assert issued["fSwayLeft"][ends - 100] > 0.01 > 2.0 * issued["fSwayLeft"][ends + 100]
+
+
 def test_the_kernel_leaves_the_fast_mode_alone():
     for ratio in (1.8, 4.0, 9.0):
         frequencies = np.array([1.0, ratio])
