@@ -152,7 +152,8 @@ def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compi
     swung = crane(compiled)
     swung.run(6.0, sensor=MISREADS[name])
     issued = swung.run(14.0, sensor=MISREADS[name], fTarget=STANDS + 6.0, bExecute=1.0)
-    assert issued["nSensorFault"][-1] == 7.0 and issued["nPromise"][-1] == 2.0
+    assert issued["nSensorFault"][-1] in (5.0, 7.0)  # soon after the block was enabled 5 may be first
+    assert issued["nPromise"][-1] == 2.0
     assert not issued["bDamping"].any()  # so the load does as without a sensor
     assert np.abs(issued["sway"][-500:]).max() < 1e-3
     require_limits(issued)
@@ -180,6 +181,19 @@ def test_after_disable_and_enable_it_is_damped_at_once_and_promised_again(compil
     assert np.argmax(issued["bDamping"][enabled:] > 0.0) * CYCLE <= 0.05
     assert issued["nPromise"][enabled + 100] == 2.0 and issued["bPromise"][-1]
     assert np.abs(issued["sway"][-1000:]).max() < ALLOWED
+
+
+def test_what_errors_may_have_left_is_forgotten_once_the_load_was_damped(compiled):
+    swung = crane(compiled)
+    swung.run(0.5)
+    swung.run(5.0, bVelocity=1.0, fVelocityCommand=1.0)
+    swung.run(5.0, bVelocity=0.0)
+    swung.gust = 0.15
+    swung.run(1.5)
+    swung.gust = 0.0
+    issued = swung.run(9.0)
+    (ends,) = np.flatnonzero(np.diff(issued["bDamping"]) < 0.0)
+    assert issued["fSwayLeft"][ends - 100] > 0.01 > 2.0 * issued["fSwayLeft"][ends + 100]
 
 
 def test_the_kernel_leaves_the_fast_mode_alone():

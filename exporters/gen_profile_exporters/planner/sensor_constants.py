@@ -19,6 +19,7 @@ NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
 CORRELATED = (
     0.15  # of what else may differ, that is a misreading where nothing differs otherwise for a period
 )
+SETTLES = 1.7  # times as much within two periods after it was first used
 STEADY = 0.03  # share by which a live parameter may be another than planned with, while motions are judged
 MEMORY = 1.0  # slow periods, over which what it shows of the axis's own motions is
 ROWS_BEFORE = 4  # of the model by mode, where one axis is planned: frequency, decay, error and sway
@@ -137,6 +138,7 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cSensorScale": sensor.misread,
         "cSensorOthers": sensor.others,
         "cSensorAlike": CORRELATED,
+        "cSensorSettles": SETTLES,
         "cSensorSteady": STEADY,
         "cSensorForgets": 1.0 / (2.0 * np.pi * MEMORY),
         "cSensorFloor": sensor.floor,

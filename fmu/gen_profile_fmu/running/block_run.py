@@ -62,16 +62,16 @@ class Measurement:
         Of each cycle that there may be: gain and offset of the sensor, how many cycles ago the value is of,
         whether there is news, and by how much, in m, the block's first axis is moved unseen: to the loads,
         which see accelerations alone, that is a force in proportion to their masses.
-    rests_again : bool
-        Whether the axes may move on after they came to rest, as a sensor that fails may show: what counts then
-        is the rest that lasts.
+    again : int
+        How often the axes may move on after they came to rest, as a sensor may show: what counts is the rest
+        that lasts.
     """
 
     quantity: str
     shows: int
     valid: int
     cycles: Array
-    rests_again: bool = False
+    again: int = 0
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -217,7 +217,7 @@ class _History(Structure):
         ("quantity", c_uint),
         *((name, c_size_t) for name in ("shows", "valid")),
         ("shown", POINTER(c_double)),
-        ("rests_again", c_bool),
+        ("again", c_long),
     ]
 
 
@@ -380,7 +380,7 @@ class BlockFollower:
             "shows": measured.shows,
             "valid": measured.valid,
             "shown": doubles(shown),
-            "rests_again": measured.rests_again,
+            "again": measured.again,
         }
 
     def _numbers(self, names: Collection[str]) -> Any:

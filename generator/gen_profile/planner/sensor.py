@@ -249,16 +249,17 @@ def _floor(sensor: SensorSpec, one: SensedModes) -> float:
 
 
 def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
-    """Find how much of what differs comes from gusts, wrong frequencies and noise at most.
+    """Find how much of what differs is not the sensor's fault at most.
 
-    The root of its square's integral over the phase in the memory, which by Cauchy and Schwarz bounds how
-    much of it looks like what the axis's own motions show.
+    It comes from gusts, what is unknown at first, wrong frequencies and noise: the root of its square's
+    integral over the phase in the memory, which by Cauchy and Schwarz bounds how much of it looks like
+    what the axis's own motions show.
     """
     state, measured, gain = _filter(sensor, one)
     slowest, corrected = float(one.frequencies[0]), state - np.outer(gain, measured[0])
-    pushed, freed = np.zeros(len(state)), np.zeros((len(state), 2))
+    pushed, freed = np.zeros(len(state)), np.zeros((len(state), 3))
     pushed[1:-1:2] = one.push
-    freed[0, 0], freed[1, 1] = one.swing, slowest * one.swing
+    freed[0, 0], freed[1, 1], freed[-1, 2] = one.swing, slowest * one.swing, sensor.offset
     peak = max(
         abs(measured[0] @ np.linalg.solve(1j * frequency * np.eye(len(state)) - corrected, pushed))
         for frequency in slowest * np.geomspace(0.1, 10.0, 100)

@@ -39,6 +39,7 @@ NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
 JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
+ONCE, AS_OFTEN = 1, 1000  # that an axis moves on at rest, where a load seems to swing by just too much
 TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
 
 
@@ -113,7 +114,7 @@ class SensedHistory:
         for share, long, strong in zip(others[::3], others[1::3], others[2::3], strict=True):
             if disturbance.gust is not None:
                 lasts = SHORTEST + long * max(0.0, disturbance.gust.longest - SHORTEST)
-                begin = gusts[-1].time + gusts[-1].lasts if gusts else 0.0  # together they push no more than stated
+                begin = gusts[-1].time + gusts[-1].lasts if gusts else 0.0  # no two push at once
                 start = begin + share * (latest - (lasts if fault else 0.0) - begin)  # likewise
                 acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
                 if start >= begin:
@@ -194,7 +195,7 @@ class SensedHistory:
             shows=list(inputs).index("fSensor"),
             valid=list(inputs).index("bSensorValid"),
             cycles=rows,
-            rests_again=bool(self.fault),
+            again=AS_OFTEN if self.fault else ONCE,
         )
 
     def to_dict(self) -> dict[str, Any]:

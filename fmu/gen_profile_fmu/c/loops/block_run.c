@@ -50,7 +50,7 @@ typedef struct {
     unsigned quantity;                   /* what it shows */
     size_t shows, valid;                 /* places of two inputs */
     double *shown;                       /* n_measured values, to be written */
-    bool rests_again;                    /* the axes may move on after they stood: the rest that lasts counts */
+    long again;                          /* how often the axes may move on after they stood: the rest that lasts counts */
 } History;
 
 /* Of an axis; gap: by how far the position is not the velocity's integral, nor this the acceleration's. */
@@ -136,6 +136,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
     double *before = NULL, *now = room;
     double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads, *inputs = stood + block->n_axes;
     long last = history->start_cycles[history->n_rows - 1], end = last + history->longest;
+    long again = history->n_measured > 0 ? history->again : 0;
     size_t row = 0, mark = 0;
     begin_axes(block, found);
     found->stands = -1;
@@ -153,7 +154,8 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         if (found->fault != 0) return;
         take_states(block, now, found);
         const bool guides = now[block->enabled] != 0.0;
-        if (history->rests_again && found->stands >= 0 && !standing(block, now)) {
+        if (again > 0 && found->stands >= 0 && !standing(block, now)) {
+            again--;
             found->stands = -1;
             end = last + history->longest;
             for (size_t i = 0; i < block->n_axes; i++) found->axes[i].creep = 0.0;
