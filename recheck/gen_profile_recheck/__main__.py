@@ -8,6 +8,7 @@ proved, 4 where it is not, and 2 where a file cannot be read.
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         artefact, certificate, spec = (Path(one).read_bytes() for one in arguments)
-        print(check(artefact, spec, certificate, _report))
+        print(check(artefact, spec, certificate, _report, os.cpu_count() or 1))
     except OSError as error:
         print(f"Cannot read {error.filename}: {error.strerror}.", file=sys.stderr)
         return 2
