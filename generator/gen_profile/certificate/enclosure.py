@@ -49,6 +49,7 @@ TIME_NODES, FEW_TIME_NODES = 12, 8  # for the defect, and for what need not be a
 MORE_NODES = 4  # than terms, in each parameter: what interpolation misses is bounded roughly
 ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
 PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
+HOPELESS = 0.02  # error of a motion as a share of its size, without its growth: no proof is tried
 FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
 
 
@@ -133,8 +134,13 @@ class Enclosure:
         source = norm(matmul_most(scaling.most, defect))
         size = norm(matmul_most(scaling.most, self._around.most))
         most = size.max(axis=1, keepdims=True)
-        reach = WIDER * self._accumulated(self._still.max(axis=-1), source) + FIRST_GUESS * most
-        off = np.full((*size.shape, self.equations.sway.rows), np.nan)
+        off, still = (
+            np.full((*size.shape, n), np.nan) for n in (self.equations.sway.rows, self._around.shape[-1])
+        )
+        promising = (self._accumulated(0.0 * source, source) <= HOPELESS * most).all(axis=1)
+        if promising.any():
+            still[promising] = self._of(np.flatnonzero(promising))._still
+        reach = WIDER * self._accumulated(still.max(axis=-1), source) + FIRST_GUESS * most
         waiting = np.flatnonzero((reach <= most).all(axis=1))
         for _ in range(ATTEMPTS):
             if not waiting.size:
@@ -142,7 +148,7 @@ class Enclosure:
             some = self._of(waiting)
             s = some.approximation.scaling
             tube = reach[waiting, :, None] * norm(s.inverse_most) * s.slack[..., None]
-            growth, disturbance, slopes, shift = some._tubes(tube * ROUND_UP, self._still[waiting])
+            growth, disturbance, slopes, shift = some._tubes(tube * ROUND_UP, still[waiting])
             error = some._accumulated(growth, source[waiting] + disturbance)
             closed = (error <= reach[waiting]).all(axis=1)
             off[waiting[closed]] = ((slopes * error[..., None] + shift) * ROUND_UP)[closed]
