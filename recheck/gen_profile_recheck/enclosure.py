@@ -31,9 +31,9 @@ from gen_profile_recheck.boxes import (
 )
 from gen_profile_recheck.jets import SINGLE, Jet, along, moved
 
-TERMS, FEW_TERMS = 14, 6  # of power series in time: for the defect and sway, and for μ
+TERMS, FEW_TERMS = 16, 8  # of power series in time: for the defect and sway, and for μ
 MORE, SOME_MORE = 2, 0  # nodes than terms in each parameter, likewise
-MANY_MORE = 4  # beyond these, where that is not enough
+MANY_MORE = 4  # nodes and terms beyond these, where that is not enough
 ATTEMPTS, WIDER = 12, 2
 INVERSE = 7  # terms of V in each parameter
 MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
@@ -75,6 +75,7 @@ class BoxProof:
     ) -> None:
         self.box, self.pieces, self.start = box, pieces, start
         self.scales = [ScaleMatrix(box, one) for one in scales]
+        self.terms, self.few_terms = TERMS + beyond, FEW_TERMS + beyond
         self.fine = tuple(count + MORE + beyond for count in box.terms)
         self.coarse = tuple(count + SOME_MORE + beyond // 2 for count in box.terms)
 
@@ -96,7 +97,7 @@ class BoxProof:
             sides = [watch for watch in watches if number >= watch.first]
             wanted = partial(self._defect_and_sways, sides)
             none, bent = [0] * len(self.start), partial(self._bent, wanted)
-            outputs = piece.enclosed(wanted, TERMS, self.fine, none, bent)
+            outputs = piece.enclosed(wanted, self.terms, self.fine, none, bent)
             defect, sways = outputs[: len(self.start)], outputs[len(self.start) :]
             source = norm(scale.sizes_of([one.size for one in defect]))
             error, step = self._step(piece, scale, error, source, fed)
@@ -182,7 +183,7 @@ class BoxProof:
             return [(turned[i][j] + turned[j][i]) / arb(2) for i, j in pairs]
 
         pairs = [(i, j) for i in range(n) for j in range(i + 1)]
-        bounds = piece.enclosed(symmetric, FEW_TERMS, self.coarse, tube)
+        bounds = piece.enclosed(symmetric, self.few_terms, self.coarse, tube)
         entry = dict(zip(pairs, bounds, strict=True))
         rows = []
         for i in range(n):
