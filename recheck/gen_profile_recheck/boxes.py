@@ -313,10 +313,10 @@ class MotionPiece:
         `bent` bounds what is left of them on discs and ellipses after something linear in the motions is
         taken off, which expansions of enough terms have exactly.
         """
-        enough = self.series[0].nrows() <= terms and all(
+        exact = self.series[0].nrows() <= terms and all(
             a <= b for a, b in zip(self.box.terms, counts, strict=True)
         )
-        beyond = bent if bent and enough else lambda s: [spread_of(one) for one in function(s)]
+        beyond = bent if bent and exact else lambda s: [spread_of(one) for one in function(s)]
         ctx.cap = terms
         at = [one * node_values(self.box.terms, counts) for one in self._in_powers]
         columns = [one.transpose().tolist() for one in at]

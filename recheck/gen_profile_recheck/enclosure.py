@@ -179,8 +179,8 @@ class BoxProof:
 
         def symmetric(s: MachineState) -> Values:
             to, back = scale.at(s.places, s.key)
-            turned = matrix_product(matrix_product(to, self._jacobian(s)), back)
-            return [(turned[i][j] + turned[j][i]) / arb(2) for i, j in pairs]
+            transformed = matrix_product(matrix_product(to, self._jacobian(s)), back)
+            return [(transformed[i][j] + transformed[j][i]) / arb(2) for i, j in pairs]
 
         pairs = [(i, j) for i in range(n) for j in range(i + 1)]
         bounds = piece.enclosed(symmetric, self.few_terms, self.coarse, tube)
@@ -190,8 +190,8 @@ class BoxProof:
             sides = (entry[max(i, j), min(i, j)].size for j in range(n) if j != i)
             rows.append(sum(sides, start=entry[i, i].ball.upper()))
         columns = zip(*self._jacobian(piece.everywhere(tube)), strict=True)
-        turned = [norm(scale.sizes_of([abs(arb(one)) for one in column])) for column in columns]
-        whole = sum((a * b for a, b in zip(turned, scale.rows, strict=True)), start=arb(0))
+        transformed = [norm(scale.sizes_of([abs(arb(one)) for one in column])) for column in columns]
+        whole = sum((a * b for a, b in zip(transformed, scale.rows, strict=True)), start=arb(0))
         return reduce(arb.max, rows) + whole * (scale.slack - 1)
 
     def _jacobian(self, s: MachineState) -> list[Values]:

@@ -300,8 +300,8 @@ class Enclosure:
             defects.append(np.stack(sums, axis=2))
         f = self.equations.rate.evaluated(*self._state_on_ellipses)
         shape = self._range.shape[:3]
-        missed = np.stack([np.broadcast_to(row[0].rad, shape) for row in f], axis=-1)
-        return np.concatenate(defects, axis=1) + self._interpolation_error(missed, self.fine)
+        remainder = np.stack([np.broadcast_to(row[0].rad, shape) for row in f], axis=-1)
+        return np.concatenate(defects, axis=1) + self._interpolation_error(remainder, self.fine)
 
     def _whole(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Ball:
         """Give values at nodes, of which some may be alike, their full shape."""
@@ -397,9 +397,9 @@ class Enclosure:
         mid, rad = np.empty((2, *self._around.shape[:2], size, size))
         for rows in self._portions(counts):
             jacobian = self.equations.jacobian(*self._state_at(counts, rows))
-            turned = symmetric(product(product(entries(to, rows), jacobian), entries(back, rows)))
+            transformed = symmetric(product(product(entries(to, rows), jacobian), entries(back, rows)))
             for i, j in zip(*np.tril_indices(size), strict=True):
-                series = chebyshev.interpolated(self._whole(turned[i][j], counts, rows), self.variables)
+                series = chebyshev.interpolated(self._whole(transformed[i][j], counts, rows), self.variables)
                 first = chebyshev.first(series.mid, self.variables)
                 rest = chebyshev.total(series, self.variables) - np.abs(first)
                 mid[:, rows, i, j], rad[:, rows, i, j] = first, rest * ROUND_UP
@@ -487,10 +487,10 @@ class Enclosure:
         """
         power = 1 if len(at_nodes) == 1 else 2
         whole, beyond = (reduce(add, (balls.power(one, power) for one in each)) for each in (at_nodes, far))
-        missed = np.broadcast_to(beyond.rad, self._range.shape[:3])[:, :, first:]
+        remainder = np.broadcast_to(beyond.rad, self._range.shape[:3])[:, :, first:]
         series = chebyshev.interpolated(whole, self.variables)
         rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
-        off = rounding + self._interpolation_error(missed, self.fine)
+        off = rounding + self._interpolation_error(remainder, self.fine)
         targets = np.maximum(targets, 0.0) ** power
         bounds = [chebyshev.greatest(*one) for one in zip(series.mid, off, targets.tolist(), strict=True)]
         largest_met = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
