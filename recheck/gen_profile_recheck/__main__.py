@@ -3,7 +3,7 @@
     python -m gen_profile_recheck ARTEFACT CERTIFICATE SPEC
 
 SPEC is the manifest beside the artefact, or the spec in it, as JSON. The exit code is 0 where everything is
-proved, 4 where it is not, and 2 where a file cannot be read.
+proved, 4 where it is not, 2 where a file cannot be read, and 130 after Ctrl-C.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ def main(arguments: list[str]) -> int:
     except NotProvedError as error:
         print(f"Not proved: {error}.")
         return 4
+    except KeyboardInterrupt:
+        print("Interrupted: nothing is said of the certificate.", file=sys.stderr)
+        return 130
     print(TRUST)
     return 0
 
