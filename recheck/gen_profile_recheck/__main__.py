@@ -3,11 +3,12 @@
     python -m gen_profile_recheck ARTEFACT CERTIFICATE SPEC
 
 SPEC is the manifest beside the artefact, or the spec in it, as JSON. The exit code is 0 where everything is
-proved, 4 where it is not, and 2 where a file cannot be read.
+proved, 4 where it is not, 2 where a file cannot be read, and 130 after Ctrl-C.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -27,13 +28,16 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         artefact, certificate, spec = (Path(one).read_bytes() for one in arguments)
-        print(check(artefact, spec, certificate, _report))
+        print(check(artefact, spec, certificate, _report, os.cpu_count() or 1))
     except OSError as error:
         print(f"Cannot read {error.filename}: {error.strerror}.", file=sys.stderr)
         return 2
     except NotProvedError as error:
         print(f"Not proved: {error}.")
         return 4
+    except KeyboardInterrupt:
+        print("Interrupted: nothing is said of the certificate.", file=sys.stderr)
+        return 130
     print(TRUST)
     return 0
 

@@ -52,7 +52,7 @@ class Expansion:
     @property
     def size(self) -> arb:
         """Bound its absolute value."""
-        return sum((abs(one) for one in self.coefficients.entries()), start=self.rest).abs_upper()
+        return sum(map(abs, self.coefficients.entries()), start=self.rest).abs_upper()
 
     @property
     def ball(self) -> arb:
@@ -212,7 +212,7 @@ class MachineBox:
 
 
 def _beyond(at: Callable[[int, float], Values], number: int, count: int, rho: float) -> list[arb]:
-    return [4 * size_of(one) / arb(rho) ** count / (1 - 1 / arb(rho)) for one in at(number, rho)]
+    return [4 * one / arb(rho) ** count / (1 - 1 / arb(rho)) for one in at(number, rho)]
 
 
 def _least(bounds: Sequence[arb]) -> arb:
@@ -220,9 +220,10 @@ def _least(bounds: Sequence[arb]) -> arb:
     return min(known, key=float) if known else arb("inf")
 
 
-def size_of(value: Any) -> arb:
-    """Bound an absolute value."""
-    return abs(acb(value)).abs_upper()
+def spread_of(value: Any) -> arb:
+    """Bound how far a value is from a constant, of which an expansion misses nothing."""
+    known = acb(value)
+    return abs(known - known.mid()).abs_upper()
 
 
 @dataclass
@@ -300,9 +301,22 @@ class MotionPiece:
         return MachineState(states, [wide(one) for one in slope], self._axes_at(_range), k, places, "all")
 
     def enclosed(
-        self, function: Function, terms: int, counts: tuple[int, ...], tube: Sequence[Any]
+        self,
+        function: Function,
+        terms: int,
+        counts: tuple[int, ...],
+        tube: Sequence[Any],
+        bent: Function | None = None,
     ) -> list[Expansion]:
-        """Enclose functions of the motions, and of all within a tube around them."""
+        """Enclose functions of the motions, and of all within a tube around them.
+
+        `bent` bounds what is left of them on discs and ellipses after something linear in the motions is
+        taken off, which expansions of enough terms have exactly.
+        """
+        exact = self.series[0].nrows() <= terms and all(
+            a <= b for a, b in zip(self.box.terms, counts, strict=True)
+        )
+        beyond = bent if bent and exact else lambda s: [spread_of(one) for one in function(s)]
         ctx.cap = terms
         at = [one * node_values(self.box.terms, counts) for one in self._in_powers]
         columns = [one.transpose().tolist() for one in at]
@@ -321,15 +335,13 @@ class MotionPiece:
         late = self.box.least(
             (terms, len(rows[0])),
             DISCS,
-            lambda r: [
-                size_of(one) / arb(r) ** terms / (1 - 1 / arb(r)) for one in function(self.on_disc(r, tube))
-            ],
+            lambda r: [one / arb(r) ** terms / (1 - 1 / arb(r)) for one in beyond(self.on_disc(r, tube))],
         )
         rests = self.box.interpolation_error(
             counts,
             late,
             (terms, len(rows[0])),
-            lambda number, rho: function(self.on_ellipse(number, rho, tube)),
+            lambda number, rho: beyond(self.on_ellipse(number, rho, tube)),
         )
         result = []
         for output, rest in enumerate(rests):

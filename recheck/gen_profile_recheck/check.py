@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import signal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations, pairwise, product
 from math import prod
+from multiprocessing import get_all_start_methods, get_context
 from typing import Any
 
 from flint import acb_mat, arb, ctx
@@ -61,9 +63,15 @@ class Case:
 
 
 def check(
-    artefact: bytes, spec: bytes, certificate: bytes, progress: Progress = lambda done, boxes: None
+    artefact: bytes,
+    spec: bytes,
+    certificate: bytes,
+    progress: Progress = lambda done, boxes: None,
+    processes: int = 1,
 ) -> str:
     """Prove again what a certificate says of an artefact and a spec (or its manifest), and report it.
+
+    Boxes are shared among processes where the system can fork.
 
     Raises
     ------
@@ -82,7 +90,7 @@ def check(
         case = _case(artefact, spec_of(read_json(spec), document["spec_sha256"]), document)
         _require_setpoints(case)
         _require_times(case)
-        _prove(case, progress)
+        _prove(case, progress, processes)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise NotProvedError(
             f"a file is damaged, or not covered ({type(error).__name__}: {error})"
@@ -229,33 +237,66 @@ def _watches(case: Case, knots: Sequence[float]) -> list[SwayClaim]:
     return claims
 
 
-def _prove(case: Case, progress: Progress) -> None:
-    machine, setpoints = case.machine, case.setpoints
-    proof = ProofMaterial(case.document, 2 * len(machine.coordinates), len(machine.axes))
+def _prove(case: Case, progress: Progress, processes: int) -> None:
+    proof = ProofMaterial(case.document, 2 * len(case.machine.coordinates), len(case.machine.axes))
     _require_cover(proof, len(case.ranges))
-    watches, knots, times = _watches(case, proof.knots), proof.knots, setpoints.times
+    knots, times, boxes = proof.knots, case.setpoints.times, len(proof.parts)
     moving = {knot for knot in knots if knot <= times[-1]}
     if knots[0] != times[0] or times[-1] not in moving or not moving <= set(times):
         raise NotProvedError("the certificate's motion of the axes does not belong to the setpoints")
-    halves = [(arb(end) - begin) / 2 for begin, end in pairwise(knots)]
-    axes = []
-    for axis, positions in enumerate(setpoints.positions):
-        smooth = [quintic(half, *ends) for half, ends in zip(halves, proof.ends[axis], strict=True)]
-        velocity = case.spec["move"]["final_velocity"][axis]
-        axes.append(list(axis_pieces(knots, smooth, times, positions, velocity)))
-    names = (*machine.coordinates, *(f"{name}.rate" for name in machine.coordinates))
-    start = [case.spec["move"].get("initial", {}).get(name, 0.0) for name in names]
-    for number, parts in enumerate(proof.parts):
-        box = MachineBox(machine, case.parameters, case.ranges, parts, proof.terms)
-        pieces = [
-            MotionPiece(box, half, along_axes, series)
-            for half, along_axes, series in zip(
-                halves, zip(*axes, strict=True), proof.motion(number), strict=True
-            )
-        ]
-        material = box, pieces, proof.scales(number), start
+    work = BoxByBox(case, proof)
+    if processes == 1 or boxes == 1 or "fork" not in get_all_start_methods():
+        for number in range(boxes):
+            work.prove(number)
+            progress(number + 1, boxes)
+        return
+    with get_context("fork").Pool(min(processes, boxes), _begin, (work,)) as pool:
+        for done, _ in enumerate(pool.imap_unordered(_prove_box, range(boxes)), start=1):
+            progress(done, boxes)
+
+
+class BoxByBox:
+    """The proof of every box, which needs nothing of the others."""
+
+    def __init__(self, case: Case, proof: ProofMaterial) -> None:
+        setpoints, knots = case.setpoints, proof.knots
+        self.case, self.proof, self.watches = case, proof, _watches(case, knots)
+        self.halves = [(arb(end) - begin) / 2 for begin, end in pairwise(knots)]
+        axes = []
+        for axis, positions in enumerate(setpoints.positions):
+            smooth = [quintic(half, *ends) for half, ends in zip(self.halves, proof.ends[axis], strict=True)]
+            velocity = case.spec["move"]["final_velocity"][axis]
+            axes.append(list(axis_pieces(knots, smooth, setpoints.times, positions, velocity)))
+        self.axes = list(zip(*axes, strict=True))
+        initial, coordinates = case.spec["move"].get("initial", {}), case.machine.coordinates
+        names = (*coordinates, *(f"{name}.rate" for name in coordinates))
+        self.start = [initial.get(name, 0.0) for name in names]
+
+    def prove(self, number: int) -> None:
+        """Prove a box.
+
+        Raises
+        ------
+        NotProvedError
+        """
+        case, proof = self.case, self.proof
+        box = MachineBox(case.machine, case.parameters, case.ranges, proof.parts[number], proof.terms)
+        motion = zip(self.halves, self.axes, proof.motion(number), strict=True)
+        pieces = [MotionPiece(box, half, along_axes, series) for half, along_axes, series in motion]
+        material = box, pieces, proof.scales(number), self.start
         try:
-            BoxProof(*material).require(watches)
+            BoxProof(*material).require(self.watches)
         except NotProvedError:
-            BoxProof(*material, beyond=MANY_MORE).require(watches)
-        progress(number + 1, len(proof.parts))
+            BoxProof(*material, beyond=MANY_MORE).require(self.watches)
+
+
+_own: list[BoxByBox] = []  # of this process, one of several that share the work
+
+
+def _begin(work: BoxByBox) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
+    _own.append(work)
+
+
+def _prove_box(number: int) -> None:
+    _own[-1].prove(number)

@@ -9,7 +9,7 @@ e = z − x̃ obeys d|S e|/dt ≤ μ |S e| + |S| (|x̃' − f(x̃)| + |r|), μ t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import product
 from typing import Any
@@ -19,19 +19,21 @@ from flint import arb, arb_mat, arb_poly
 from gen_profile_recheck.axes import magnitude, mean_products
 from gen_profile_recheck.boxes import (
     Expansion,
+    Function,
     MachineBox,
     MachineState,
     MotionPiece,
     Values,
     _t,
     powers,
+    spread_of,
     wide,
 )
 from gen_profile_recheck.jets import SINGLE, Jet, along, moved
 
-TERMS, FEW_TERMS = 24, 14  # of power series in time: for the defect and sway, and for μ
-MORE, SOME_MORE = 4, 2  # nodes than terms in each parameter, likewise
-MANY_MORE = 4  # beyond these, where that is not enough
+TERMS, FEW_TERMS = 16, 8  # of power series in time: for the defect and sway, and for μ
+MORE, SOME_MORE = 2, 0  # nodes than terms in each parameter, likewise
+MANY_MORE = 4  # nodes and terms beyond these, where that is not enough
 ATTEMPTS, WIDER = 12, 2
 INVERSE = 7  # terms of V in each parameter
 MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
@@ -73,6 +75,7 @@ class BoxProof:
     ) -> None:
         self.box, self.pieces, self.start = box, pieces, start
         self.scales = [ScaleMatrix(box, one) for one in scales]
+        self.terms, self.few_terms = TERMS + beyond, FEW_TERMS + beyond
         self.fine = tuple(count + MORE + beyond for count in box.terms)
         self.coarse = tuple(count + SOME_MORE + beyond // 2 for count in box.terms)
 
@@ -93,7 +96,8 @@ class BoxProof:
                 error += norm(scale.sizes_of(_first_gap(piece, leap)))
             sides = [watch for watch in watches if number >= watch.first]
             wanted = partial(self._defect_and_sways, sides)
-            outputs = piece.enclosed(wanted, TERMS, self.fine, [0] * len(self.start))
+            none, bent = [0] * len(self.start), partial(self._bent, wanted)
+            outputs = piece.enclosed(wanted, self.terms, self.fine, none, bent)
             defect, sways = outputs[: len(self.start)], outputs[len(self.start) :]
             source = norm(scale.sizes_of([one.size for one in defect]))
             error, step = self._step(piece, scale, error, source, fed)
@@ -109,6 +113,25 @@ class BoxProof:
             own_sway = sways[watch.loads]
             entries.append(own_sway[0] if len(own_sway) == 1 else sum(one * one for one in own_sway))
         return entries
+
+    def _bent(self, function: Function, s: MachineState) -> Values:
+        """Bound what is not linear in state, axes and slope: by how much derivatives by these change."""
+        columns, units, reaches, still = [s.x, *s.axes[:2]], 0, list[arb](), list[Values]()
+        for number, column in enumerate(columns):
+            still.append([one.mid() for one in column])
+            for chosen in range(len(column)):
+                unit = [1 if row == chosen else 0 for row in range(len(column))]
+                columns[number] = moved(columns[number], unit, SINGLE << units)
+                units += 1
+            reaches += [spread_of(one) for one in column]
+        outputs, middles = (
+            function(replace(s, x=x, axes=axes, slope=[0] * len(x))) for x, *axes in (columns, still)
+        )
+        changes = (
+            sum((spread_of(along(one, SINGLE << k)) * reach for k, reach in enumerate(reaches)), start=arb(0))
+            for one in outputs
+        )
+        return [spread_of(one) + change for one, change in zip(middles, changes, strict=True)]
 
     def _leap(self, number: int) -> list[arb]:
         """Bound by how much the approximate motion leaps where a piece begins."""
@@ -155,24 +178,21 @@ class BoxProof:
         n = len(tube)
 
         def symmetric(s: MachineState) -> Values:
-            jacobian = self._jacobian(s)
             to, back = scale.at(s.places, s.key)
-            transformed = matrix_product(matrix_product(to, jacobian), back)
-            whole = [one for row in transformed for one in row]
-            return [
-                (transformed[i][j] + transformed[j][i]) / arb(2) for i in range(n) for j in range(i + 1)
-            ] + whole
+            transformed = matrix_product(matrix_product(to, self._jacobian(s)), back)
+            return [(transformed[i][j] + transformed[j][i]) / arb(2) for i, j in pairs]
 
-        bounds = piece.enclosed(symmetric, FEW_TERMS, self.coarse, tube)
         pairs = [(i, j) for i in range(n) for j in range(i + 1)]
-        entry = dict(zip(pairs, bounds[: len(pairs)], strict=True))
+        bounds = piece.enclosed(symmetric, self.few_terms, self.coarse, tube)
+        entry = dict(zip(pairs, bounds, strict=True))
         rows = []
         for i in range(n):
             sides = (entry[max(i, j), min(i, j)].size for j in range(n) if j != i)
             rows.append(sum(sides, start=entry[i, i].ball.upper()))
-        growth = reduce(arb.max, rows)
-        whole = norm([one.size for one in bounds[len(pairs) :]])
-        return growth + whole * (scale.slack - 1)
+        columns = zip(*self._jacobian(piece.everywhere(tube)), strict=True)
+        transformed = [norm(scale.sizes_of([abs(arb(one)) for one in column])) for column in columns]
+        whole = sum((a * b for a, b in zip(transformed, scale.rows, strict=True)), start=arb(0))
+        return reduce(arb.max, rows) + whole * (scale.slack - 1)
 
     def _jacobian(self, s: MachineState) -> list[Values]:
         a, v = s.axes[:2]

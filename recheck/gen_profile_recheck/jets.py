@@ -34,9 +34,11 @@ class Jet:
 
     def __mul__(self, other: Scalar) -> Jet:
         """Multiply, without squares of units."""
+        if not isinstance(other, Jet):
+            return Jet({key: value * other for key, value in self.parts.items()})
         parts: dict[int, Scalar] = {}
         for one, first in self.parts.items():
-            for two, second in _parts(other).items():
+            for two, second in other.parts.items():
                 if not (one & two or (one >= SINGLE <= two)):
                     product = first * second
                     parts[one | two] = parts[one | two] + product if one | two in parts else product

@@ -11,7 +11,7 @@ from gen_profile.charts.curves import WINDY, wind_lines
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.static_deflection import in_wind, static_deflection
-from gen_profile.spec.reading import preset_spec
+from gen_profile.spec.reading import preset_spec, read_spec
 
 FORCE = 300.0
 
@@ -62,6 +62,29 @@ def test_a_wind_may_be_stated_where_the_end_load_is_a_body(preset):
 def test_a_wind_on_what_is_no_body_is_refused():
     with pytest.raises(SpecError, match=r"check\.wind\.force: .*does not push the surface.*; remove it"):
         preset_spec("slosh-tank", ["check.wind.force=5"])
+
+
+@pytest.mark.parametrize("bodies", [True, False])
+def test_a_machine_file_takes_wind_where_it_states_bodies(tmp_path, bodies):
+    left_out = "" if bodies else ", bodies=(), mechanics=without"
+    (tmp_path / "own.py").write_text(
+        "import attrs\nfrom gen_profile.plants.plant import Mechanics\n"
+        "from gen_profile.plants.single_pendulum_crane import PLANT as known\n"
+        "def without(q_u, q_a, p):\n    return Mechanics(mass=[], place=[])\n"
+        f"PLANT = attrs.evolve(known, type='own'{left_out})\n"
+    )
+    (tmp_path / "own.toml").write_text(
+        "plant = {file = 'own.py', L0 = 3.0, m = 100}\nmove = {target = [3.0, 0.0], duration = 9.0}\n"
+        "check = {wind = {force = 98.1}}\n"
+    )
+    if bodies:
+        spec = read_spec(tmp_path / "own.toml")
+        assert in_wind(spec, scenarios(spec)[:1]).loads["payload"] == pytest.approx(
+            3.0 * math.sin(math.atan(0.1))
+        )
+        return
+    with pytest.raises(SpecError, match=r"check\.wind\.force: .*states no bodies.*or remove the wind"):
+        read_spec(tmp_path / "own.toml")
 
 
 def test_the_machine_that_is_held_farthest_aside_is_named():

@@ -16,8 +16,9 @@ of x̃ is bounded in the norm |S e| by::
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Iterator, Mapping
+from functools import cached_property, reduce
+from operator import add
 from typing import Any
 
 import attrs
@@ -26,28 +27,29 @@ from numpy.typing import NDArray
 
 from gen_profile.certificate.arithmetic import balls, chebyshev
 from gen_profile.certificate.arithmetic.affine import Affine
-from gen_profile.certificate.arithmetic.balls import Array, Ball, ball, matmul, shared, stack
+from gen_profile.certificate.arithmetic.balls import Array, Ball, ball, matmul, shared
 from gen_profile.certificate.arithmetic.chebyshev import ROUND_UP
 from gen_profile.certificate.arithmetic.matrices import (
     array,
     entries,
-    full,
     gershgorin,
     matmul_most,
     norm,
     product,
     split,
+    symmetric,
     times,
 )
 from gen_profile.certificate.axes.axis_motion import AxisMotion, Gap, powers, widened
 from gen_profile.certificate.equations import EnclosedEquations
-from gen_profile.certificate.scaling import Scaling
+from gen_profile.certificate.scaling import Scaling, affine_entries
 from gen_profile.certificate.sway_limits import SwayBounds, WatchedSway
 
-TIME_NODES, FEW_TIME_NODES = 16, 8  # for the defect, and for what need not be as close
+TIME_NODES, FEW_TIME_NODES = 12, 8  # for the defect, and for what need not be as close
 MORE_NODES = 4  # than terms, in each parameter: what interpolation misses is bounded roughly
 ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
 PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
+HOPELESS = 0.02  # error of a motion as a share of its size, without its growth: no proof is tried
 FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
 
 
@@ -132,8 +134,13 @@ class Enclosure:
         source = norm(matmul_most(scaling.most, defect))
         size = norm(matmul_most(scaling.most, self._around.most))
         most = size.max(axis=1, keepdims=True)
-        reach = WIDER * self._accumulated(self._still.max(axis=-1), source) + FIRST_GUESS * most
-        off = np.full((*size.shape, self.equations.sway.rows), np.nan)
+        off, still = (
+            np.full((*size.shape, n), np.nan) for n in (self.equations.sway.rows, self._around.shape[-1])
+        )
+        promising = (self._accumulated(0.0 * source, source) <= HOPELESS * most).all(axis=1)
+        if promising.any():
+            still[promising] = self._of(np.flatnonzero(promising))._still
+        reach = WIDER * self._accumulated(still.max(axis=-1), source) + FIRST_GUESS * most
         waiting = np.flatnonzero((reach <= most).all(axis=1))
         for _ in range(ATTEMPTS):
             if not waiting.size:
@@ -141,7 +148,7 @@ class Enclosure:
             some = self._of(waiting)
             s = some.approximation.scaling
             tube = reach[waiting, :, None] * norm(s.inverse_most) * s.slack[..., None]
-            growth, disturbance, slopes, shift = some._tubes(tube * ROUND_UP, self._still[waiting])
+            growth, disturbance, slopes, shift = some._tubes(tube * ROUND_UP, still[waiting])
             error = some._accumulated(growth, source[waiting] + disturbance)
             closed = (error <= reach[waiting]).all(axis=1)
             off[waiting[closed]] = ((slopes * error[..., None] + shift) * ROUND_UP)[closed]
@@ -179,16 +186,12 @@ class Enclosure:
         return rho, 0.5 * (rho + 1.0 / rho)
 
     @cached_property
-    def _range(self) -> tuple[Ball, Ball]:
-        """Enclose x̃ and its slope on ellipses, each (ellipses, boxes, pieces, 2 n_u)."""
-        series, (rho, _) = self.approximation.series, self._ellipses()
-        over_time, *others = chebyshev.weights(rho, series.shape[3:])
-        total = chebyshev.weighted(series, [over_time, *others])
-        slope = over_time @ np.abs(chebyshev.derivative(series.shape[3]))
-        rate = chebyshev.weighted(series, [slope, *others])
+    def _range(self) -> Ball:
+        """Enclose x̃ on ellipses, (ellipses, boxes, pieces, 2 n_u)."""
+        series, rho = self.approximation.series, self._ellipses()[0]
+        total = chebyshev.weighted(series, chebyshev.weights(rho, series.shape[3:]))
         middle = self._around.mid
-        state = Ball(middle, (total - np.abs(middle)) * ROUND_UP + 1e-15 * total)
-        return state, Ball(np.zeros_like(rate), rate) / self.axes.halves[:, None]
+        return Ball(middle, (total - np.abs(middle)) * ROUND_UP + 1e-15 * total)
 
     def _portions(self, counts: tuple[int, ...]) -> Iterator[slice]:
         """Split pieces, so that arrays over their nodes are small."""
@@ -233,23 +236,39 @@ class Enclosure:
         low, high = self.approximation.lower[:, column], self.approximation.upper[:, column]
         return 0.5 * (low + high), 0.5 * (high - low)
 
-    def _parameters(self, reach: Array | None = None) -> list[Ball | Affine]:
-        """All parameters: of whole boxes, (boxes, 1), or on ellipses, (ellipses, boxes, 1)."""
+    def _parameters(self, far: Mapping[int, Array] | None = None) -> list[Ball | Affine]:
+        """All parameters: of whole boxes, (boxes, 1), or as far out as ellipses, (ellipses, boxes, 1)."""
         parameters: list[Ball | Affine] = [ball(value) for value in self.approximation.nominal.tolist()]
-        columns = range(len(self.approximation.varied))
-        far = {k: np.ones(()) if reach is None else reach[:, 1 + k, None, None] for k in columns}
+        far = dict.fromkeys(self._symbols, np.ones(())) if far is None else far
         for k, number in enumerate(self.approximation.varied):
             middle, half = (part[:, None] for part in self._middle(k))
             rad = (middle.rad + half.rad * far[k]) * ROUND_UP
             parameters[number] = Affine(middle.mid, {k: half.mid}, rad, far)
         return parameters
 
+    @property
+    def _symbols(self) -> range:
+        """Number what parameters depend on."""
+        return range(len(self.approximation.varied))
+
+    @cached_property
     def _state_on_ellipses(self) -> tuple[list[Any], ...]:
-        """List all that equations depend on, on ellipses: each (ellipses, boxes, pieces)."""
-        reach = self._ellipses()[1]
-        over_time = reach[:, :1, None, None]
-        q_a, v = (split(self._axes_on(over_time, order), -1) for order in (0, 1))
-        return split(self._range[0], -1), q_a, v, self._parameters(reach)
+        """List all that equations depend on, on ellipses: each (ellipses, boxes, pieces).
+
+        All of it is linear in polynomials of fewer degrees than there are nodes (of the parameters, and where
+        nodes are `fine` of time, too). These are interpolated exactly, so that only what is nonlinear in them
+        counts for what interpolation misses (`Affine.beyond`).
+        """
+        wide = self._ellipses()[1]
+        far = {k: wide[:, 1 + k, None, None] for k in self._symbols}
+        parameters, state = self._parameters(far), list[list[Affine]]()
+        axes = (self._axes_on(wide[:, :1, None, None], order) for order in (0, 1))
+        for column in (self._range, *axes):
+            state.append([])
+            for one in split(column, -1):
+                far[len(far)] = one.rad
+                state[-1].append(Affine(one.mid, {len(far) - 1: np.ones(())}, np.zeros(()), far))
+        return *state, parameters
 
     def _interpolation_error(self, most: Array, counts: tuple[int, ...]) -> Array:
         """Bound what interpolation misses, by what there is at most on ellipses, (ellipses, boxes, …)."""
@@ -279,10 +298,10 @@ class Enclosure:
                 chebyshev.total(chebyshev.interpolated(one, self.variables), self.variables) for one in each
             ]
             defects.append(np.stack(sums, axis=2))
-        rate = split(self._range[1], -1)
-        f = self.equations.rate(*self._state_on_ellipses())
-        most = stack([dx - row[0] for dx, row in zip(rate, f, strict=True)], axis=-1).most
-        return np.concatenate(defects, axis=1) + self._interpolation_error(most, self.fine)
+        f = self.equations.rate.evaluated(*self._state_on_ellipses)
+        shape = self._range.shape[:3]
+        remainder = np.stack([np.broadcast_to(row[0].rad, shape) for row in f], axis=-1)
+        return np.concatenate(defects, axis=1) + self._interpolation_error(remainder, self.fine)
 
     def _whole(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Ball:
         """Give values at nodes, of which some may be alike, their full shape."""
@@ -374,36 +393,35 @@ class Enclosure:
         a, counts = self.approximation, self.coarse
         scaling, size = a.scaling, a.series.shape[2]
         to, back = (chebyshev.evaluated(s, counts[1:]) for s in (scaling.series, scaling.inverse))
-        mids, rests = [], []
+        far = symmetric(self._turned_on_ellipses())
+        mid, rad = np.empty((2, *self._around.shape[:2], size, size))
         for rows in self._portions(counts):
             jacobian = self.equations.jacobian(*self._state_at(counts, rows))
-            transformed = product(product(entries(to, rows), jacobian), entries(back, rows))
-            for i, j in np.ndindex(size, size):
-                whole = self._whole(0.5 * (transformed[i][j] + transformed[j][i]), counts, rows)
-                series = chebyshev.interpolated(whole, self.variables)
+            transformed = symmetric(product(product(entries(to, rows), jacobian), entries(back, rows)))
+            for i, j in zip(*np.tril_indices(size), strict=True):
+                series = chebyshev.interpolated(self._whole(transformed[i][j], counts, rows), self.variables)
                 first = chebyshev.first(series.mid, self.variables)
-                mids.append(first)
-                rests.append((chebyshev.total(series, self.variables) - np.abs(first)) * ROUND_UP)
+                rest = chebyshev.total(series, self.variables) - np.abs(first)
+                mid[:, rows, i, j], rad[:, rows, i, j] = first, rest * ROUND_UP
+        for i, j in zip(*np.tril_indices(size), strict=True):
+            rad[..., i, j] += self._interpolation_error(self._missed_by_few(far[i][j]), counts)
+            mid[..., j, i], rad[..., j, i] = mid[..., i, j], rad[..., i, j]
+        return gershgorin(Ball(mid, (rad + 1e-14 * np.abs(mid)) * ROUND_UP))
 
-        def joined(parts: list[Array]) -> Array:
-            split = [np.stack(parts[n : n + size**2], axis=-1) for n in range(0, len(parts), size**2)]
-            whole = np.concatenate(split, axis=1)
-            return whole.reshape(*whole.shape[:2], size, size)
-
-        most = self._turned_on_ellipses()
-        rest = joined(rests) + self._interpolation_error(0.5 * (most + np.swapaxes(most, -1, -2)), counts)
-        return gershgorin(Ball(joined(mids), (rest + 1e-14 * np.abs(joined(mids))) * ROUND_UP))
-
-    def _turned_on_ellipses(self) -> Array:
-        """Bound S J S⁻¹ on ellipses, (ellipses, boxes, pieces, 2 n_u, 2 n_u)."""
-        rho, scaling = self._ellipses()[0], self.approximation.scaling
-        shape = (len(rho), *self.approximation.series.shape[:2])
-        jacobian = array(self.equations.jacobian(*self._state_on_ellipses()), shape).most
-        to, back = (
-            chebyshev.weighted(series, chebyshev.weights(rho[:, 1:], series.shape[4:]))
-            for series in (scaling.series, scaling.inverse)
+    def _missed_by_few(self, value: Affine) -> Array:
+        """Bound what is not interpolated exactly where nodes of time are few: all that changes in time."""
+        shape, times = self._range.shape[:3], len(ELLIPSES)
+        over_time, over_parameters = (
+            np.broadcast_to(one, shape) for one in (value.beyond(self._symbols), value.rad)
         )
-        return np.asarray(to @ jacobian @ back * ROUND_UP)
+        return np.concatenate([over_time[:times], over_parameters[times:]])
+
+    def _turned_on_ellipses(self) -> list[list[Affine]]:
+        """Enclose S J S⁻¹ on ellipses, each entry (ellipses, boxes, pieces)."""
+        scaling, state = self.approximation.scaling, self._state_on_ellipses
+        rho, far = self._ellipses()[0][:, 1:], state[0][0].reach
+        to, back = (affine_entries(series, rho, far) for series in (scaling.series, scaling.inverse))
+        return product(product(to, self.equations.jacobian.evaluated(*state)), back)
 
     def _growth(self, near: Ball, tube: Array, still: Array) -> Array:
         """Bound the logarithmic norm of S J S⁻¹ within a tube, (boxes, pieces)."""
@@ -445,36 +463,35 @@ class Enclosure:
         pieces = slice(begun, None)
         x, q_a, _, p = self._state_at(self.fine, pieces)
         at_nodes = [self._whole(row[0], self.fine, pieces) for row in self.equations.sway(x[:n_u], q_a, p)]
-        x, q_a, _, p = self._state_on_ellipses()
-        shape = (*self._range[0].shape[:3],)
-        far = [full(row[0], shape) for row in self.equations.sway(x[:n_u], q_a, p)]
+        x, q_a, _, p = self._state_on_ellipses
+        far = [row[0] for row in self.equations.sway.evaluated(x[:n_u], q_a, p)]
         bounds, largest_met = np.zeros((2, len(off), len(self.watches)))
         for column, watch in enumerate(self.watches):
             loads, since = watch.loads, slice(watch.first - begun, None)
             away = norm(off[:, watch.first :, loads]).max(axis=1)
             bounds[:, column], largest_met[:, column] = self._greatest(
                 [one[:, since] for one in at_nodes[loads]],
-                [one[:, :, watch.first :] for one in far[loads]],
+                far[loads],
+                watch.first,
                 targets[column] - away,
             )
             bounds[:, column] = (bounds[:, column] + away) * ROUND_UP
         return SwayBounds(sway=bounds, largest_met=largest_met)
 
-    def _greatest(self, at_nodes: list[Ball], far: list[Ball], targets: Array) -> tuple[Array, Array]:
+    def _greatest(
+        self, at_nodes: list[Ball], far: list[Affine], first: int, targets: Array
+    ) -> tuple[Array, Array]:
         """Bound a vector of the approximate motions, and give its greatest length at nodes, each (boxes,).
 
         Of several components the squared length is interpolated, which is as smooth as they are.
         """
         power = 1 if len(at_nodes) == 1 else 2
-        whole, most = (
-            sum((balls.power(one, power) for one in each), start=ball(0.0)) for each in (at_nodes, far)
-        )
+        whole, beyond = (reduce(add, (balls.power(one, power) for one in each)) for each in (at_nodes, far))
+        remainder = np.broadcast_to(beyond.rad, self._range.shape[:3])[:, :, first:]
         series = chebyshev.interpolated(whole, self.variables)
         rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
-        off, targets = (
-            rounding + self._interpolation_error(most.most, self.fine),
-            np.maximum(targets, 0.0) ** power,
-        )
+        off = rounding + self._interpolation_error(remainder, self.fine)
+        targets = np.maximum(targets, 0.0) ** power
         bounds = [chebyshev.greatest(*one) for one in zip(series.mid, off, targets.tolist(), strict=True)]
         largest_met = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
         return np.array(bounds) ** (1.0 / power) * ROUND_UP, largest_met ** (1.0 / power)

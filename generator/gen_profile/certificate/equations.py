@@ -123,6 +123,11 @@ class Enclosed:
 
     def __call__(self, *inputs: Sequence[AffineOperand]) -> list[list[Ball]]:
         """Evaluate on columns of balls, or of what knows its parameters; the result is nested rows."""
+        rows = self.evaluated(*inputs)
+        return [[one if isinstance(one, Ball) else one.ball for one in row] for row in rows]
+
+    def evaluated(self, *inputs: Sequence[AffineOperand]) -> list[list[Any]]:
+        """Evaluate likewise, to what still knows its parameters where an input does."""
         reach = next((x.reach for column in inputs for x in column if isinstance(x, Affine)), None)
         memory: dict[int, Any] = {}
         angles: dict[int, Any] = {}  # of places that hold a hyperbolic sine
@@ -152,7 +157,7 @@ class Enclosed:
                 value = _applied(step.operation, arguments, angles[step.arguments[-1]])
                 angle = arguments[0] if step.operation == "SINH" else None
             memory[step.results[0]], angles[step.results[0]] = value, angle
-        entries = [one if isinstance(one, Ball) else one.ball for _, one in sorted(results.items())]
+        entries = [one for _, one in sorted(results.items())]
         return [entries[row :: self.rows] for row in range(self.rows)]
 
 

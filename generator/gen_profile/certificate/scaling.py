@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 
 import attrs
 import numpy as np
 
 from gen_profile.certificate.arithmetic import chebyshev
+from gen_profile.certificate.arithmetic.affine import Affine
 from gen_profile.certificate.arithmetic.balls import Array, Ball
 from gen_profile.certificate.arithmetic.chebyshev import ROUND_UP
 
@@ -88,6 +90,36 @@ class Scaling:
             start=Ball(0.0, 0.0),
         )
         return chebyshev.interpolated(products, self.variables)
+
+
+def affine_entries(series: Array, rho: Array, far: Mapping[int, Array]) -> list[list[Affine]]:
+    """Take matrices that are polynomials of the parameters apart: what is linear in these, and the rest.
+
+    Parameters
+    ----------
+    series : (boxes, pieces, rows, columns, terms, …) array
+    rho : (ellipses, parameters) array
+        Of the ellipses on which parameters are.
+    far : mapping of int to array
+        How far each parameter is from 0, of `Affine`.
+    """
+    terms, rest = series.shape[4:], series.copy()
+    constant = (0,) * len(terms)
+    unit = {
+        k: tuple(int(k == other) for other in range(len(terms))) for k, count in enumerate(terms) if count > 1
+    }
+    exact = {}
+    for degrees in (constant, *unit.values()):
+        place = (slice(None),) * 4 + degrees
+        exact[degrees] = np.moveaxis(series[place], (2, 3), (0, 1))
+        rest[place] = 0.0
+    off = np.moveaxis(chebyshev.weighted(rest, chebyshev.weights(rho, terms)), (3, 4), (0, 1))
+
+    def entry(i: int, j: int) -> Affine:
+        slopes = {k: exact[degrees][i, j] for k, degrees in unit.items()}
+        return Affine(exact[constant][i, j], slopes, off[i, j], far)
+
+    return [[entry(i, j) for j in range(series.shape[3])] for i in range(series.shape[2])]
 
 
 def _identity(like: Ball) -> Array:

@@ -182,7 +182,11 @@ def _wind(spec: Spec, plant: Plant) -> Iterator[Fault]:
     if spec.check.wind.force == 0.0:
         return
     if not plant.bodies:
-        yield "check.wind.force", "the machine states no bodies (mechanics), so its deflection is not known"
+        yield (
+            "check.wind.force",
+            "the machine's file states no bodies, and equations alone do not tell how far a force holds a "
+            "load aside; state bodies and mechanics in it, or remove the wind",
+        )
     elif not end_load_is_a_body(plant):
         problem = Phrase(
             "wind does not push the {load}, which is no body of the machine; remove it",

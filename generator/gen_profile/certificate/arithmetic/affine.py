@@ -8,7 +8,7 @@ determinant of a crane's matrix of inertia is a small difference of terms that c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import attrs
 import numpy as np
@@ -40,12 +40,17 @@ class Affine:
     @property
     def off(self) -> Array:
         """Bound how far a number is from its midpoint."""
-        return np.asarray((self._turned(self.slopes) + self.rad) * UPWARD)
+        return self.beyond(())
 
     @property
     def ball(self) -> Ball:
         """Forget what depends on what."""
         return Ball(self.mid, self.off)
+
+    def beyond(self, linear: Collection[int]) -> Array:
+        """Bound how far a number is from a linear function of some of what it depends on."""
+        others = {k: slope for k, slope in self.slopes.items() if k not in linear}
+        return np.asarray((self._turned(others) + self.rad) * UPWARD)
 
     def _turned(self, slopes: Mapping[int, Array]) -> Array:
         """Bound what slopes add up to."""

@@ -42,6 +42,7 @@ class Ball:
 
     mid: Any
     rad: Any
+    _size: Any = None
 
     # so that NumPy leaves `array * ball` to the ball
     __array_ufunc__ = None
@@ -59,16 +60,15 @@ class Ball:
     def __mul__(self, other: Operand) -> Ball:
         """Multiply."""
         b = ball(other)
-        mid, (size, other_size) = self.mid * b.mid, _sizes(self, b)
-        return _rounded(mid, size * b.rad + self.rad * (other_size + b.rad))
+        return _rounded(self.mid * b.mid, self.size * b.rad + self.rad * (b.size + b.rad))
 
     def __truediv__(self, other: Operand) -> Ball:
         """Divide; by what may be zero gives everything."""
         b = ball(other)
-        mid = self.mid / b.mid
-        away = np.abs(b.mid) - b.rad
-        error = self.rad + np.abs(mid) * b.rad + UNIT * np.abs(self.mid) + LEAST  # before it is divided
-        return _rounded(mid, _shared(np.where(away > 0.0, error / away, np.inf), self.rad, b.rad))
+        mid, rads = self.mid / b.mid, (self.rad, b.rad)
+        away = -_shared(-np.abs(b.mid), *rads) - b.rad
+        error = self.rad + _shared(np.abs(mid), *rads) * b.rad + UNIT * self.size + LEAST  # before dividing
+        return _rounded(mid, np.where(away > 0.0, error / away, np.inf))
 
     def __neg__(self) -> Ball:
         """Negate, exactly."""
@@ -92,6 +92,13 @@ class Ball:
     def reshape(self, *shape: int) -> Ball:
         """Take the numbers in another shape."""
         return Ball(np.reshape(self.mid, shape), np.reshape(self.rad, shape))
+
+    @property
+    def size(self) -> Any:
+        """Upper bound of midpoints, one for all numbers that share a radius."""
+        if self._size is None:
+            object.__setattr__(self, "_size", _shared(np.abs(self.mid), self.rad))
+        return self._size
 
     @property
     def most(self) -> Array:
@@ -162,14 +169,10 @@ def _shared(values: Any, *rads: Any) -> Any:
     return values.max(axis=axes, keepdims=True)
 
 
-def _sizes(a: Ball, b: Ball) -> tuple[Any, Any]:
-    """Bound midpoints, for numbers that share a radius all at once."""
-    return _shared(np.abs(a.mid), a.rad, b.rad), _shared(np.abs(b.mid), a.rad, b.rad)
-
-
 def _rounded(mid: Any, error: Any, unit: float = UNIT) -> Ball:
     """Add the rounding of a midpoint to what else it misses."""
-    return Ball(mid, (error + unit * _shared(np.abs(mid), error)) * UPWARD + LEAST)
+    size = _shared(np.abs(mid), error)
+    return Ball(mid, (error + unit * size) * UPWARD + LEAST, size)
 
 
 def _evaluated(mid: Any, error: Any, x: Ball) -> Ball:

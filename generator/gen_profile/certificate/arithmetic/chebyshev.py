@@ -20,6 +20,7 @@ from gen_profile.certificate.arithmetic.balls import UNIT, Array, Ball
 
 COSINE = 32 * UNIT  # by which a cosine here may be off, its argument's rounding included
 ROUND_UP = 1.0 + 1e-12  # outweighs the rounding of sums of up to 9000 terms, 2⁻⁵³ each
+MOST_TOGETHER = 256  # values that a matrix of several variables sums up
 TINY = 1e-5  # of a bound, up to which coefficients of the highest degrees are not halved any more
 PORTION, MOST_WORK = 2**18, 2**31  # coefficients that are halved at once, and in all
 NEAR = 1.005  # of the greatest value seen: how closely a bound is sought
@@ -48,7 +49,7 @@ def evaluated(series: Array, counts: Sequence[int]) -> Ball:
     """Evaluate series at nodes; all values of a series share a radius."""
     terms = series.shape[series.ndim - len(counts) :]
     matrices = [values_at_nodes(*sizes) for sizes in zip(counts, terms, strict=True)]
-    off = sum(2.0 * COSINE + (size + 4) * UNIT for size in terms)
+    off = 2.0 * COSINE * len(terms) + _rounding(matrices)
     return Ball(_turned(matrices, series), _sum(np.abs(series), len(counts)) * off * ROUND_UP)
 
 
@@ -57,9 +58,10 @@ def interpolated(values: Ball, variables: int) -> Ball:
     counts = np.shape(values.mid)[np.ndim(values.mid) - variables :]
     size = np.abs(values.mid).max(axis=tuple(range(-variables, 0)), keepdims=True)
     most = 2.0**variables  # as no row of such a matrix sums to more than 2
-    off = sum(2.0 * COSINE * count + (count + 4) * UNIT for count in counts)
+    matrices = [coefficients_of(count) for count in counts]
+    off = 2.0 * COSINE * sum(counts) + _rounding(matrices)
     rad = most * (values.rad + size * off) * ROUND_UP
-    return Ball(_turned([coefficients_of(count) for count in counts], values.mid), rad)
+    return Ball(_turned(matrices, values.mid), rad)
 
 
 def interpolate(values: Array, variables: int) -> Array:
@@ -69,10 +71,30 @@ def interpolate(values: Array, variables: int) -> Array:
 
 def _turned(matrices: Sequence[Array], values: Array) -> Array:
     """Let a matrix act on each of the last axes."""
-    first = values.ndim - len(matrices)
-    for matrix in matrices:  # each time the first of these axes becomes the last one
-        values = np.tensordot(values, matrix, axes=(first, 1))
-    return values
+    shape = (*values.shape[: values.ndim - len(matrices)], *(len(matrix) for matrix in matrices))
+    after = 1
+    for matrix in _together(matrices):
+        values = values.reshape(-1, matrix.shape[1], after)
+        values = values[..., 0] @ matrix.T if after == 1 else matrix @ values
+        after *= len(matrix)
+    return values.reshape(shape)
+
+
+def _together(matrices: Sequence[Array]) -> list[Array]:
+    """Let small matrices of several axes act at once, as their Kronecker product; of the last axes first."""
+    joined: list[Array] = []
+    for matrix in reversed(matrices):
+        if joined and joined[-1].shape[1] * matrix.shape[1] <= MOST_TOGETHER:
+            joined[-1] = np.asarray(np.kron(matrix, joined[-1]), dtype=np.float64)
+        else:
+            joined.append(matrix)
+    return joined
+
+
+def _rounding(matrices: Sequence[Array]) -> float:
+    """Bound the rounding of sums and of products of entries, as a share of the absolute terms."""
+    summed = sum(matrix.shape[1] for matrix in _together(matrices))
+    return UNIT * float(summed + 4 * len(matrices))
 
 
 def _sum(values: Array, variables: int) -> Array:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import add
+from typing import Any
+
 import numpy as np
 
-from gen_profile.certificate.arithmetic.balls import Array, Ball, ball, stack
+from gen_profile.certificate.arithmetic.affine import Affine
+from gen_profile.certificate.arithmetic.balls import Array, Ball, stack
 from gen_profile.certificate.arithmetic.chebyshev import ROUND_UP
 
 
@@ -55,16 +60,22 @@ def entries(values: Ball, rows: slice) -> list[list[Ball]]:
     return [[Ball(*pair) for pair in zip(*row, strict=True)] for row in zip(mid, rad, strict=True)]
 
 
-def product(a: list[list[Ball]], b: list[list[Ball]]) -> list[list[Ball]]:
-    """Multiply matrices of balls, many of which are nothing."""
+def product(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
+    """Multiply matrices of balls, or of what knows its parameters, many of which are nothing."""
     columns = list(zip(*b, strict=True))
 
-    def entry(row: list[Ball], column: tuple[Ball, ...]) -> Ball:
-        products = (x * y for x, y in zip(row, column, strict=True) if _is_some(x) and _is_some(y))
-        return sum(products, start=ball(0.0))
+    def entry(row: list[Any], column: tuple[Any, ...]) -> Any:
+        products = [x * y for x, y in zip(row, column, strict=True) if _is_some(x) and _is_some(y)]
+        return reduce(add, products) if products else 0.0 * row[0]
 
     return [[entry(row, column) for column in columns] for row in a]
 
 
-def _is_some(x: Ball) -> bool:
-    return bool(np.any(x.rad)) or bool(np.any(x.mid))
+def symmetric(a: list[list[Any]]) -> list[list[Any]]:
+    """Take the symmetric part, below its diagonal and on it."""
+    return [[0.5 * (a[i][j] + a[j][i]) for j in range(i + 1)] for i in range(len(a))]
+
+
+def _is_some(x: Ball | Affine) -> bool:
+    slopes = x.slopes.values() if isinstance(x, Affine) else ()
+    return any(bool(np.any(part)) for part in (x.mid, x.rad, *slopes))
