@@ -8,11 +8,9 @@ import numpy as np
 
 VARIATIONS = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated errors: machines watched
 TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
-ADMITTED, PULSE_ADMITTED = (
-    0.7,
-    0.8,
-)  # of what an epoch may leave: more is refused
+ADMITTED = 0.8  # of what an epoch may leave: no plan or pulse that leaves more, if that is more than now
 LEAST_ROOM, STOP_ROOM = 0.15, 0.4  # of the allowed sway, that an epoch may leave at least; where it stops
+KEPT_BACK = 0.15  # of what it may leave, towards its end
 BETWEEN = 1.05  # of the sway on the machines watched: those between them
 CLOSE = 1.25  # rad, up to which that holds: between two of them, after an epoch; 1 / cos(CLOSE / 4)
 SPREAD = 3.2 * CLOSE  # rad, from none to the whole error: epochs end; up to a quarter later on the way
@@ -51,8 +49,8 @@ def real(fine: int, least_decay: float) -> dict[str, float]:
         "cLeastDecay": least_decay,
         "cLeastRoom": LEAST_ROOM,
         "cStopRoom": STOP_ROOM,
+        "cKeptBack": KEPT_BACK,
         "cTighter": TIGHTER,
         "cAdmitted": ADMITTED,
-        "cPulseAdmitted": PULSE_ADMITTED,
         "cVariationSum": float(np.sum(np.power(VARIATIONS, 4))),
     }

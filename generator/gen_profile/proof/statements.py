@@ -40,7 +40,7 @@ from gen_profile_exporters.planner.error_constants import SPREAD
 BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
-USED_UP = 0.65  # of the allowed sway: plans are refused from 0.7 on
+USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
