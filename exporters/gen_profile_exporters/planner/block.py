@@ -427,16 +427,14 @@ def _cycle_work(c: PlannerConstants) -> int:
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    left = _work(c) - _cycle_work(c) - 20 - conditions * conditions - 100
+    left = _work(c) - _cycle_work(c) - of_errors.FINE_BEGIN - 120 - conditions * conditions
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
-    axes = len(c.axes)
-    return (_work(c) - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // (
-        55 + (5 * ZONES if c.zones else 0)
-    )
+    spent = _cycle_work(c) + of_errors.FINE_BEGIN + 80 + (1 + 3 * len(c.axes)) * FUTURE
+    return (_work(c) - spent) // (55 + (5 * ZONES if c.zones else 0))
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:

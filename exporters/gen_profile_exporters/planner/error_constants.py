@@ -17,7 +17,7 @@ SPREAD = 3.2 * CLOSE  # rad, from none to the whole error: epochs end; up to a q
 MOST_FINE, LEAST_FINE = 128, 16  # finer machines of each mode
 FINE_WORK = 0.1  # of a cycle's operations, that they take at most
 FINE_STEP = 17  # operations of one
-FINE_BEGIN = 240  # where those of another mode begin
+FINE_BEGIN = 150  # where those of another mode begin
 
 
 def finer(operations: int, slot: int, modes: int) -> int:
@@ -31,12 +31,13 @@ def whole(fine: int, slot: int, modes: int) -> dict[str, int]:
         "cVariations": len(VARIATIONS),
         "cFine": fine,
         "cFineChunk": -(-fine * modes // (slot - 1)),
+        "cFineBegin": FINE_BEGIN,
     }
 
 
 def cycle_work(constants: Mapping[str, int]) -> int:
-    """Count the floating-point operations that finer machines take in a cycle."""
-    return FINE_STEP * constants["cFineChunk"] + FINE_BEGIN if "cFineChunk" in constants else 0
+    """Count the floating-point operations that finer machines take in a cycle, where no mode begins."""
+    return FINE_STEP * constants.get("cFineChunk", 0)
 
 
 def real(fine: int, least_decay: float) -> dict[str, float]:
