@@ -96,20 +96,9 @@ def test_a_stick_has_its_velocity_soon_and_stops_without_speeding_up(text, rope,
     assert np.flatnonzero(velocity)[-1] * CYCLE < 1.25 * within
 
 
-def test_a_hand_in_time_with_the_swing_breaks_no_promise(text):
-    """Slopes of zero left 92 mm after 64 reversals, with the promise held."""
-    driver = standing(text, 9.0, 2000.0).hold(0.1, bVelocity=1, fVelocityCommand=0.0)
-    for number in range(64):
-        driver.hold(3.125, fVelocityCommand=VELOCITY * (-1.0) ** number)
-    out = driver.hold(40.0, fVelocityCommand=0.0).outputs
-    found = worst(out["fVelocity"], 9.0, 2000.0)
-    assert found < 1.2 * LIMIT
-    assert found < LIMIT or not out["bPromise"][-1]
-
-
 def test_a_block_that_forgets_what_was_left_breaks_it(text):
-    """The test above sees it."""
-    forgets = text.replace("IF (nState <> cMoving) OR (nTick + 1 = nSlot / 2) THEN", "IF FALSE THEN")
+    """By what a hand in time with the swing leaves."""
+    forgets = text.replace("nForgotten := 0;", "nForgotten := cModes;")
     assert forgets != text
     driver = standing(forgets, 9.0, 2000.0).hold(0.1, bVelocity=1, fVelocityCommand=0.0)
     for number in range(64):

@@ -31,3 +31,4 @@ def test_machines_between_those_that_the_block_watches_are_tried_where_a_history
     assert short.poles.shape[1] == len(ERRORS)
     turns = np.diff(np.unique(long.poles[0].imag)) * 1600.0
     assert turns.max() < 0.71
+    assert short.turns == pytest.approx(np.ptp(long.poles.imag, axis=1).max() / 2.0)

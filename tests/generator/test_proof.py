@@ -312,6 +312,14 @@ def test_every_fault_of_a_run_is_told(spec, changed, words):
     assert faults == () if words is None else words in faults[0]
 
 
+def test_errors_may_add_up_in_a_history_that_lasts_long(spec):
+    run, stop = attrs.evolve(GOOD, promise=False), Command(time=0.1, command="stop", live={})
+    history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
+    judged = judge_run(spec, WatchedRun(run=run), history, cycle=CYCLE, number=0, group=RHYTHMS)
+    assert judged.faults == ()
+    assert not judged.promise
+
+
 def test_of_several_axes_the_one_at_fault_is_named():
     spec = parse_spec(GANTRY)
     axes = dict(enumerate([BlockAxis(name="x"), BlockAxis(name="y")]))

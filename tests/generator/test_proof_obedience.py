@@ -218,6 +218,15 @@ def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
 
 
+@pytest.mark.parametrize(
+    ("stated", "reason", "wrong"), [(0.06, 0.0, "kept"), (0.04, 5.0, "lost"), (0.06, 5.0, "")]
+)
+def test_errors_end_the_promise_where_they_may_leave_more_than_allowed(stated, reason, wrong):
+    followed = attrs.evolve(with_output("fSwayLeft", slice(None), stated), sway_limit=0.05)
+    followed.issued["nPromise"][:], followed.issued["bPromise"][:] = reason, reason == 0.0
+    assert kinds(followed) == ({kind_of(WORDS[wrong])} if wrong else set())
+
+
 def test_a_block_that_is_disabled_and_taken_over_has_no_fault():
     assert kinds(disabled()) == set()
 

@@ -83,6 +83,6 @@ def test_a_block_that_forgets_what_was_left_is_found_by_a_rhythm(spec, thrown_ov
     sound = left(spec, text, thrown_over)
     assert sound.faults == ()
     assert 0.01 < sound.left < 0.05
-    forgets = text.replace("IF (nState <> cMoving) OR (nTick + 1 = nSlot / 2) THEN", "IF FALSE THEN")
+    forgets = text.replace("nForgotten := 0;", "nForgotten := cModes;")
     assert forgets != text
     assert any("fSwayLeft states" in fault for fault in left(spec, forgets, thrown_over).faults)

@@ -26,8 +26,8 @@ on the way, and likewise what is for zones and events where there are none.
 - ``calming.st`` calms what sways since live parameters changed. With the left eigenvectors l of the matrix a
   mode is l * sway; what the committed future leaves in it is a sum over its coefficients, as of a plan, and
   so is its slope. A pulse of the kernel's shape that ends where it begins takes both away.
-- ``variations.st``: what the committed future leaves on machines of other frequencies is a state.
-  ``slope_bounds.st`` bounds what past and plan together leave.
+- ``variations.st``, ``left.st``: what the committed future leaves on machines of other frequencies is a
+  state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan together leave.
 - ``sensor.st`` estimates what sways, and ``damping.st`` damps the slowest mode by pulses of another kernel.
 - ``events.st`` tells what is other than in the cycle before.
 - ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
@@ -47,6 +47,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile_exporters.block_source import initialiser
+from gen_profile_exporters.planner import error_constants as of_errors
 from gen_profile_exporters.planner import search_constants as of_search
 from gen_profile_exporters.planner import sensor_constants as of_sensor
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants, axis_interface, axis_words
@@ -67,12 +68,7 @@ CHUNK = 45  # slots that a phase takes at once
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 RAMP_LEAST = 0.05  # of full speed: a change of the stick that is planned for
 RAMP_LEAST_SLOTS = 9
-TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
-PULSE_ADMITTED = 0.9
-ADMITTED = 0.8  # of the allowed sway: no plan that leaves more, if that is more than now
-BETWEEN = 1.05  # of the sway on the machines watched: those between them
 MET = 1e-6  # sum of shares by which a plan may miss a condition
-VARIATIONS = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated errors: machines watched
 HOLD = 0.2  # s, in which an input that is out of range is held
 STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
 ROUNDING = 1e-3  # of a live parameter's greatest rate
@@ -144,6 +140,8 @@ class PlannerConstants:
         frequencies and decays, then of what follows.
     exponents : (parameters, terms) array of int
         Which of them are multiplied.
+    least_decay : float
+        How slowly modes of the stated errors may decay, relative to those of the machine as given.
     modes : int
     model : (rows, terms) array
         Coefficients for the squared frequencies (of two, for their sum and product), for the decays, then
@@ -174,6 +172,7 @@ class PlannerConstants:
     degrees: int
     curvatures: Sequence[float]
     exponents: NDArray[np.int64]
+    least_decay: float
     modes: int
     model: Array
     sensor: of_sensor.SensorConstants | None = None
@@ -295,11 +294,12 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "row": conditions,
         "gram": conditions**2,
         "bounds": 4 * WIDE,
-        "left": axes * modes * len(VARIATIONS),
-        "one": len(VARIATIONS),
-        "variation": modes * len(VARIATIONS),
-        "back": modes * (len(VARIATIONS) + 1),
+        "left": axes * modes * len(of_errors.VARIATIONS),
+        "one": len(of_errors.VARIATIONS),
+        "variation": modes * len(of_errors.VARIATIONS),
+        "back": modes * (len(of_errors.VARIATIONS) + 1),
         "gain": axes * modes,
+        "fine": axes * modes * _fine(c),
         "reach": axes * len(_reach_slots(c)),
         **of_sensor.lengths(c.sensor, modes, c.cycle),
     }
@@ -330,7 +330,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cCycleWork": _cycle_work(c),
         "cMostLonger": MOST_LONGER,
         "cConditions": _conditions(c),
-        "cVariations": len(VARIATIONS) if not c.rates else 0,
+        **_watched(c),
         "cSlotBits": _longest_slot(c).bit_length(),
         "cRampLeastSlots": RAMP_LEAST_SLOTS,
         "cAhead": 2 if c.rates else 1,
@@ -396,6 +396,22 @@ def _reaction(c: PlannerConstants) -> float:
     return max(bound(period) for period in c.periods)
 
 
+def _fine(c: PlannerConstants) -> int:
+    """Finer machines of a mode that what was executed is followed on."""
+    return of_errors.finer(c.operations, _shortest_slot(c), c.modes * len(c.axes))
+
+
+def _watched(c: PlannerConstants) -> dict[str, int]:
+    """On how many machines what errors leave is watched, if it is."""
+    sizes = _fine(c), _shortest_slot(c), c.modes * len(c.axes)
+    return of_errors.whole(*sizes) if c.stated_error and not c.rates else {"cVariations": 0}
+
+
+def _shortest_slot(c: PlannerConstants) -> int:
+    """Cycles in the shortest slot."""
+    return int(min(c.periods) / (SLOTS_PER_PERIOD * c.cycle))
+
+
 def _longest_slot(c: PlannerConstants) -> int:
     """Cycles in the longest slot."""
     return max(1, int(max(c.periods) / (SLOTS_PER_PERIOD * c.cycle)) + 1)
@@ -405,22 +421,20 @@ def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 110 + 4 * c.modes * (4 * c.modes + 17)
     axes = (120 + (following if c.rates else 0) + (23 * ZONES if c.zones else 0)) * len(c.axes)
-    return axes - 35 + of_sensor.cycle_work(c.sensor, c.modes)
+    return axes - 35 + of_errors.cycle_work(_watched(c)) + of_sensor.cycle_work(c.sensor, c.modes)
 
 
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    left = _work(c) - _cycle_work(c) - 20 - 100
+    left = _work(c) - _cycle_work(c) - of_errors.FINE_BEGIN - 120
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
-    axes = len(c.axes)
-    return (_work(c) - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // (
-        55 + (5 * ZONES if c.zones else 0)
-    )
+    spent = _cycle_work(c) + of_errors.FINE_BEGIN + 80 + (1 + 3 * len(c.axes)) * FUTURE
+    return (_work(c) - spent) // (55 + (5 * ZONES if c.zones else 0))
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:
@@ -441,13 +455,9 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
             {}
             if c.rates
             else {
-                "cSwayShare": c.sway_share / len(c.axes),
+                "cSwayShare": c.sway_share / c.sway_limit / len(c.axes),
                 "cSwayLimit": c.sway_limit,
-                "cBetween": BETWEEN,
-                "cTighter": TIGHTER,
-                "cAdmitted": ADMITTED,
-                "cPulseAdmitted": PULSE_ADMITTED,
-                "cVariationSum": float(np.sum(np.power(VARIATIONS, 4))),
+                **of_errors.real(_fine(c), c.least_decay),
             }
         ),
         "cRampLeast": RAMP_LEAST,
@@ -478,7 +488,7 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveBend": c.curvatures or (0.0, 0.0),
-        **({} if c.rates else {"cVariation": VARIATIONS}),
+        **({} if c.rates else {"cVariation": of_errors.VARIATIONS}),
         "cLiveDrift": c.drift or (0.0,),
         "cLiveStep": [c.cycle * c.rates.get(name, 0.0) * (1.0 + ROUNDING) for name in lives],
         "cModel": c.model.ravel(),

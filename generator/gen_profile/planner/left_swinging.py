@@ -56,6 +56,11 @@ class GivenModes:
             poles=np.asarray(poles, dtype=np.complex128), gains=np.array(gains), damped=bool(ratios.any())
         )
 
+    @property
+    def turns(self) -> float:
+        """By how much the stated error turns a mode at most, in rad/s."""
+        return float((self.poles.imag.max(axis=1) - self.poles[:, 0].imag).max())
+
     def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, ...]:
         """Find what sways on where axes stand.
 

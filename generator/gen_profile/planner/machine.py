@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import product
 from types import SimpleNamespace
 
@@ -71,7 +71,7 @@ def live_modes(spec: Spec) -> LiveModes:
         return np.array(
             [
                 *([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares),
-                *(linear.distinct_damping_ratios * linear.distinct_frequencies),
+                *decays(linear),
             ]
         )
 
@@ -120,6 +120,11 @@ def live_modes(spec: Spec) -> LiveModes:
     return LiveModes(modes=modes, live=live, interpolant=interpolant, others=second, error=error)
 
 
+def decays(linear: Linearization) -> Array:
+    """Give how fast the modes decay, in 1/s."""
+    return np.asarray(linear.distinct_damping_ratios * linear.distinct_frequencies)
+
+
 def _curvatures(functions: Callable[[Sequence[float]], Array], variables: int) -> list[float]:
     """Find how each variable bends the first of some functions."""
     return [bend([functions((t * axis).tolist())[0] for t in (-1.0, 0.0, 1.0)]) for axis in np.eye(variables)]
@@ -157,6 +162,19 @@ def frequency_errors(spec: Spec) -> Array:
     return np.asarray(
         np.max([_frequency_errors(spec, point) for point in corners(spec.planner.live)], axis=0)
     )
+
+
+def least_decay(spec: Spec) -> float:
+    """How slowly a mode of the stated errors may decay, as a share of what the machine as given does."""
+    least = 1.0
+    for point in corners(spec.planner.live):
+        as_given = decays(linearized(spec, point))
+        lost = np.zeros_like(as_given)
+        for wrong in _machines_of_errors(spec, point):
+            found = np.min([decays(one) for one in wrong], axis=0)
+            lost += 1.0 - np.minimum(1.0, found / np.maximum(as_given, np.finfo(float).tiny))
+        least = min(least, float(1.0 - lost[as_given > 0.0].max(initial=0.0)))
+    return max(least, 0.0)
 
 
 def left_by_errors(spec: Spec, point: Sequence[float]) -> Array:
@@ -200,14 +218,20 @@ def corners(live: Collection[str]) -> list[Sequence[float]]:
 
 
 def _frequency_errors(spec: Spec, point: Sequence[float]) -> Array:
-    nominal, frequencies = spec.plant.parameters, linearized(spec, point).distinct_frequencies
+    frequencies = linearized(spec, point).distinct_frequencies
     errors = np.zeros_like(frequencies)
+    for wrong in _machines_of_errors(spec, point):
+        errors += np.max([np.abs(one.distinct_frequencies / frequencies - 1.0) for one in wrong], axis=0)
+    return errors
+
+
+def _machines_of_errors(spec: Spec, point: Sequence[float]) -> Iterator[list[Linearization]]:
+    """Linearise machines with each uncertain parameter at its ends."""
+    nominal = spec.plant.parameters
     for name, ends in spec.checked_ranges().items():
         if nominal[name] == 0.0 or (name in spec.planner.live and name in spec.check.spans):
             continue  # of nothing there is no share, and a live one's span says where it may be
-        wrong = [linearized(spec, point, {name: end / nominal[name]}) for end in ends]
-        errors += np.max([np.abs(one.distinct_frequencies / frequencies - 1.0) for one in wrong], axis=0)
-    return errors
+        yield [linearized(spec, point, {name: end / nominal[name]}) for end in ends]
 
 
 def linearized(

@@ -9,7 +9,7 @@ import attrs
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.proof.histories import History
-from gen_profile.proof.numbering import Numbering
+from gen_profile.proof.numbering import LONG, RHYTHMS, Numbering
 from gen_profile.proof.verdict import TAKEN_BACK, JudgedHistory
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.st_to_c import FAULTS
@@ -70,7 +70,7 @@ def judge_run(
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
         left=watched.left,
-        faults=(*_faults(history, run, limits), *watched.faults),
+        faults=(*_faults(history, run, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
     )
 
 
@@ -91,8 +91,8 @@ def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
     return shares
 
 
-def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterator[str]:
-    """Say what is wrong, each in words that end a sentence."""
+def _faults(history: History, run: BlockRun, limits: dict[str, float], *, lasts: bool) -> Iterator[str]:
+    """Say what is wrong, each in words that end a sentence; in one that lasts long errors may add up."""
     if run.fault:
         yield "a setpoint is no number" if run.fault == NO_NUMBER else f"the block {FAULTS[run.fault]}"
         return
@@ -100,7 +100,7 @@ def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterat
         yield from _axis_faults(history, named, axis, limits)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    if not run.promise and not (history.brakes or history.disturbed):
+    if not run.promise and not (history.brakes or history.disturbed or lasts):
         yield TAKEN_BACK
 
 

@@ -35,12 +35,14 @@ from gen_profile.proof.orders import (
     Flags,
     TimedOrder,
 )
+from gen_profile_exporters.planner.error_constants import SPREAD
 
 BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
 USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
+ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
 BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
 AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
@@ -149,6 +151,9 @@ def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     for begin in followed.enabled:
         ready[begin : begin + after] = False
     yield from never("lost", (why == 3.0) & ready)
+    stated = followed.issued.get("fSwayLeft", np.zeros(followed.cycles))
+    yield from never("lost", (why == ADDED_UP) & (stated <= followed.sway_limit))
+    yield from never("kept", promise & (stated > followed.sway_limit))
     may_be, must_be = _unknown(followed, motion)
     yield from never("lost", (why == 2.0) & ~may_be)
     yield from never("kept", promise & must_be)
@@ -370,11 +375,12 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         )  # by frequencies that are rounded
         beside = BESIDE * limit * np.clip(long**2, 1.0, MOST_BESIDE)
         apart = stated[ends] - BETWEEN * watched
-        wrong = np.maximum(apart - OVERSTATED * watched, -apart - AS_STATED * watched) - beside
+        first = np.array(ends) * followed.cycle * followed.modes.turns < SPREAD  # later sizes add up
+        wrong = np.maximum((apart - OVERSTATED * watched) * first, -apart - AS_STATED * watched) - beside
         worst = int(np.argmax(wrong))
         yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        above = (at_most - (1.0 + AS_STATED) * stated[ends] - beside) * promised
+        above = at_most - stated[ends] - BESIDE * limit
         worst = int(np.argmax(above))
         yield Allowance("understated", ends[worst], float(above[worst]), 0.0)

@@ -30,13 +30,12 @@ from gen_profile.proof.orders import (
     TimedOrder,
     read_orders,
 )
-from gen_profile.proof.statements import LEFT
+from gen_profile.proof.statements import ADDED_UP, LEFT
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 
 LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block does not know
-ADDED_UP = 5.0  # nPromise: errors left more than is allowed
 STATED = 1.05  # sway by what the block states: between the machines that it watches
 MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs

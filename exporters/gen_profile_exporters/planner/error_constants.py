@@ -1,0 +1,57 @@
+"""What stated errors leave, as a planner block watches it: constants, and on how many machines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+VARIATIONS = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated errors: machines watched
+TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
+ADMITTED = 0.8  # of what an epoch may leave: no plan or pulse that leaves more, if that is more than now
+LEAST_ROOM, STOP_ROOM = 0.15, 0.4  # of the allowed sway, that an epoch may leave at least; where it stops
+KEPT_BACK = 0.15  # of what it may leave, towards its end
+BETWEEN = 1.05  # of the sway on the machines watched: those between them
+CLOSE = 1.25  # rad, up to which that holds: between two of them, after an epoch; 1 / cos(CLOSE / 4)
+SPREAD = 3.2 * CLOSE  # rad, from none to the whole error: epochs end; up to a quarter later on the way
+MOST_FINE, LEAST_FINE = 128, 16  # finer machines of each mode
+FINE_WORK = 0.1  # of a cycle's operations, that they take at most
+FINE_STEP = 17  # operations of one
+FINE_BEGIN = 150  # where those of another mode begin
+
+
+def finer(operations: int, slot: int, modes: int) -> int:
+    """Give the number of finer machines of a mode, for so many modes of all axes and cycles in a slot."""
+    return max(LEAST_FINE, min(MOST_FINE, int(FINE_WORK * operations / FINE_STEP * (slot - 1) / modes)))
+
+
+def whole(fine: int, slot: int, modes: int) -> dict[str, int]:
+    """Give the constants that count; each cycle takes so many finer machines on that a slot is enough."""
+    return {
+        "cVariations": len(VARIATIONS),
+        "cFine": fine,
+        "cFineChunk": -(-fine * modes // (slot - 1)),
+        "cFineBegin": FINE_BEGIN,
+    }
+
+
+def cycle_work(constants: Mapping[str, int]) -> int:
+    """Count the floating-point operations that finer machines take in a cycle, where no mode begins."""
+    return FINE_STEP * constants.get("cFineChunk", 0)
+
+
+def real(fine: int, least_decay: float) -> dict[str, float]:
+    """Give the others."""
+    return {
+        "cBetween": BETWEEN,
+        "cSpread": SPREAD,
+        "cFineSpread": 0.5 * CLOSE * (fine - 1),
+        "cFineStep": 2.0 / (fine - 1),
+        "cLeastDecay": least_decay,
+        "cLeastRoom": LEAST_ROOM,
+        "cStopRoom": STOP_ROOM,
+        "cKeptBack": KEPT_BACK,
+        "cTighter": TIGHTER,
+        "cAdmitted": ADMITTED,
+        "cVariationSum": float(np.sum(np.power(VARIATIONS, 4))),
+    }
