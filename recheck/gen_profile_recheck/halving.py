@@ -1,0 +1,60 @@
+"""Bounds of an expansion, by halving the ranges of time and parameters."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from flint import arb, arb_mat, arb_poly
+
+from gen_profile_recheck.boxes import Expansion, _t, powers
+
+MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
+
+
+def keeps(one: Expansion, allowed: arb) -> bool:
+    """Tell whether a function's absolute value is proved to be at most so much, halving where it is not."""
+    waiting = [one]
+    for _ in range(MOST_PARTS):
+        if not waiting:
+            return True
+        part = waiting.pop()
+        if part.size <= allowed:
+            continue
+        if not part.rest < allowed or not part.coefficients[0, 0].is_finite():
+            return False
+        axis = _steepest(part)
+        waiting += [_half(part, axis, side) for side in (-1, 1)]
+    return False
+
+
+def _steepest(one: Expansion) -> int:
+    """Choose the variable whose own terms are greatest."""
+    sums = [arb(0)] * len(one.counts)
+    for degrees, entry in zip(product(*map(range, one.counts)), one.coefficients.entries(), strict=True):
+        for axis, degree in enumerate(degrees):
+            sums[axis] += abs(entry) * degree * degree
+    return max(range(len(sums)), key=lambda axis: float(sums[axis].mid()))
+
+
+def _half(one: Expansion, axis: int, side: int) -> Expansion:
+    if axis == 0:
+        return Expansion(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
+    matrix = arb_mat(1, 1, [1])
+    for number, count in enumerate(one.counts[1:], start=1):
+        unit = arb_mat(count, count, [int(i == j) for i in range(count) for j in range(count)])
+        matrix = _kronecker(matrix, _halving(count, side) if number == axis else unit)
+    return Expansion(one.coefficients * matrix.transpose(), one.counts, one.rest)
+
+
+def _kronecker(a: arb_mat, b: arb_mat) -> arb_mat:
+    first, second = a.tolist(), b.tolist()
+    return arb_mat([[x * y for x in row for y in other] for row in first for other in second])
+
+
+def _halving(count: int, side: int) -> arb_mat:
+    """Matrix from Chebyshev coefficients on −1 … 1 to those on a half of it."""
+    inner, columns = arb_poly([arb(side) / 2, arb(1) / 2]), []
+    for k in range(count):
+        poly = _t(k, arb_poly([0, 1]))(inner) if k else arb_poly([1])
+        columns.append([poly[row] for row in range(count)])
+    return powers(count) * arb_mat(columns).transpose()
