@@ -18,10 +18,11 @@ _SECTION = re.compile(
     r"\s*(VAR_IN_OUT|VAR_INPUT|VAR_OUTPUT|VAR(?:\s+CONSTANT)?)\b(.*?)\bEND_VAR\b", re.DOTALL | re.IGNORECASE
 )
 # a comment, or a declaration with the comment behind it; no part looks beyond the next one, or a hostile
-# text would be read again and again
+# text would be read again and again; nor is a possessive group within one that is taken out, as Python before
+# 3.11.4 loses what that holds
 _VARIABLE = re.compile(
     r"\(\*[^*]*+\*\)|(?<!\w)(\w++)\s*+:([^:;]*+)(?::=([^:;]*+))?;"
-    r"(?:[ \t]*+\(\*((?:[^*(]|\*(?!\))|\((?!\*))*+)\*\))?"
+    r"(?:[ \t]*+\(\*((?:[^*(]++|\*(?!\))|\((?!\*))*)\*\))?"
 )
 _ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.IGNORECASE)
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)

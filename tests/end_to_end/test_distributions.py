@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import tarfile
 import zipfile
 from pathlib import Path
 
@@ -28,8 +27,7 @@ def test_who_cites_names_this_version():
 def test_a_wheel_from_the_source_archive_is_that_from_the_checkout(tmp_path):
     build(ROOT, tmp_path / "checkout")
     (archive,) = (tmp_path / "checkout").glob("*.tar.gz")
-    with tarfile.open(archive) as opened:
-        opened.extractall(tmp_path, filter="data")
+    subprocess.run(["tar", "-xf", archive, "-C", tmp_path], check=True)
     build(tmp_path / archive.name.removesuffix(".tar.gz"), tmp_path / "archive", "-t", "wheel")
     (one,), (other,) = (tuple((tmp_path / name).glob("*.whl")) for name in ("checkout", "archive"))
     assert one.read_bytes() == other.read_bytes()

@@ -23,16 +23,16 @@ def text():
 
 
 class Crane:
-    """An instance, what it was told, and what it issued."""
+    """An instance, its inputs, and what it issued."""
 
     def __init__(self, text, rope, load, place=20.0):
         self.block, self.parts = BlockInstance(text), []
-        self.told = self.block.inputs | {"bEnable": 1.0, "fL1": rope, "fm2": load, "fActPosition": place}
+        self.given = self.block.inputs | {"bEnable": 1.0, "fL1": rope, "fm2": load, "fActPosition": place}
         self.hold(4.0)
 
     def hold(self, seconds, **inputs):
-        self.told |= inputs
-        rows = np.tile([*self.told.values()], (max(1, round(seconds / CYCLE)), 1))
+        self.given |= inputs
+        rows = np.tile([*self.given.values()], (max(1, round(seconds / CYCLE)), 1))
         issued = dict(zip(self.block.outputs, self.block.call(rows).T, strict=True))
         kept = ("fVelocity", "fAcceleration", "fSwayLeft", "bPromise", "nPromise", "bDone")
         self.parts.append({name: issued[name].copy() for name in kept})

@@ -176,7 +176,7 @@ def quick(tmp_path_factory):
 def _little_work(quick, monkeypatch):
     """Try no harder to prove a forgery than what it was made of takes."""
     monkeypatch.setattr("gen_profile_recheck.check.MANY_MORE", 0)
-    monkeypatch.setattr(enclosure, "MOST_PARTS", 200)
+    monkeypatch.setattr("gen_profile_recheck.halving.MOST_PARTS", 200)
     check(*contents(*quick))
 
 

@@ -33,7 +33,7 @@ BYTES = {"LREAL": 8, "DINT": 4}
 
 _WITHIN = r"((?:(?!FUNCTION_BLOCK).)*?)"
 _BLOCK = re.compile(
-    r"((?:\(\*(?:(?!\*\)|\(\*).)*+\*\)\s*+)?)FUNCTION_BLOCK\s++\"(\w++)\"\s*+\{[^{}]*+\}\s*+VERSION\s*+:\s*+[\d.]++"
+    r"((?:\(\*(?:[^*(]++|\*(?!\))|\((?!\*))*\*\)\s*+)?)FUNCTION_BLOCK\s++\"(\w++)\"\s*+\{[^{}]*+\}\s*+VERSION\s*+:\s*+[\d.]++"
     rf"{_WITHIN}\bBEGIN\b{_WITHIN}END_FUNCTION_BLOCK",
     re.DOTALL,
 )
