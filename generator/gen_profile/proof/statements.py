@@ -382,6 +382,6 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        above = at_most - stated[ends] - BESIDE * limit * np.clip(2.0 * long, 1.0, MOST_TURNED)
+        above = at_most - stated[ends] - BESIDE * limit * np.clip(5.0 * long, 1.0, MOST_TURNED)
         worst = int(np.argmax(above))
         yield Allowance("understated", ends[worst], float(above[worst]), 0.0)
