@@ -62,7 +62,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
 def _script_hidden() -> Iterator[None]:
     """Let processes start without the script that is running, which each of them would run once more."""
     main = vars(sys.modules["__main__"])
-    hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if name in main}
+    hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if main.get(name)}
     main.update(dict.fromkeys(hidden))
     try:
         yield
