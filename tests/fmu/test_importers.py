@@ -79,6 +79,7 @@ if tuple(map(int, casadi.__version__.split(".")[:2])) >= (3, 8):  # older ones r
             np.array(jacobian(x, u)), _own_jacobian(kind, x, u), rtol=1e-10, atol=1e-12
         )
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("kind", "version"), PAIRS)
     def test_casadi_reads_every_kind(kind, version):
         fmu = cached_fmu(model_of(kind, CRANE), version)
