@@ -52,6 +52,7 @@ def library(swept, tmp_path_factory):
     return path, outcome.document
 
 
+@pytest.mark.slow
 def test_one_file_gives_the_same_library(swept, library, tmp_path):
     path = archived(swept, tmp_path / "swept.sqlite")
     assert run_here("library", path, "--out", tmp_path / "bay 3.st").code == 0

@@ -52,6 +52,7 @@ def test_strangers_are_refused(running):
     assert status(f"{address}made/unknown", **own) == 404
 
 
+@pytest.mark.slow
 def test_a_code_works_once_and_in_any_writing(tmp_path):
     with (tmp_path / "told").open("w+") as stderr, studio(stderr=stderr) as running:
         assert running.enter("") == running.enter("aaaaaaaa") == running.enter("ä") == ""

@@ -52,6 +52,7 @@ def declared(text):
     return dict.fromkeys(found)
 
 
+@pytest.mark.slow
 def test_states_jobs_phases_and_codes_have_names(text):
     bare = rf"\b(?:{'|'.join(CODED)}) (?:<>|[<>:]?=|[<>]) -?\d+\b"
     assert not re.findall(bare, statements(text))

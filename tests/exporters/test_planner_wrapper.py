@@ -80,6 +80,7 @@ def quiet(row):
 
 
 class TestOneAxis:
+    @pytest.mark.slow
     def test_it_is_powered_then_taken_over_where_it_stands_then_guided(self, bench):
         bench.cycle()
         assert bench.cycle()["nstage"] == BLOCK_OFF
@@ -289,6 +290,7 @@ class TestOneAxis:
 
 
 class TestTwoAxes:
+    @pytest.mark.slow
     @pytest.mark.parametrize("number", [0, 1])
     def test_one_that_trips_is_let_go_and_the_other_brakes_at_once(self, two, number):
         under_way(two, fTarget_x=12.0, fTarget_y=8.0)

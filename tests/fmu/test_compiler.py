@@ -94,7 +94,8 @@ def test_a_system_compiler_can_be_named(crane, quintic, monkeypatch, tmp_path):
         expected = zig.run(sample(quintic, 0.01), crane.nominal(), max_step=1e-3, settle=1.0)
         folder = plant_fmu(crane).folder
     monkeypatch.setenv("GEN_PROFILE_CC", f"{system} -DNDEBUG")
-    assert find_compiler().command[:2] == (system, "-DNDEBUG")
+    command = find_compiler().command
+    assert (command[0], command[-1]) == (system, "-DNDEBUG")
     assert plant_fmu(crane).folder != folder
     with PlantCosimulation(crane) as named:
         found = named.run(sample(quintic, 0.01), crane.nominal(), max_step=1e-3, settle=1.0)

@@ -156,6 +156,7 @@ def swings(version):
     return np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joined", [False], indirect=True)
 def test_the_plant_follows_the_planner_in_one_fmu(joined, version):
     """Setpoints are the block's, bit for bit; the loads sway as those of a plant that is led by them."""

@@ -58,6 +58,7 @@ def proof(spec, text):
     return prove(spec, text, histories=40)
 
 
+@pytest.mark.slow
 def test_a_history_against_other_equations(spec, text):
     """The setpoints are those of `planner play`; the machine's rope is 4 % longer than the block is given."""
     machine = dict(spec.plant.parameters) | {"L1": 1.04 * 6.0}
@@ -158,6 +159,7 @@ def test_what_is_found_does_not_depend_on_the_number_of_workers(spec, text, proo
     assert other.to_dict() == proof.to_dict()
 
 
+@pytest.mark.slow
 def test_workers_of_a_scheduler_find_the_same(spec, text, proof):
     with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **LOOPBACK) as cluster:
         other = prove(spec, text, histories=40, scheduler=cluster.scheduler_address)
@@ -351,6 +353,7 @@ def deployed(tmp_path_factory, designed):
     return folder, written.document
 
 
+@pytest.mark.slow
 def test_the_command_line_delivers_what_is_proved(deployed, text):
     folder, document = deployed
     assert (folder / "bay 3.st").read_text() == text

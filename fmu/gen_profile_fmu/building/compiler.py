@@ -81,10 +81,10 @@ def find_compiler(platform: str | None = None) -> Compiler:
 
 
 def _named_compiler(text: str) -> Compiler:
-    command = (*shlex.split(text), *FLAGS, *DEFINITIONS)
-    reported = _run((command[0], "--version"), folder=None, environment=None)
+    program, *options = shlex.split(text)
+    reported = _run((program, "--version"), folder=None, environment=None)
     return Compiler(
-        command=command,
+        command=(program, *FLAGS, *DEFINITIONS, *options),  # the last one of two that contradict counts
         libraries=("-lm",),
         identity="\n".join((text, *FLAGS, sys.platform, machine(), reported)),
     )
