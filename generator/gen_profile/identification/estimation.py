@@ -147,7 +147,7 @@ def _estimate(
     )
 
 
-def _taken_as_exact(fit: Fit) -> list[str]:
+def taken_as_exact(fit: Fit) -> list[str]:
     """Name the parameters that are neither identified nor known anyway."""
     return [q.name for q in fit.machine.plant.parameters if q.name not in (*fit.names, GRAVITY)]
 
@@ -157,7 +157,7 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
 
     The range of a wrong model holds nothing.
     """
-    explained = explanations(fit, _taken_as_exact(fit))
+    explained = explanations(fit, taken_as_exact(fit))
     if not explained:
         return
     model, left = next((m, one) for m, one in zip(fit.models, misfit_of_logs, strict=True) if one is not None)
@@ -193,7 +193,7 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
 
 def _rests_on(around: Uncertainty) -> dict[str, dict[str, float]]:
     """Follow 1 % of every parameter that was taken as exact through the fit, for small swings."""
-    fit, exact = around.fit, _taken_as_exact(around.fit)
+    fit, exact = around.fit, taken_as_exact(around.fit)
     exact = [name for name in exact if fit.machine.parameters[name] != 0.0]
     wider = fit.freed(exact).small()
     places = {name: wider.names.index(name) for name in wider.names}

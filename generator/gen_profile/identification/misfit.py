@@ -194,16 +194,18 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
         candidates = [
             explained
             for freed, one in equivalent.items()
-            if (explained := _nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
+            if (explained := nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
         ]
-        if candidates:
-            return likeliest(candidates)
+        if likely := likeliest(candidates):
+            return likely
         begun = list(equivalent)
     return ()
 
 
 def likeliest(candidates: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """Leave out explanations that another one surpasses beyond chance."""
+    if not candidates:
+        return ()
     noise = np.min([one.noise for one in candidates], axis=0)
     squares = [one.squares(noise) for one in candidates]
     upper = min(squares) + DISTINCT
@@ -243,7 +245,7 @@ def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
     return min(fits, key=lambda one: one.squares)
 
 
-def _nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:
+def nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:
     """Identify the parameters; None where lines are left even so, or a range is of no use."""
     try:
         unknowns, noise = fit.solve()
