@@ -1,6 +1,17 @@
 """The command line: arguments in, one function called, words and exit codes out."""
 
-from gen_profile.cli import can, deployment, fmu, identify, planner, report, robustness, streaming, sweep
+from gen_profile.cli import (
+    can,
+    deployment,
+    fmu,
+    identify,
+    log_swing,
+    planner,
+    report,
+    robustness,
+    streaming,
+    sweep,
+)
 from gen_profile.cli.entry import main
 
 __all__ = [
@@ -8,6 +19,7 @@ __all__ = [
     "deployment",
     "fmu",
     "identify",
+    "log_swing",
     "main",
     "planner",
     "report",
