@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -229,14 +229,30 @@ class OpcUaNode(OpcUaLink):
         self._name = node
         super().__init__(access)
 
-    def number(self) -> tuple[float, float]:
-        """Read when the value was taken, in s by the server's clock, and the value."""
-        value = self._run(self._node.read_data_value())
-        number = None if value.Value is None else value.Value.Value
-        if not isinstance(number, int | float):
-            raise DeploymentError(f"{self._name} holds no number.")
-        stamp = value.SourceTimestamp or value.ServerTimestamp
-        return (time.time() if stamp is None else stamp.timestamp()), float(number)
+    def tables(self, every: float = 0.02, fetched: int = 15) -> Iterator[Array]:
+        """Give times in s by the server's clock, and values, shape (samples, 2), over and over.
+
+        Parameters
+        ----------
+        every : float
+            s between two reads, of which those of one time count once.
+        fetched : int
+            Reads for each table.
+        """
+        last = -np.inf
+        while True:
+            rows = []
+            for _ in range(fetched):
+                value = self._run(self._node.read_data_value())
+                number = None if value.Value is None else value.Value.Value
+                if not isinstance(number, int | float):
+                    raise DeploymentError(f"{self._name} holds no number.")
+                stamp = value.SourceTimestamp or value.ServerTimestamp
+                at = time.time() if stamp is None else stamp.timestamp()
+                if at > last:
+                    rows.append((last := at, float(number)))
+                time.sleep(every)
+            yield np.array(rows, dtype=np.float64).reshape(-1, 2)
 
     async def _connect(self) -> None:
         client = await self._connected()

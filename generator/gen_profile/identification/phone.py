@@ -7,7 +7,8 @@ their values, those after a time alone where it is asked to, and ``/control`` be
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import suppress
 from http.client import HTTPException
 from typing import Any
 from urllib.parse import urlsplit
@@ -19,9 +20,9 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.strict_json import parse_json
 
-TIMEOUT, LOST_FOR, RETRY = 3.0, 15.0, 0.5  # s of an answer, of a lost network, and between two trials then
+TIMEOUT, LOST_FOR, PAUSE = 3.0, 15.0, 0.3  # s of an answer, of a lost network, and between two questions
 MOST_BYTES = 1 << 25
-AXES = "xyz"
+COLUMNS = ("Rate (rad/s)", *(f"Gyroscope {axis} (rad/s)" for axis in "xyz"))
 
 
 class Phone:
@@ -31,8 +32,6 @@ class Phone:
     ----------
     url : str
         As phyphox shows it where remote access is allowed, ``http://192.168.0.42:8080``.
-    pause : callable
-        Lets s pass.
 
     Raises
     ------
@@ -42,97 +41,91 @@ class Phone:
         It does not answer as phyphox does, or measures no rates.
     """
 
-    columns = ("Rate (rad/s)", *(f"Gyroscope {axis} (rad/s)" for axis in AXES))
-
-    def __init__(self, url: str, pause: Callable[[float], None] = time.sleep) -> None:
+    def __init__(self, url: str) -> None:
         parts = urlsplit(url)
         if parts.scheme != "http" or not parts.hostname or parts.query:
             raise SpecError(f"{url}: is no address such as http://192.168.0.42:8080.")
-        self._url, self._pause = url.rstrip("/"), pause
-        self._open = build_opener(ProxyHandler({})).open
-        config = self._ask("config", 0.0)
-        gyroscopes = [
-            {name: buffer for output in one.get("outputs", ()) for name, buffer in output.items()}
-            for one in config.get("inputs", ())
-            if one.get("source") == "gyroscope"
-        ]
-        if not gyroscopes or not gyroscopes[0].keys() >= {*AXES, "t"}:
+        self._url, self._open = url.rstrip("/"), build_opener(ProxyHandler({})).open
+        config = self._ask("config")
+        try:
+            sensors = {one["source"]: one.get("outputs", ()) for one in config["inputs"]}
+            buffers = {name: str(one[name]) for one in sensors.get("gyroscope", ()) for name in one}
+        except (KeyError, TypeError, AttributeError) as error:
+            raise self._strange() from error
+        if not buffers.keys() >= set("txyz"):
             raise OutputError(
                 f"The experiment {config.get('title', '')!r} on the phone measures no rates about three "
                 "axes: open phyphox's experiment Gyroscope there."
             )
-        self._buffers = [gyroscopes[0][name] for name in ("t", *AXES)]
-        self._session, self._began, self._last = "", False, -1.0
+        self._buffers = [buffers[name] for name in "txyz"]
 
-    def begin(self) -> None:
-        """Have the phone measure, if it does not yet; what it measured before does not count."""
-        status = self._status("&".join(self._buffers))
-        self._session = str(status[1].get("session"))
-        earlier = status[0][self._buffers[0]]
-        self._last = max((value for value in earlier if value is not None), default=-1.0)
-        if not status[1].get("measuring"):
-            self._began = self._ask("control?cmd=start", 0.0).get("result") is True
-            if not self._began:
-                raise OutputError("The phone does not begin to measure; press play in phyphox.")
+    def tables(self) -> Iterator[Array]:
+        """Give times in s and rates in rad/s about x, y and z, shape (samples, 4), over and over.
 
-    def rows(self) -> Array:
-        """Give what it measured since the last time: times in s and rates in rad/s about x, y and z."""
+        A phone that does not measure yet is told to, and to end afterwards.
+
+        Raises
+        ------
+        OutputError
+            It does not answer for `LOST_FOR`, or shows another experiment.
+        """
         clock, *rates = self._buffers
-        since = f"{self._last!r}"
-        values, status = self._status(
-            "&".join([f"{clock}={since}", *(f"{one}={since}|{clock}" for one in rates)])
-        )
-        if str(status.get("session")) != self._session:
-            raise OutputError("Another experiment was opened on the phone meanwhile; log again.")
-        columns = [values[name] for name in self._buffers]
-        count = min(map(len, columns))
-        table = np.array([column[:count] for column in columns], dtype=np.float64).T.reshape(-1, 4)
-        table = table[np.isfinite(table).all(axis=1) & (table[:, 0] > self._last)]
-        if len(table):
-            self._last = float(table[-1, 0])
-        return table
+        status, table = self._get("&".join(self._buffers))
+        session, last = status.get("session"), float(np.nanmax(table[:, 0], initial=-1.0))
+        began = not status.get("measuring")
+        if began and self._ask("control?cmd=start").get("result") is not True:
+            raise OutputError("The phone does not begin to measure; press play in phyphox.")
+        try:
+            while True:
+                since = "&".join(f"{one}={last!r}|{clock}" for one in rates)
+                status, table = self._get(f"{clock}={last!r}&{since}")
+                if status.get("session") != session:
+                    raise OutputError("Another experiment was opened on the phone meanwhile.")
+                table = table[np.isfinite(table).all(axis=1) & (table[:, 0] > last)]
+                last = float(table[:, 0].max(initial=last))
+                yield table
+                time.sleep(PAUSE)
+        finally:
+            if began:
+                with suppress(OutputError):
+                    self._ask("control?cmd=stop")
 
-    def end(self) -> None:
-        """Have it measure no longer, if it did not before."""
-        if self._began:
-            self._ask("control?cmd=stop", 0.0)
-
-    def shown(self, table: Array) -> Array:
-        """Put the rate about the axis about which the phone swings before those about its own, in rad/s."""
-        swing = table[:, 1:] - table[:, 1:].mean(axis=0)
-        axis = np.linalg.eigh(swing.T @ swing)[1][:, -1]
-        axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-        return np.column_stack([table[:, 0] - table[0, 0], table[:, 1:] @ axis, table[:, 1:]])
-
-    def _status(self, query: str) -> tuple[dict[str, list[float | None]], dict[str, Any]]:
+    def _get(self, query: str) -> tuple[dict[str, Any], Array]:
         answer = self._ask(f"get?{query}", LOST_FOR)
         try:
-            buffers = {name: list(answer["buffer"][name]["buffer"]) for name in self._buffers}
-            return buffers, dict(answer["status"])
+            columns = [answer["buffer"][name]["buffer"] for name in self._buffers]
+            rows = list(zip(*columns, strict=False))
+            return dict(answer["status"]), np.array(rows, dtype=np.float64).reshape(-1, 4)
         except (KeyError, TypeError, ValueError) as error:
             raise self._strange() from error
 
-    def _ask(self, path: str, patience: float) -> dict[str, Any]:
+    def _ask(self, path: str, patience: float = 0.0) -> dict[str, Any]:
         """Ask for a document, again and again for some s where the network is lost."""
-        began = time.monotonic()
+        until = time.monotonic() + patience
         while True:
             try:
                 with self._open(f"{self._url}/{path}", timeout=TIMEOUT) as reply:
-                    answer = parse_json(reply.read(MOST_BYTES))
-            except ValueError as error:
+                    return dict(parse_json(reply.read(MOST_BYTES)))
+            except (ValueError, TypeError) as error:
                 raise self._strange() from error
             except (OSError, HTTPException) as error:
-                if time.monotonic() - began >= patience:
-                    reason = getattr(error, "reason", error)
+                if time.monotonic() >= until:
                     raise OutputError(
-                        f"{self._url} does not answer ({reason}): allow remote access in phyphox, compare "
-                        "the address that it shows, keep the phone's screen on, and both in one network."
+                        f"{self._url} does not answer ({getattr(error, 'reason', error)}): allow remote "
+                        "access in phyphox, compare the address that it shows, keep the phone's screen on, "
+                        "and both in one network."
                     ) from error
-                self._pause(RETRY)
-                continue
-            if not isinstance(answer, dict):
-                raise self._strange()
-            return answer
+                time.sleep(PAUSE)
 
     def _strange(self) -> OutputError:
         return OutputError(f"{self._url} answers, but not as phyphox does; look at the address and the port.")
+
+
+def about_its_axis(table: Array) -> Array:
+    """Count times from 0; put the rate about the axis of a swing before rates about three axes, if any."""
+    times, values = table[:, 0] - table[0, 0], table[:, 1:]
+    if values.shape[1] == 1:
+        return np.column_stack([times, values])
+    swing = values - values.mean(axis=0)
+    axis = np.linalg.eigh(swing.T @ swing)[1][:, -1]
+    return np.column_stack([times, values @ axis * np.sign(axis[np.argmax(np.abs(axis))]), values])

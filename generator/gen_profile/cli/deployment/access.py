@@ -43,6 +43,20 @@ def access_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def client_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Take what a server is trusted by, and how it is spoken to."""
+    fingerprint = click.option(
+        "--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared."
+    )
+    security = click.option(
+        "--security",
+        type=click.Choice(["sign-and-encrypt", "sign", "none"]),
+        default="sign-and-encrypt",
+        help="Of the connection; sign-and-encrypt by default.",
+    )
+    return fingerprint(access_options(security(command)))
+
+
 @attrs.frozen(kw_only=True)
 class Access:
     """What was asked for of a connection; refused where it does not go together."""
