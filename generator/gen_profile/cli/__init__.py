@@ -2,6 +2,7 @@
 
 from gen_profile.cli import (
     can,
+    commission,
     deployment,
     fmu,
     identify,
@@ -16,6 +17,7 @@ from gen_profile.cli.entry import main
 
 __all__ = [
     "can",
+    "commission",
     "deployment",
     "fmu",
     "identify",

@@ -62,7 +62,7 @@ class Phone:
     def tables(self) -> Iterator[Array]:
         """Give times in s and rates in rad/s about x, y and z, shape (samples, 4), over and over.
 
-        A phone that does not measure yet is told to, and to end afterwards.
+        A phone that does not measure yet begins to, and ends afterwards.
 
         Raises
         ------
