@@ -2,11 +2,9 @@
 
 from gen_profile.cli import (
     can,
-    commission,
+    commissioning,
     deployment,
     fmu,
-    identify,
-    log_swing,
     planner,
     report,
     robustness,
@@ -17,11 +15,9 @@ from gen_profile.cli.entry import main
 
 __all__ = [
     "can",
-    "commission",
+    "commissioning",
     "deployment",
     "fmu",
-    "identify",
-    "log_swing",
     "main",
     "planner",
     "report",

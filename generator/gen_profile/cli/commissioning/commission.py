@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.commands import cli, design
+from gen_profile.cli.commissioning.identify import identify
+from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
-from gen_profile.cli.identify import identify
-from gen_profile.cli.log_swing import log_swing
 from gen_profile.cli.options import PathType, SpecChoice, complete_presets, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.report import report
@@ -59,7 +59,12 @@ def _options_of_others(command: click.Command) -> click.Command:
     "--swing", metavar="CSV|URL", help="Log of a free swing, or a phone's address, as for log-swing."
 )
 @click.option(
-    "--for", "seconds", type=click.FloatRange(min=1.0), default=60.0, help="To log the phone for; 60 s."
+    "--for",
+    "seconds",
+    metavar="SECONDS",
+    type=click.FloatRange(min=1.0),
+    default=60.0,
+    help="To log the phone for; 60 s.",
 )
 @click.option("--export", "formats", metavar="FORMAT", multiple=True, help="Format to write. Repeatable.")
 @click.option(
@@ -74,27 +79,29 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
     asked; SPEC.toml is made where it is not there, and gone on with where it is.
     """
     require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
-    run = _Steps(click.get_current_context(), options, yes)
+    run = _Guide(click.get_current_context(), options, yes)
     with redirect_stdout(sys.stderr) if as_json else nullcontext():
-        run.step("1. The machine, by tape, scale and data sheet")
+        _announce("1. The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
-        run.step("2. A swing, which tells where the rope's pendulum really ends")
+        _announce("2. A swing, which tells where the rope's pendulum really ends")
         log, signal = run.logged(path)
         url = run.answer("url", "Controller to deploy to, as opc.tcp://HOST:PORT; nothing for none", "")
         overrides += ('export.plc_tables="variables"',) * bool(url)
         run.write(path, overrides)
         if log is not None or readings or options["periods"]:
-            run.step("3. What that tells of the machine")
+            _announce("3. What that tells of the machine")
             run.call(identify, spec_path=path, out=path, log=log, readings=readings, **signal)
-        run.step("4. The motion, proved on every machine of the ranges")
+        _announce("4. The motion, proved on every machine of the ranges")
         formats = options["formats"] or run.answer("", "Formats (gen-profile formats)", "plc").split()
         run.call(design, spec_path=path, formats=formats)
         files = run.files()
         page = path.with_suffix(".html")
         run.call(report, spec_path=files[0], path=page, no_compare=True)
         record = None
-        if url and run.agreed(f"The axis stands still, and may be given {files[0].name} now?"):
-            run.step("5. Into the controller")
+        if url and (
+            yes or click.confirm(f"Does the axis stand still, and may {files[0]} be put to use?", err=True)
+        ):
+            _announce("5. Into the controller")
             run.call(deploy, artefact=files[0], url=url)
             record = files[0].parent / "deployments.json"
     document = {
@@ -107,15 +114,15 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
     print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.", as_json)
 
 
-class _Steps:
+def _announce(step: str) -> None:
+    click.secho(f"\n{step}", bold=True, err=True)
+
+
+class _Guide:
     """Answers by options, or else by who is asked, and the commands that are called with them."""
 
     def __init__(self, context: click.Context, options: dict[str, Any], yes: bool) -> None:
         self._context, self._options, self._yes, self._preset = context, options, yes, ""
-
-    def step(self, words: str) -> None:
-        """Say what comes."""
-        click.secho(f"\n{words}", bold=True, err=True)
 
     def answer(self, name: str, question: str, default: str) -> str:
         """Take an option, or ask."""
@@ -123,10 +130,6 @@ class _Steps:
         if given is not None or self._yes:
             return str(default if given is None else given)
         return str(click.prompt(question, default=default, err=True, show_default=bool(default))).strip()
-
-    def agreed(self, question: str) -> bool:
-        """Ask before something moves, or may."""
-        return self._yes or click.confirm(question, err=True)
 
     def call(self, command: click.Command, **more: Any) -> None:
         """Call another command with the options that are its own."""
