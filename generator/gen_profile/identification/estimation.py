@@ -15,7 +15,7 @@ from scipy.stats import norm
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
-from gen_profile.identification.misfit import Misfit, explanations, misfits
+from gen_profile.identification.misfit import Misfit, elsewhere, explanations, misfits
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
@@ -98,9 +98,17 @@ def estimate(
     models = [swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs]
     fit = fit_of(machine, names, readings, models)
     progress("fitting")
-    unknowns, noise = fit.solve()
-    progress("looking at what the fit leaves")
-    around, misfit_of_logs = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
+    try:
+        unknowns, noise = fit.solve()
+        progress("looking at what the fit leaves")
+        around, misfit_of_logs = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
+        again = elsewhere(fit) if any(misfit_of_logs) else None
+    except InfeasibleProblem:
+        if (again := elsewhere(fit)) is None:
+            raise
+    if again is not None:
+        around, noise = uncertainty(again.fit, again.unknowns, again.noise), again.noise
+        misfit_of_logs = misfits(again.fit, again.unknowns)
     if not any(misfit_of_logs):
         return _estimate(around, noise, misfit_of_logs, noise, progress)
     progress("looking for parameters that explain it")
