@@ -7,11 +7,13 @@ from generator.free_swings import inside, swing
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.estimation import estimate
 from gen_profile.identification.fit import SwingingMachine, fit_of
-from gen_profile.identification.measurements import Period, SwingLog
+from gen_profile.identification.identify import identify
+from gen_profile.identification.measurements import Period, SwingLog, parse_reading
 from gen_profile.identification.misfit import Explanation, likeliest, spectrum
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.plants.registry import find_plant
+from gen_profile.spec.reading import preset_spec
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
 TIMES = np.arange(0.0, 15.0, 0.1)
@@ -39,6 +41,19 @@ def test_another_rope_that_is_wrong_is_named():
         estimate(machine, ["L1"], [], [log])
     assert "free " in str(refusal.value)
     assert inside(estimate(machine, ["L1", "L2"], [], [log]), true)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lasts", [12.6, 20.0])
+def test_a_rope_far_from_the_spec_s_is_found(lasts):
+    """The search from 1.5 m ended beside a log of 4 m, or did not come to rest."""
+    spec, times = preset_spec("bay-crane"), np.arange(0.0, lasts, 0.04)
+    true = {**spec.plant.parameters, "L2": 4.0}
+    exact = swing(true, times, [0.012, -0.01, 0.0, 0.004], (8.0,), "double-pendulum-crane")
+    rates = np.gradient(exact, times) + np.random.default_rng(0).normal(0.0, 1e-3, len(times))
+    log = SwingLog(times=times, values=rates, quantity="rate", load="hook")
+    found = identify(spec, [log, parse_reading("L1=6.0±0.01")], "L2").estimate
+    assert inside(found, true) and found.half_range["L2"] < 0.1
 
 
 def test_a_damping_that_is_wrong_is_named():

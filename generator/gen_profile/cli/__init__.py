@@ -1,13 +1,23 @@
 """The command line: arguments in, one function called, words and exit codes out."""
 
-from gen_profile.cli import can, deployment, fmu, identify, planner, report, robustness, streaming, sweep
+from gen_profile.cli import (
+    can,
+    commissioning,
+    deployment,
+    fmu,
+    planner,
+    report,
+    robustness,
+    streaming,
+    sweep,
+)
 from gen_profile.cli.entry import main
 
 __all__ = [
     "can",
+    "commissioning",
     "deployment",
     "fmu",
-    "identify",
     "main",
     "planner",
     "report",

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gen_profile.designs.design import Design
     from gen_profile.designs.planner import Deployment
     from gen_profile.identification.identify import Identification
+    from gen_profile.identification.learning import Learning
     from gen_profile.proof.check import BlockJudgement
     from gen_profile.proof.verdict import Proof
     from gen_profile.report.build import Report
@@ -289,6 +290,25 @@ def identification(identified: Identification, path: Path) -> str:
     rows += [*_stated_ranges(identified), *_rests(identified)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
     return _block(identified.spec.name, rows)
+
+
+def learning(learned: Learning, path: Path) -> str:
+    """Tell which ranges are left, and what the runs showed."""
+    document = learned.to_dict()
+    rows = []
+    for name, row in document["parameters"].items():
+        (low, high), before = row["range"], row["before"]
+        size = f"{low:.5g} to {high:.5g} {row['unit']}"
+        rows.append((name, f"{size} ({before[0]:.5g} to {before[1]:.5g} before)"))
+    for row in document["runs"]:
+        if "seen" in row:
+            rows.append((f"{row['load']}", f"seen {row['seen']:.4g} ± {row['bound']:.2g} m after the motion"))
+            continue
+        left = f"{row['left']:.2g} of {row['swing']:.2g} {row['unit']} RMS left by the best machine"
+        rows.append((f"log of {row['load']}", f"the motion begins at {row['begins_s']:.2f} s; {left}"))
+    rows += [("WARNING", sentence) for sentence in learned.warnings()]
+    rows += [("ranges hold", f"with {document['confidence']:.1%} for each log"), ("wrote", str(path))]
+    return _block(learned.spec.name, rows)
 
 
 def _stated_ranges(identified: Identification) -> Iterator[tuple[str, str]]:

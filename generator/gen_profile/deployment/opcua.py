@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Coroutine
+import time
+from collections.abc import Coroutine, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -142,14 +143,7 @@ class OpcUaLink:
             raise LinkLostError(str(error) or type(error).__name__) from error
 
     async def _connect(self) -> None:
-        access = self._access
-        self._client = client = Client(access.url, timeout=TIMEOUT)
-        client.session_timeout = 1000 * SESSION
-        await self._secure(client)
-        if access.user:
-            client.set_user(access.user)
-            client.set_password(access.password)
-        await client.connect()
+        access, client = self._access, await self._connected()
         instances = [one async for one in _instances(client)]
         path, nodes = _chosen(instances, access.instance, access.url)
         self._request, self._reply, self._state = nodes
@@ -161,6 +155,17 @@ class OpcUaLink:
                     "shortened it, or the block is of another version. Restart the controller's server."
                 )
         self.server = {"url": access.url, "instance": path, "security": access.security, **self.server}
+
+    async def _connected(self) -> Any:
+        access = self._access
+        self._client = client = Client(access.url, timeout=TIMEOUT)
+        client.session_timeout = 1000 * SESSION
+        await self._secure(client)
+        if access.user:
+            client.set_user(access.user)
+            client.set_password(access.password)
+        await client.connect()
+        return client
 
     async def _secure(self, client: Any) -> None:
         """Choose an endpoint, and hold its certificate to the fingerprint that was compared."""
@@ -203,6 +208,61 @@ class OpcUaLink:
         if self._client is not None:
             client, self._client = self._client, None
             await client.disconnect()
+
+
+class OpcUaNode(OpcUaLink):
+    """A connection to one node, whose value is a number.
+
+    Parameters
+    ----------
+    access : OpcUaAccess
+    node : str
+        As in ``ns=4;s=GVL.rAngle``.
+
+    Raises
+    ------
+    DeploymentError
+        The server cannot be reached or trusted, or has no such number.
+    """
+
+    def __init__(self, access: OpcUaAccess, node: str) -> None:
+        self._name = node
+        super().__init__(access)
+
+    def tables(self, every: float = 0.02, fetched: int = 15) -> Iterator[Array]:
+        """Give times in s by the server's clock, and values, shape (samples, 2), over and over.
+
+        Parameters
+        ----------
+        every : float
+            s between two reads, of which those of one time count once.
+        fetched : int
+            Reads for each table.
+        """
+        last = -np.inf
+        while True:
+            rows = []
+            for _ in range(fetched):
+                value = self._run(self._node.read_data_value())
+                number = None if value.Value is None else value.Value.Value
+                if not isinstance(number, int | float):
+                    raise DeploymentError(f"{self._name} holds no number.")
+                stamp = value.SourceTimestamp or value.ServerTimestamp
+                at = time.time() if stamp is None else stamp.timestamp()
+                if at > last:
+                    rows.append((last := at, float(number)))
+                time.sleep(every)
+            yield np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+    async def _connect(self) -> None:
+        client = await self._connected()
+        try:
+            self._node = client.get_node(self._name)
+            await self._node.read_data_value()
+        except (ua.UaStringParsingError, ua.uaerrors.BadNodeIdUnknown, ValueError) as error:
+            raise DeploymentError(
+                f"{self._access.url} has no node {self._name}; write it as in ns=4;s=GVL.rAngle."
+            ) from error
 
 
 def _plain(text: str) -> str:

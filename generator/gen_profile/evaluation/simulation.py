@@ -107,7 +107,7 @@ class PlantSimulation:
     ) -> None:
         self.plant, self.initial, self._profile = plant, initial, profile
         self._p = p = parameter_rows(plant, machines)
-        start, motion = initial_state(plant, initial).reshape(2, -1), _motion(profile)
+        start, motion = initial_state(plant, initial).reshape(2, -1), motion_of(profile)
         ends = [profile.start, profile.target]
         rates = np.array(eigenvalues_at(plant, p, ends))
         fastest = float(np.abs(rates).max())
@@ -211,16 +211,30 @@ def free_swing(
     """
     position = np.array([q_a], dtype=np.float64)
     still = np.concatenate([position, np.zeros((1, 2 * position.size))], axis=1)
-    followed = swing_from(
-        plant,
-        machines,
-        motion=lambda nodes: np.repeat(still, len(nodes), axis=0),
-        start=starts.reshape(len(machines), 2, -1).swapaxes(0, 1),
-        times=times,
+    return driven_swing(
+        plant, machines, motion=lambda nodes: np.repeat(still, len(nodes), axis=0), starts=starts, times=times
     )
-    q_u = np.ascontiguousarray(followed[0].swapaxes(0, 1))
+
+
+def driven_swing(
+    plant: Plant, machines: Array, *, motion: Callable[[Array], Array], starts: Array, times: Array
+) -> tuple[Array, Array]:
+    """Let machines swing from given states while their axes move; see `free_swing` and `swing_from`.
+
+    Returns
+    -------
+    sway, angle : (machines, samples, loads) arrays
+
+    Raises
+    ------
+    CosimulationError
+        The integration fails.
+    """
+    start = starts.reshape(len(machines), 2, -1).swapaxes(0, 1)
+    followed = swing_from(plant, machines, motion=motion, start=start, times=times)
+    q_u, places = np.ascontiguousarray(followed[0].swapaxes(0, 1)), motion(times)[:, : len(plant.actuated)]
     outputs, loads = equations_of(plant)[1], len(plant.loads)
-    values = outputs(q_u, position, machines[:, None])[..., 0]
+    values = outputs(q_u, places, machines[:, None])[..., 0]
     return values[:, :, :loads], values[:, :, loads:]
 
 
@@ -321,7 +335,7 @@ def _sway(plant: Plant) -> tuple[Function, bool]:
     return Function("sway", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, d.sway), sym.depends(d.sway, d.q_a)
 
 
-def _motion(profile: Profile) -> Callable[[Array], Array]:
+def motion_of(profile: Profile) -> Callable[[Array], Array]:
     """Evaluate position, velocity and acceleration of all axes, as rows, without overhead."""
     order = profile.coefficients.shape[1]
     stacked = np.zeros((len(profile.knots), order, 3, profile.axes))  # one segment more: what follows

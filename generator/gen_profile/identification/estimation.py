@@ -15,7 +15,7 @@ from scipy.stats import norm
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
-from gen_profile.identification.misfit import Misfit, explanations, misfits
+from gen_profile.identification.misfit import Misfit, elsewhere, explanations, misfits
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
@@ -98,9 +98,17 @@ def estimate(
     models = [swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs]
     fit = fit_of(machine, names, readings, models)
     progress("fitting")
-    unknowns, noise = fit.solve()
-    progress("looking at what the fit leaves")
-    around, misfit_of_logs = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
+    try:
+        unknowns, noise = fit.solve()
+        progress("looking at what the fit leaves")
+        around, misfit_of_logs = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
+        again = elsewhere(fit) if any(misfit_of_logs) else None
+    except InfeasibleProblem:
+        if (again := elsewhere(fit)) is None:
+            raise
+    if again is not None:
+        around, noise = uncertainty(again.fit, again.unknowns, again.noise), again.noise
+        misfit_of_logs = misfits(again.fit, again.unknowns)
     if not any(misfit_of_logs):
         return _estimate(around, noise, misfit_of_logs, noise, progress)
     progress("looking for parameters that explain it")
@@ -147,7 +155,7 @@ def _estimate(
     )
 
 
-def _taken_as_exact(fit: Fit) -> list[str]:
+def taken_as_exact(fit: Fit) -> list[str]:
     """Name the parameters that are neither identified nor known anyway."""
     return [q.name for q in fit.machine.plant.parameters if q.name not in (*fit.names, GRAVITY)]
 
@@ -157,7 +165,7 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
 
     The range of a wrong model holds nothing.
     """
-    explained = explanations(fit, _taken_as_exact(fit))
+    explained = explanations(fit, taken_as_exact(fit))
     if not explained:
         return
     model, left = next((m, one) for m, one in zip(fit.models, misfit_of_logs, strict=True) if one is not None)
@@ -193,7 +201,7 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
 
 def _rests_on(around: Uncertainty) -> dict[str, dict[str, float]]:
     """Follow 1 % of every parameter that was taken as exact through the fit, for small swings."""
-    fit, exact = around.fit, _taken_as_exact(around.fit)
+    fit, exact = around.fit, taken_as_exact(around.fit)
     exact = [name for name in exact if fit.machine.parameters[name] != 0.0]
     wider = fit.freed(exact).small()
     places = {name: wider.names.index(name) for name in wider.names}

@@ -110,8 +110,8 @@ class SwingLog(Sampled):
 Measurement = DirectReading | Period | SwingLog
 
 
-def parse_reading(text: str) -> DirectReading:
-    """Read ``L1=0.47±0.005``.
+def parse_reading(text: str, option: str = "measured") -> DirectReading:
+    """Read ``L1=0.47±0.005``, given by an option of some name.
 
     Raises
     ------
@@ -126,13 +126,13 @@ def parse_reading(text: str) -> DirectReading:
     if match is None:
         comma = _decimal_points(text)
         raise SpecError(
-            f"measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
+            f"{option} {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
         )
     name, value, uncertainty = match.groups()
     return DirectReading(
         parameter=name,
         value=float(value),
-        uncertainty=_spread(f"measured {text!r}", float(value), float(uncertainty)),
+        uncertainty=_spread(f"{option} {text!r}", float(value), float(uncertainty)),
     )
 
 

@@ -163,6 +163,24 @@ class Explanation:
         return float(residuals @ residuals)
 
 
+def elsewhere(fit: Fit) -> Explanation | None:
+    """Find a fit that leaves nothing but noise, begun at other values of a parameter that was not read."""
+    if not fit.models:
+        return None
+    rough, read = _rough(fit), {getattr(reading, "parameter", "") for reading in fit.readings}
+    begun = (_of_small_swings(rough, name).fit for name in fit.names if name not in read)
+    found = (nothing_left(attrs.evolve(one, models=fit.models), ()) for one in begun)
+    return next((one for one in found if one is not None), None)
+
+
+def _rough(fit: Fit) -> Fit:
+    """Fit fewer averages of the logs."""
+    parameters = fit.machine.parameters
+    logs = [shortened(m.log, m.plant, parameters, m.q_a, ROUGHLY) for m in fit.models]
+    models = (attrs.evolve(m, log=log) for m, log in zip(fit.models, logs, strict=True))
+    return attrs.evolve(fit, models=tuple(models))
+
+
 def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
     """Find which parameters, identified as well, leave nothing but noise of every log.
 
@@ -176,11 +194,7 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
     more : sequence of str
         Parameters that were taken as known.
     """
-    machine = fit.machine
-    logs = [shortened(m.log, m.plant, machine.parameters, m.q_a, ROUGHLY) for m in fit.models]
-    rough = attrs.evolve(
-        fit, models=tuple(attrs.evolve(m, log=log) for m, log in zip(fit.models, logs, strict=True))
-    )
+    rough = _rough(fit)
     begun: list[tuple[str, ...]] = [()]
     for _ in range(min(TRIED, len(more))):
         sets = {
@@ -194,16 +208,18 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
         candidates = [
             explained
             for freed, one in equivalent.items()
-            if (explained := _nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
+            if (explained := nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
         ]
-        if candidates:
-            return likeliest(candidates)
+        if likely := likeliest(candidates):
+            return likely
         begun = list(equivalent)
     return ()
 
 
 def likeliest(candidates: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """Leave out explanations that another one surpasses beyond chance."""
+    if not candidates:
+        return ()
     noise = np.min([one.noise for one in candidates], axis=0)
     squares = [one.squares(noise) for one in candidates]
     upper = min(squares) + DISTINCT
@@ -243,7 +259,7 @@ def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
     return min(fits, key=lambda one: one.squares)
 
 
-def _nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:
+def nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:
     """Identify the parameters; None where lines are left even so, or a range is of no use."""
     try:
         unknowns, noise = fit.solve()

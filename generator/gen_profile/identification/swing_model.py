@@ -93,17 +93,41 @@ class SwingModel:
         slopes : (samples, p + s + 1) array
         """
         count, n = self.samples(until), len(start) - 1
-        step = STEP * (np.abs(start[:n]).max() or 1.0)
+        size = float(np.abs(start[:n]).max()) or 1.0
+        machines, starts, by = self.lanes(parameters, names, steps, start[:n], size)
+        outputs = self._outputs(machines, starts, count)
+        slopes = (outputs[1:] - outputs[0]).T / by
+        return outputs[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
+
+    def lanes(
+        self, parameters: Mapping[str, float], names: Sequence[str], steps: Array, start: Array, size: float
+    ) -> tuple[Array, Array, Array]:
+        """Put machines side by side that tell slopes: the first as it is, then with a step in each unknown.
+
+        Parameters
+        ----------
+        parameters, names, steps
+            As of `residuals`.
+        start : (s,) array
+            Of q_u and q̇_u, those that are shown.
+        size : float
+            Of a swing, a millionth of which is a step of the start.
+
+        Returns
+        -------
+        machines : (1 + p + s, parameters) array
+        starts : (1 + p + s, 2 n_u) array
+        steps : (p + s,) array
+        """
+        n, step = len(start), STEP * size
         order = [q.name for q in self.plant.parameters]
         machines = np.tile([parameters[name] for name in order], (1 + len(names) + n, 1))
         for lane, (name, by) in enumerate(zip(names, steps, strict=True), start=1):
             machines[lane, order.index(name)] += by
         starts = np.zeros((len(machines), 2 * len(self.plant.unactuated)))
-        starts[:, self.shown] = start[:n]
+        starts[:, self.shown] = start
         starts[1 + len(names) + np.arange(n), self.shown] += step
-        outputs = self._outputs(machines, starts, count)
-        slopes = (outputs[1:] - outputs[0]).T / np.concatenate([steps, np.full(n, step)])
-        return outputs[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
+        return machines, starts, np.concatenate([steps, np.full(n, step)])
 
     def _outputs(self, machines: Array, starts: Array, count: int) -> Array:
         """Say what the log would show of machines that begin so: (machines, count)."""

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import tomli_w
 import tomlkit
-from tomlkit.items import Item, Table
+from tomlkit.items import InlineTable, Item, Table
 
 from gen_profile.errors import GenProfileError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import overridden, parse_spec
 
-CHANGED = ("plant", "robustness")
+CHANGED = ("plant", "robustness", "check")
 
 
 def changed_text(text: str, overrides: tuple[str, ...], given: Spec, spec: Spec, folder: Path) -> str:
-    """Write a spec that differs from the one a text states, in parameters and robustness.
+    """Write a spec that differs from the one a text states, in parameters, robustness and check.
 
     Parameters
     ----------
@@ -67,8 +67,13 @@ def _width(item: object) -> int:
 
 def _set(table: tomlkit.TOMLDocument | Table, key: str, before: object, after: object) -> None:
     if isinstance(after, dict) and isinstance(before, dict):
-        if key not in table:
-            table[key] = tomlkit.table()
+        known = table.setdefault(key, tomlkit.table())
+        if (
+            isinstance(known, InlineTable) and not after.keys() <= known.keys()
+        ):  # else the last one lacks its space
+            held = (f"{name} = {tomlkit.item(value).as_string()}" for name, value in after.items())
+            table[key] = tomlkit.value(f"{{ {', '.join(held)} }}")
+            return
         for name, value in after.items():
             _change(table[key], name, before.get(name), value)
     else:

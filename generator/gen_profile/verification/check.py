@@ -136,6 +136,29 @@ def check_artefact(
     )
 
 
+def replayed(path: Path, spec: Spec) -> SampledProfile:
+    """Replay a file as the controller does, by the spec beside it, or by another one of this machine.
+
+    Raises
+    ------
+    OutputError, ExportError
+        It cannot be read.
+    SpecError
+        It moves other axes than the spec's machine.
+    """
+    content, exporter = read_artefact(path), find_exporter(format_of(path))
+    try:
+        own, _ = spec_and_manifest(path, content, None)
+    except OutputError:
+        own = spec
+    setpoints = exporter.replay(content, target_of(own))
+    if setpoints.position.shape[1] != len(spec.machine().actuated):
+        raise SpecError(
+            f"{path} moves {setpoints.position.shape[1]} axes, and the spec's machine has others."
+        )
+    return setpoints
+
+
 def _rows(
     spec: Spec, setpoints: SampledProfile, row: int | None, progress: Progress
 ) -> tuple[tuple[Scenario, ...], int]:

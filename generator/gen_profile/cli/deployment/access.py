@@ -17,6 +17,7 @@ from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from gen_profile.deployment.mailbox import ControllerLink
+    from gen_profile.deployment.opcua import OpcUaAccess
     from gen_profile.deployment.table import BlockTable
 
 _OPC_UA = re.compile(r"opc\.tcp://[^\s/@]+:(\d{1,5})(/\S*)?", re.ASCII)
@@ -40,6 +41,20 @@ def access_options(command: Callable[..., Any]) -> Callable[..., Any]:
     ):
         command = decorate(command)
     return command
+
+
+def client_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Take what a server is trusted by, and how it is spoken to."""
+    fingerprint = click.option(
+        "--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared."
+    )
+    security = click.option(
+        "--security",
+        type=click.Choice(["sign-and-encrypt", "sign", "none"]),
+        default="sign-and-encrypt",
+        help="Of the connection; sign-and-encrypt by default.",
+    )
+    return fingerprint(access_options(security(command)))
 
 
 @attrs.frozen(kw_only=True)
@@ -68,15 +83,21 @@ class Access:
         DeploymentError
         """
         if self.data_block is None:
-            from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
+            from gen_profile.deployment.opcua import OpcUaLink
 
-            values = attrs.asdict(self, filter=attrs.filters.exclude("data_block"))
-            return OpcUaLink(OpcUaAccess(**values, password=password(self.user)))
+            return OpcUaLink(self.opcua())
         from gen_profile.deployment.s7 import TCP_PORT, S7Access, S7Link
 
         host, port, rack, slot = _matched(_S7, self.url)
         place = {"port": int(port or TCP_PORT), "rack": int(rack), "slot": int(slot)}
         return S7Link(S7Access(url=self.url, host=host, block=self.data_block, **place), table)
+
+    def opcua(self) -> OpcUaAccess:
+        """Say how an OPC UA server is reached; ask for the password, if there is to be one."""
+        from gen_profile.deployment.opcua import OpcUaAccess
+
+        values = attrs.asdict(self, filter=attrs.filters.exclude("data_block"))
+        return OpcUaAccess(**values, password=password(self.user))
 
     def _require_s7(self) -> None:
         match = _S7.fullmatch(self.url)

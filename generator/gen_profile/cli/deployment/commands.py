@@ -13,6 +13,7 @@ from gen_profile.cli.deployment.access import (
     MOST_PORT,
     Access,
     access_options,
+    client_options,
     password,
     require_opcua,
     require_s7,
@@ -47,14 +48,7 @@ if TYPE_CHECKING:
     "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
 )
 @click.option("--instance", default="", metavar="PATH", help="Which block, where the server shows several.")
-@click.option("--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared.")
-@access_options
-@click.option(
-    "--security",
-    type=click.Choice(["sign-and-encrypt", "sign", "none"]),
-    default="sign-and-encrypt",
-    help="Of the connection; sign-and-encrypt by default.",
-)
+@client_options
 @click.option("--verify", is_flag=True, help="Only tell whether the controller uses this table.")
 @click.option("--watch", is_flag=True, help="Verify, then hold every setpoint to the table until Ctrl-C.")
 @click.option("--for", "seconds", type=click.FloatRange(min=0.1), metavar="SECONDS", help="Watch so long.")

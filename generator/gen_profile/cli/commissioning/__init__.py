@@ -1,0 +1,5 @@
+"""Commands on site: what is measured there, and what follows from it."""
+
+from gen_profile.cli.commissioning import commission, identify, log_swing
+
+__all__ = ["commission", "identify", "log_swing"]

@@ -1,0 +1,204 @@
+"""The command that leads from a tape measure to a controller: the other commands, one after the other."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext, redirect_stdout
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gen_profile.cli.commands import cli, design
+from gen_profile.cli.commissioning.identify import identify
+from gen_profile.cli.commissioning.log_swing import log_swing
+from gen_profile.cli.deployment.commands import deploy
+from gen_profile.cli.options import PathType, SpecChoice, complete_presets, output_options
+from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.report import report
+from gen_profile.errors import GenProfileError, OutputError
+from gen_profile.plugins import require_installed
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# what it takes of each of the others
+TAKEN: dict[click.Command, tuple[str, ...]] = {
+    identify: ("readings", "periods", "columns", "signal", "unit", "time_unit", "after", "free"),
+    design: ("folder",),
+    deploy: ("data_block", "instance", "fingerprint", "user", "certificate", "security", "by", "key_path"),
+}
+ASKED = {
+    "move.distance": "How far it shall go, in m",
+    "move.duration": "in how many s",
+    "limits.velocity": "The drive's greatest velocity, in m/s",
+    "limits.acceleration": "and acceleration, in m/s²",
+    "check.residual_sway": "Sway that may remain, in m",
+}
+UNCHANGED = "as it is"
+Words = tuple[str, ...]
+
+
+def _options_of_others(command: click.Command) -> click.Command:
+    """Add the options that are handed on."""
+    for other, names in TAKEN.items():
+        command.params += [one for one in other.params if one.name in names]
+    return command
+
+
+@_options_of_others
+@cli.command(epilog="Example: gen-profile commission crane.toml --export plc --to opc.tcp://10.0.0.5:4840")
+@click.argument("path", metavar="SPEC.toml", type=PathType())
+@click.option(
+    "--preset",
+    metavar="NAME",
+    shell_complete=complete_presets,
+    help="What a spec that is not there begins as.",
+)
+@click.option("--set", "overrides", metavar="KEY=VALUE", multiple=True, help="A key of it. Repeatable.")
+@click.option(
+    "--swing", metavar="CSV|URL", help="Log of a free swing, or a phone's address, as for log-swing."
+)
+@click.option(
+    "--for",
+    "seconds",
+    metavar="SECONDS",
+    type=click.FloatRange(min=1.0),
+    default=60.0,
+    help="To log the phone for; 60 s.",
+)
+@click.option("--export", "formats", metavar="FORMAT", multiple=True, help="Format to write. Repeatable.")
+@click.option(
+    "--to", "url", metavar="URL", help="Controller to deploy to, as for deploy; an empty text for none."
+)
+@click.option("--yes", is_flag=True, help="Ask nothing: what no option answers stays as it is.")
+@output_options
+def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
+    """Go from a tape measure to a controller, step by step.
+
+    Measure, log a swing, identify, design, prove, report, deploy, and record it. What no option answers is
+    asked; SPEC.toml is made where it is not there, and gone on with where it is.
+    """
+    require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
+    run = _Guide(click.get_current_context(), options, yes)
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():
+        _announce("1. The machine, by tape, scale and data sheet")
+        overrides, readings = run.measured(path)
+        _announce("2. A swing, which tells where the rope's pendulum really ends")
+        log, signal = run.logged(path)
+        url = run.answer("url", "Controller to deploy to, as opc.tcp://HOST:PORT; nothing for none", "")
+        overrides += ('export.plc_tables="variables"',) * bool(url)
+        run.write(path, overrides)
+        if log is not None or readings or options["periods"]:
+            _announce("3. What that tells of the machine")
+            run.call(identify, spec_path=path, out=path, log=log, readings=readings, **signal)
+        _announce("4. The motion, proved on every machine of the ranges")
+        formats = options["formats"] or run.answer("", "Formats (gen-profile formats)", "plc").split()
+        run.call(design, spec_path=path, formats=formats)
+        files = run.files()
+        page = path.with_suffix(".html")
+        run.call(report, spec_path=files[0], path=page, no_compare=True)
+        record = None
+        if url and (
+            yes or click.confirm(f"Does the axis stand still, and may {files[0]} be put to use?", err=True)
+        ):
+            _announce("5. Into the controller")
+            run.call(deploy, artefact=files[0], url=url)
+            record = files[0].parent / "deployments.json"
+    document = {
+        "spec": str(path),
+        "artefacts": [str(one) for one in files],
+        "report": str(page),
+        "record": record and str(record),
+    }
+    written = ", ".join(str(one) for one in (path, *files, page, record) if one)
+    print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.", as_json)
+
+
+def _announce(step: str) -> None:
+    click.secho(f"\n{step}", bold=True, err=True)
+
+
+class _Guide:
+    """Answers by options, or else by who is asked, and the commands that are called with them."""
+
+    def __init__(self, context: click.Context, options: dict[str, Any], yes: bool) -> None:
+        self._context, self._options, self._yes, self._preset = context, options, yes, ""
+
+    def answer(self, name: str, question: str, default: str) -> str:
+        """Take an option, or ask."""
+        given = self._options.get(name)
+        if given is not None or self._yes:
+            return str(default if given is None else given)
+        return str(click.prompt(question, default=default, err=True, show_default=bool(default))).strip()
+
+    def call(self, command: click.Command, **more: Any) -> None:
+        """Call another command with the options that are its own."""
+        names = TAKEN.get(command, ())
+        self._context.invoke(command, **{**{name: self._options[name] for name in names}, **more})
+
+    def measured(self, path: Path) -> tuple[Words, Words]:
+        """Give keys of the spec and readings; of one that is not there, ask what tape and scale say."""
+        given, readings = tuple(self._options["overrides"]), tuple(self._options["readings"])
+        if path.exists():
+            return given, readings
+        self._preset = self.answer("preset", "Most like which of gen-profile presets", "bay-crane")
+        spec = SpecChoice(None, self._preset, given).spec()
+        asked = {
+            f"plant.{q.name}": f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)"
+            for q in spec.machine().parameters
+            if q.name != "g" and not any(one.startswith(f"{q.name}=") for one in readings)
+        } | (ASKED if len(spec.machine().actuated) == 1 else {})
+        for key, question in asked.items():
+            if not any(one.startswith(f"{key}=") for one in given):
+                given, readings = self._taken(key, question, given, readings)
+        return given, readings
+
+    def _taken(self, key: str, question: str, given: Words, readings: Words) -> tuple[Words, Words]:
+        """Add an answer to the keys or the readings, once it is one that the spec takes."""
+        from gen_profile.identification.measurements import parse_reading
+
+        while (text := self.answer("", question, UNCHANGED)) != UNCHANGED:
+            try:
+                if "±" in text or "+-" in text:
+                    reading = f"{key.removeprefix('plant.')}={text}"
+                    parse_reading(reading)
+                    return given, (*readings, reading)
+                SpecChoice(None, self._preset, (*given, f"{key}={text}")).spec()
+                return (*given, f"{key}={text}"), readings
+            except GenProfileError as error:
+                click.echo(f"Error: {error}", err=True)
+        return given, readings
+
+    def logged(self, path: Path) -> tuple[Path | None, dict[str, str]]:
+        """Give the log of a swing, which a phone may write now, and what it is a log of."""
+        from pathlib import Path
+
+        swing = self.answer(
+            "swing", "Log of a free swing: a file, or a phone's address; nothing for none", ""
+        )
+        if not swing.startswith("http:"):
+            if swing and not Path(swing).is_file():
+                raise OutputError(f"There is no log {swing}; nothing was written.")
+            return (Path(swing) if swing else None), {}
+        log = path.with_name("swing.csv")
+        self.call(log_swing, source=swing, out=log, seconds=self._options["seconds"])
+        return log, {"columns": "1,2", "signal": self._options["signal"].replace("angle", "rate")}
+
+    def write(self, path: Path, overrides: Words) -> None:
+        """Write what was answered into the spec."""
+        from gen_profile.identification.identify import write_spec
+        from gen_profile.spec.reading import parse_spec
+        from gen_profile.spec.text import changed_text
+
+        there = path.exists()
+        text, source, folder = SpecChoice(path if there else None, None if there else self._preset, ()).text()
+        spec = parse_spec(text, overrides, source, folder)
+        write_spec(spec, path, changed_text(text, overrides, spec, spec, folder))
+
+    def files(self) -> list[Path]:
+        """List what was delivered, blocks first."""
+        from gen_profile.artefacts.manifest import FILENAME, parse_manifest
+
+        folder = self._options["folder"]
+        manifest = parse_manifest((folder / FILENAME).read_bytes(), FILENAME)
+        return sorted((folder / one.path for one in manifest.artefacts), key=lambda one: one.suffix != ".st")

@@ -1,0 +1,251 @@
+"""The commands that turn measurements into a spec."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import (
+    InputFile,
+    OutputFile,
+    PathType,
+    SpecChoice,
+    output_options,
+    plot_option,
+    require_formats,
+    spec_options,
+)
+from gen_profile.cli.outcome import fail, print_outcome, warn
+from gen_profile.errors import SpecError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gen_profile.identification.measurements import SwingLog
+    from gen_profile.spec.model import Spec
+
+
+def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add how a table of a swing is read; the command gets what reads one of a spec's machine as `read`."""
+
+    @click.option(
+        "--columns", metavar="TIME,VALUE", default="1,2", help="Columns of the log: names, or numbers."
+    )
+    @click.option(
+        "--signal",
+        metavar="SIGNAL",
+        default="angle",
+        help="What the log's values are: angle, sway or rate (of the angle), of the first load or, as in "
+        "rate:hook, of another.",
+    )
+    @click.option(
+        "--unit",
+        metavar="UNIT",
+        help="Unit of the log's values: rad, deg, m, mm, um, rad/s or deg/s; by default what their column's "
+        "name says; for counts the size of one, as in '0.09 deg'.",
+    )
+    @click.option(
+        "--time-unit",
+        type=click.Choice(["s", "ms", "us"]),
+        help="Unit of its times; by default what their column's name says, or s.",
+    )
+    @wraps(command)
+    def reading(*, columns: str, signal: str, unit: str | None, time_unit: str | None, **options: Any) -> Any:
+        time, comma, value = columns.partition(",")
+        if not comma:
+            raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
+
+        def read(path: Path, spec: Spec, after: float = 0.0) -> SwingLog:
+            from gen_profile.identification.identify import read_swing
+
+            return read_swing(
+                path, spec, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit, after=after
+            )
+
+        return command(read=read, **options)
+
+    return reading
+
+
+@cli.command(epilog="Example: gen-profile identify crane.toml --measured L1=6.2±0.1 --period 51.3±0.3/10")
+@spec_options
+@click.option(
+    "--measured",
+    "readings",
+    metavar="NAME=VALUE±U",
+    multiple=True,
+    help="A parameter read off a tape or scale, with its standard deviation (+- will do for ±). Repeatable.",
+)
+@click.option(
+    "--period",
+    "periods",
+    metavar="[MODE:]S±U[/N]",
+    multiple=True,
+    help="N small swings by stopwatch, of the slowest mode (1) by default. Repeatable.",
+)
+@click.option(
+    "--swing",
+    "log",
+    metavar="CSV",
+    type=PathType(),
+    help="A swing logged while the axes stood still.",
+)
+@log_options
+@click.option(
+    "--after",
+    metavar="SECONDS",
+    type=float,
+    default=0.0,
+    help="Leave out what the log holds before this time; of dates, so long after the first.",
+)
+@click.option(
+    "--free",
+    metavar="NAME",
+    multiple=True,
+    help="Identify a parameter that was not read directly. Repeatable.",
+)
+@click.option(
+    "--at", metavar="POSITION,…", help="Where the axes stood, in m or rad; at the move's target by default."
+)
+@click.option(
+    "--out",
+    type=OutputFile(replaces="spec_path"),
+    default="identified.toml",
+    help="Spec to write; ./identified.toml by default.",
+)
+@plot_option
+@output_options
+def identify(
+    chosen: SpecChoice,
+    *,
+    readings: tuple[str, ...],
+    periods: tuple[str, ...],
+    log: Path | None,
+    read: Callable[..., SwingLog],
+    after: float,
+    free: tuple[str, ...],
+    at: str | None,
+    out: Path,
+    picture: Path | None,
+    as_json: bool,
+) -> None:
+    """Find parameters from measurements on site, and write a spec."""
+    from gen_profile.charts.plot import plot
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.identification.identify import identify as run
+    from gen_profile.identification.identify import write_spec
+    from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
+    from gen_profile.spec.reading import parse_spec
+    from gen_profile.spec.text import changed_text
+
+    text, source, folder = chosen.text()
+    spec = parse_spec(text, chosen.overrides, source, folder)
+    if picture is not None and log is None:
+        raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
+    measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
+    with progress() as tell:
+        if log is not None:
+            tell("reading the log")
+            measurements.append(read(log, spec, after))
+        identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
+        if picture is not None:
+            tell("drawing")
+            plot(identified, picture)
+        write_spec(identified.spec, out, changed_text(text, chosen.overrides, spec, identified.spec, folder))
+    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out), as_json)
+
+
+def _positions(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise SpecError(f"--at {text!r}: write one number per axis, such as 3.5 or 0,3.5.") from error
+
+
+@cli.command(
+    epilog="Example: gen-profile learn crane.toml run.csv --played deploy/crane.st --signal rate:hook"
+)
+@spec_options
+@click.argument("logs", metavar="[LOG.csv]...", nargs=-1, type=PathType())
+@click.option(
+    "--played",
+    required=True,
+    type=InputFile(),
+    help="The file whose setpoints the axes followed in these runs.",
+)
+@click.option(
+    "--seen",
+    metavar="LOAD=M±M",
+    multiple=True,
+    help="Greatest sway in m after a run as it was seen, within a bound (+- will do for ±). Repeatable.",
+)
+@log_options
+@click.option(
+    "--out",
+    type=OutputFile(replaces="spec_path"),
+    default="learned.toml",
+    help="Spec to write; ./learned.toml by default.",
+)
+@click.option(
+    "--export",
+    "formats",
+    metavar="FORMAT",
+    multiple=True,
+    help="Design for the ranges that are left, check, and write in this format. Repeatable.",
+)
+@click.option(
+    "--folder",
+    metavar="DIR",
+    type=PathType(),
+    default="gen-profile-out",
+    help="Folder for that; ./gen-profile-out by default.",
+)
+@output_options
+def learn(
+    chosen: SpecChoice,
+    *,
+    logs: tuple[Path, ...],
+    played: Path,
+    seen: tuple[str, ...],
+    read: Callable[..., SwingLog],
+    out: Path,
+    formats: tuple[str, ...],
+    folder: Path,
+    as_json: bool,
+) -> None:
+    """Narrow a spec's ranges by what runs of a motion showed.
+
+    A run is a log of the swing, from before the motion until some swings after it, or what was seen then.
+    """
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.designs.design import design
+    from gen_profile.identification.identify import write_spec
+    from gen_profile.identification.learning import learn as run
+    from gen_profile.identification.measurements import parse_reading
+    from gen_profile.spec.reading import parse_spec
+    from gen_profile.spec.text import changed_text
+    from gen_profile.verification.check import replayed
+
+    text, source, place = chosen.text()
+    spec = parse_spec(text, chosen.overrides, source, place)
+    require_formats(formats)
+    sights = [parse_reading(one, "seen") for one in seen]
+    with progress() as tell:
+        tell("reading the runs")
+        setpoints = replayed(played, spec)
+        learned = run(spec, setpoints, [*(read(log, spec) for log in logs), *sights], tell)
+        write_spec(learned.spec, out, changed_text(text, chosen.overrides, spec, learned.spec, place))
+        made = design(learned.spec, formats, folder, progress=tell) if formats else None
+    document = {**learned.to_dict(), "path": str(out), "design": None if made is None else made.to_dict()}
+    text = words.learning(learned, out)
+    print_outcome(document, text if made is None else f"{text}\n{words.design(made)}", as_json)
+    if made is not None:
+        warn(made.check)
+        if not made.passed and made.check is not None:
+            fail(made.check.reasons(), f"{out} was written, and nothing to {folder}.")

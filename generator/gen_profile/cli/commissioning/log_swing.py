@@ -1,0 +1,134 @@
+"""The command that logs a swing: of a phone, or of a node of a controller."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING, Any, cast
+
+import click
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.deployment.access import Access, client_options
+from gen_profile.cli.options import OutputFile, output_options
+from gen_profile.cli.outcome import print_outcome, print_warnings
+from gen_profile.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gen_profile.motion.profile import Array
+
+DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and columns beside it
+
+
+@cli.command("log-swing", epilog="Example: gen-profile log-swing http://192.168.0.42:8080 --out run.csv")
+@click.argument("source")
+@click.option("--out", type=OutputFile(), default="swing.csv", help="Log to write; ./swing.csv by default.")
+@click.option(
+    "--for",
+    "seconds",
+    type=click.FloatRange(min=1.0),
+    metavar="SECONDS",
+    help="Log so long, not until Ctrl-C.",
+)
+@click.option("--node", metavar="NODEID", help="Of an OPC UA server, as ns=4;s=GVL.rAngle.")
+@click.option(
+    "--unit", default="rad", metavar="UNIT", help="Of its values, for the column's name; rad by default."
+)
+@client_options
+@output_options
+def log_swing(
+    source: str,
+    *,
+    out: Path,
+    seconds: float | None,
+    node: str | None,
+    unit: str,
+    as_json: bool,
+    **security: Any,
+) -> None:
+    """Log how a load swings, for identify and learn, until Ctrl-C.
+
+    SOURCE is a phone with phyphox, by the address that its remote access shows, or an OPC UA server.
+    """
+    from gen_profile.artefacts.writing import deliver
+    from gen_profile.identification.phone import COLUMNS, Phone
+
+    if source.startswith("opc.tcp:"):
+        if node is None:
+            raise SpecError("--node: name the node whose value swings, as ns=4;s=GVL.rAngle.")
+        from gen_profile.deployment.opcua import OpcUaNode
+
+        access = Access(url=source, instance="", data_block=None, **security).opcua()
+        with closing(OpcUaNode(access, node)) as link:
+            table = _logged(link.tables(), seconds)
+    else:
+        if node or security["user"] or security["fingerprint"] or security["certificate"]:
+            raise SpecError(
+                "--node, --user, --fingerprint, --certificate: are for OPC UA, opc.tcp://HOST:PORT."
+            )
+        table = _logged(Phone(source).tables(), seconds)
+    columns = COLUMNS if node is None else (f"Value ({unit})",)
+    lines = (",".join(f"{value:.9g}" for value in row) for row in table.tolist())
+    deliver(out, "\n".join([",".join(("Time (s)", *columns)), *lines, ""]).encode("utf-8"))
+    lasts = float(table[-1, 0])
+    document = {"path": str(out), "samples": len(table), "lasts_s": lasts, "columns": list(columns)}
+    print_outcome(document, f"{len(table)} samples in {lasts:.1f} s: {out}", as_json)
+
+
+def _logged(tables: Iterator[Array], seconds: float | None) -> Array:
+    """Log until Ctrl-C, or for so long by the sensor's clock."""
+    import numpy as np
+
+    from gen_profile.deployment.mailbox import LinkLostError
+    from gen_profile.identification.measurements import LEAST_SAMPLES
+    from gen_profile.identification.phone import about_its_axis
+    from gen_profile.interrupts import interrupts_collected
+
+    table = np.empty((0, 0))
+    try:
+        with _curve() as draw, interrupts_collected() as came, closing(cast("Any", tables)):
+            for rows in tables:
+                if len(rows):
+                    table = np.concatenate([table, rows]) if len(table) else rows
+                    draw(about_its_axis(table))
+                if came or (seconds is not None and len(table) and np.ptp(table[:, 0]) >= seconds):
+                    break
+    except KeyboardInterrupt:  # which is how it ends
+        pass
+    except (LinkLostError, OutputError) as error:
+        if not len(table):
+            raise OutputError(str(error)) from error
+        print_warnings([f"{str(error).rstrip('.')}; the log ends there"])
+    if len(table) < LEAST_SAMPLES:
+        raise OutputError(
+            f"Only {len(table)} samples came, and a swing needs {LEAST_SAMPLES}; nothing was written."
+        )
+    return about_its_axis(table)
+
+
+@contextmanager
+def _curve() -> Iterator[Callable[[Array], None]]:
+    """Draw what swings on stderr, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    import numpy as np
+    from rich.console import Console, Group
+    from rich.live import Live
+    from rich.text import Text
+
+    from gen_profile.streaming.live_terminal import curves
+
+    console = Console(stderr=True)
+    with Live(console=console, auto_refresh=False) as live:
+
+        def draw(table: Array) -> None:
+            late = table[table[:, 0] > table[-1, 0] - DRAWN, 1]
+            blank = np.full_like(late, np.nan)
+            picture = curves(blank, late, max(10, console.width - MARGIN), HEIGHT)
+            live.update(Group(Text(f"{table[-1, 0]:.1f} s, {len(table)} samples"), *picture), refresh=True)
+
+        yield draw

@@ -1,0 +1,88 @@
+"""From a tape measure to a controller in one command, with answers by options and from a keyboard."""
+
+import json
+import subprocess
+
+import numpy as np
+import pytest
+from command_line import PROGRAM, run_here
+from end_to_end.test_deploy import free_port, in_thread
+
+from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
+from gen_profile.deployment.table import read_table
+from gen_profile.problem.linearization import linearize
+from gen_profile.spec.reading import preset_spec, read_spec
+
+ROPE, DAMPING = 6.05, 400.0
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    """A folder with the log of a phone, on a rope that is shorter than the tape says."""
+    monkeypatch.chdir(tmp_path)
+    crane = preset_spec("bay-crane", plant={"L1": ROPE, "c1": DAMPING})
+    mode = linearize(crane.machine(), crane.plant.parameters)
+    frequency, ratio = mode.frequencies[0], mode.damping_ratios[0]
+    times = np.arange(0.0, 40.0, 0.04)
+    angles = 0.04 * np.exp(-ratio * frequency * times) * np.cos(frequency * times)
+    rates = np.gradient(angles, times) + np.random.default_rng(1).normal(0.0, 0.001, times.size)
+    np.savetxt("run.csv", np.column_stack([times, rates]), "%.5f", ",", header="t (s),x (rad/s)", comments="")
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_options_answer_everything(site):
+    settings = ("--set", "export.plc_tables=variables", "--export", "plc")
+    assert run_here("--preset", "bay-crane", *settings, "--no-check", "--out", "first").code == 0
+    port = free_port()
+
+    async def controller(ready, end):
+        simulated = SimulatedController(
+            read_table(site / "first" / "bay-crane.st"), PlcSimOptions(port=port, secure=False)
+        )
+        simulated.ended = end
+        await simulated.serve(ready)
+
+    identified = ("--measured", "L1=6.2±0.1", "--free", "c1", "--swing", "run.csv", "--signal", "rate:hook")
+    deployed = ("--to", f"opc.tcp://127.0.0.1:{port}", "--security", "none", "--by", "me")
+    with in_thread(controller):
+        outcome = run_here(
+            "commission", "hall.toml", "--preset", "bay-crane", *identified, *deployed,
+            "--set", "move.distance=5", "--export", "plc", "--yes", "--json",
+        )  # fmt: skip
+        assert outcome.code == 0, outcome.err
+        again = run_here("commission", "hall.toml", *deployed, "--export", "plc", "--yes")
+        assert again.code == 0, again.err
+    spec = read_spec("hall.toml")
+    assert spec.plant.parameters["L1"] == pytest.approx(ROPE, rel=2e-3)
+    assert spec.plant.parameters["c1"] == pytest.approx(DAMPING, rel=0.1)
+    assert spec.move.distance == (5.0,)
+    assert all(
+        (site / name).is_file() for name in (outcome.document["report"], *outcome.document["artefacts"])
+    )
+    record = json.loads((site / outcome.document["record"]).read_text("utf-8"))
+    assert "me" in json.dumps(record) and len(outcome.out.splitlines()) < 15
+
+
+def commissioned(site, *arguments, answers):
+    return subprocess.run(
+        [PROGRAM, "commission", "hall.toml", *arguments],
+        input="\n".join(answers), capture_output=True, text=True, cwd=site, check=False,
+    )  # fmt: skip
+
+
+def test_a_wrong_answer_is_asked_for_again(site):
+    """The keyboard ends before all is answered, so nothing is written."""
+    answers = ["bay-crane", "350", "six", "2000", "6.2±x", "6.2±0.1"]
+    ended = commissioned(site, answers=answers)
+    assert ended.returncode == 130, ended.stderr
+    assert "plant.m2: must be a number" in ended.stderr
+    assert "write NAME=VALUE±UNCERTAINTY" in ended.stderr
+    assert "L2, rope from hook to payload, in m" in ended.stderr
+    assert sorted(one.name for one in site.iterdir()) == ["run.csv"]
+
+
+def test_a_log_that_is_not_there_is_refused_before_anything_is_written(site):
+    refused = commissioned(site, "--preset", "bay-crane", "--yes", "--swing", "nun.csv", answers=[])
+    assert refused.returncode == 2 and "There is no log nun.csv" in refused.stderr
+    assert not (site / "hall.toml").exists()

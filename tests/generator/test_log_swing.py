@@ -1,0 +1,208 @@
+"""Swings that are logged from a phone and from a controller, both on the loopback interface."""
+
+import asyncio
+import json
+import signal
+import subprocess
+import threading
+import time
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import parse_qsl, urlsplit
+
+import numpy as np
+import pytest
+from asyncua import Server, ua
+from command_line import PROGRAM, run_here
+from end_to_end.test_deploy import free_port, in_thread
+
+from gen_profile.identification.identify import read_swing
+from gen_profile.spec.reading import preset_spec
+
+AXIS = np.array([0.36, -0.48, 0.8])  # about which the phone swings, of its own
+FREQUENCY = 1.9
+
+
+def rate(times):
+    return 0.2 * np.cos(FREQUENCY * times)
+
+
+class Phyphox:
+    """What the app answers of an experiment; its clock runs while it measures."""
+
+    def __init__(self, *, measuring=False, source="gyroscope", speed=20.0):
+        self.measuring, self.source, self.speed = measuring, source, speed
+        self.session, self.fails, self.asked = "a1b2c3", 0, []
+        self.started, self.before = time.monotonic(), 3.0 if measuring else 0.0
+
+    def buffers(self):
+        now = self.before + (time.monotonic() - self.started) * self.speed if self.measuring else self.before
+        times = np.arange(0.0, now, 0.01)
+        rates = rate(times)[:, None] * AXIS + [0.01, -0.02, 0.005]
+        return dict(zip(("tt", "rx", "ry", "rz"), [times, *rates.T], strict=True))
+
+    def answer(self, path, query):
+        self.asked.append(path + ("?" + "&".join("=".join(one) for one in query) if query else ""))
+        if path == "/config":
+            outputs = [{"x": "rx"}, {"y": "ry"}, {"z": "rz"}, {"t": "tt"}]
+            return {"title": "Some", "inputs": [{"source": self.source, "outputs": outputs}], "buffers": []}
+        if path == "/control":
+            self.measuring, self.started = query[0][1] == "start", time.monotonic()
+            return {"result": True}
+        kept, held = {}, self.buffers()
+        for name, asked in query:
+            threshold, _, reference = asked.partition("|")
+            values = held[name][-1:] if not asked else held[name][held[reference or name] > float(threshold)]
+            kept[name] = {
+                "size": 0,
+                "updateMode": "partial",
+                "buffer": [float(f"{one:.7e}") for one in values],
+            }
+        return {"buffer": kept, "status": {"session": self.session, "measuring": self.measuring}}
+
+
+class OtherServer(Phyphox):
+    def answer(self, path, query):
+        return b"<html>"
+
+
+class Stubborn(Phyphox):
+    def answer(self, path, query):
+        return {"result": False} if path == "/control" else super().answer(path, query)
+
+
+@contextmanager
+def served(app):
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            if app.fails:
+                app.fails -= 1
+                self.connection.close()
+                return
+            parts = urlsplit(self.path)
+            answer = app.answer(parts.path, parse_qsl(parts.query, keep_blank_values=True))
+            content = answer if isinstance(answer, bytes) else json.dumps(answer).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, *_):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+@pytest.mark.parametrize("measuring", [False, True])
+def test_a_phone_is_logged_about_the_axis_it_swings_about(tmp_path, measuring):
+    app = Phyphox(measuring=measuring)
+    with served(app) as url:
+        outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "5", "--json")
+    assert outcome.code == 0, outcome.err
+    assert app.measuring == measuring  # as it was before
+    assert outcome.document["lasts_s"] >= 5.0
+    log = read_swing(tmp_path / "swing.csv", preset_spec("bay-crane"), columns=("1", "2"), signal="rate:hook")
+    np.testing.assert_allclose(np.diff(log.times), 0.01, atol=1e-6)
+    waves = [np.cos(FREQUENCY * log.times), np.sin(FREQUENCY * log.times), np.ones_like(log.times)]
+    (cosine, sine, _), (left,), *_ = np.linalg.lstsq(np.stack(waves, axis=1), log.values)
+    assert np.hypot(cosine, sine) == pytest.approx(0.2, rel=1e-3)
+    assert left < 1e-9 * len(log.times)
+
+
+def test_a_network_that_is_lost_for_a_moment_loses_nothing(tmp_path):
+    app = Phyphox(measuring=True)
+    with served(app) as url:
+        timer = threading.Timer(0.2, lambda: setattr(app, "fails", 2))
+        timer.start()
+        outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "12")
+        timer.join()
+    assert outcome.code == 0 and app.fails == 0, outcome.err
+    times = np.loadtxt(tmp_path / "swing.csv", delimiter=",", skiprows=1)[:, 0]
+    np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("app", "sentence"),
+    [
+        (Phyphox(source="accelerometer"), "measures no rates about three axes: open phyphox's experiment"),
+        (OtherServer(), "but not as phyphox does"),
+        (Stubborn(), "press play in phyphox"),
+    ],
+)
+def test_what_is_no_gyroscope_is_refused(tmp_path, app, sentence):
+    with served(app) as url:
+        outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "2")
+    assert outcome.code == 2 and sentence in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_addresses_that_are_none(tmp_path):
+    for source, *more in (
+        ("192.168.0.42:8080",),
+        ("https://x:1",),
+        ("opc.tcp://127.0.0.1:1", "--security", "none"),
+    ):
+        assert run_here("log-swing", source, *more, "--out", tmp_path / "swing.csv").code == 2
+    gone = run_here("log-swing", f"http://127.0.0.1:{free_port()}", "--out", tmp_path / "swing.csv")
+    assert gone.code == 2 and "does not answer" in gone.err and "allow remote access" in gone.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_ends_a_log_and_keeps_it(tmp_path):
+    app = Phyphox(measuring=True)
+    with served(app) as url:
+        program = subprocess.Popen(
+            [PROGRAM, "log-swing", url], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+        )
+        while "|" not in app.asked[-1:].__repr__():
+            time.sleep(0.05)
+        time.sleep(0.5)
+        program.send_signal(signal.SIGINT)
+        _, err = program.communicate(timeout=60)
+    assert program.returncode == 0, err
+    assert len((tmp_path / "swing.csv").read_text().splitlines()) > 16
+
+
+@pytest.mark.slow
+def test_a_node_of_a_controller_is_logged(tmp_path):
+    port = free_port()
+
+    async def main(ready, end):
+        server = Server()
+        await server.init()
+        server.set_endpoint(f"opc.tcp://127.0.0.1:{port}")
+        server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+        node = await server.nodes.objects.add_variable("ns=2;s=angle", "2:angle", 0.0)
+        word = await server.nodes.objects.add_variable("ns=2;s=word", "2:word", "none")
+        assert word
+        async with server:
+            ready()
+            began = time.monotonic()
+            while not end.is_set():
+                await node.write_value(float(np.degrees(rate(time.monotonic() - began))))
+                await asyncio.sleep(0.02)
+
+    with in_thread(main):
+        url = f"opc.tcp://127.0.0.1:{port}"
+        how = ("--security", "none", "--out", tmp_path / "swing.csv", "--for", "2", "--unit", "deg", "--json")
+        outcome = run_here("log-swing", url, *how, "--node", "ns=2;s=angle")
+        for node, sentence in {
+            "ns=2;s=word": "holds no number",
+            "ns=2;s=x": "has no node",
+            "angle": "has no node",
+        }.items():
+            refused = run_here("log-swing", url, *how, "--node", node)
+            assert refused.code == 6 and sentence in refused.err
+    assert outcome.code == 0, outcome.err
+    log = read_swing(tmp_path / "swing.csv", preset_spec("bay-crane"), columns=("1", "2"))
+    assert log.times[-1] >= 2.0 and len(log.times) > 40
+    apart = [np.std(log.values - rate(log.times + late)) for late in np.linspace(0.0, 4.0, 200)]
+    assert min(apart) < 0.01
