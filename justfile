@@ -64,6 +64,20 @@ release:
     grep -Eq "^## \\[$(sed -n 's/^version = \"\(.*\)\"/\1/p' pyproject.toml)\\] – 20[0-9-]{8}$" CHANGELOG.md || { echo "CHANGELOG.md: date this version."; exit 1; }
     just distributions
 
+# A folder for Linux with Python and a C compiler inside, for engineers who have none, and its archive. It needs glibc
+# as new as this computer's, so build it on an old one. By hand: takes minutes.
+standalone:
+    python standalone/build.py dist/gen-profile-linux
+    uvx --quiet --from cyclonedx-bom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file dist/gen-profile-linux/sbom.cdx.json dist/gen-profile-linux/python/bin/python3
+    du --summarize --si dist/gen-profile-linux
+    dist/gen-profile-linux/gen-profile --version
+    XZ_OPT=-T0 tar --create --xz --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 --directory dist --file dist/gen-profile-linux.tar.xz gen-profile-linux
+
+# The same for Windows with an installer, from python.org's embeddable package; elsewhere by Wine and Debian's nsis.
+standalone-windows embeddable:
+    python standalone/build.py --windows {{ embeddable }} dist/gen-profile-windows
+    makensis -V2 -DVERSION=$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml) -DFOLDER=$PWD/dist/gen-profile-windows -DOUT=$PWD/dist/gen-profile-setup.exe standalone/installer.nsi
+
 # Timings, printed and not judged.
 bench:
     pytest -s tests/benchmarks

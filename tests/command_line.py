@@ -35,7 +35,8 @@ def commands_of(group: click.Group, before: str = "") -> dict[str, click.Command
 
 
 COMMANDS = commands_of(cli)
-PROGRAM = Path(sysconfig.get_path("scripts")) / "gen-profile"
+STANDALONE = os.environ.get("STANDALONE")  # a folder of standalone/build.py, to be tried in place of this
+PROGRAM = Path(STANDALONE or sysconfig.get_path("scripts")) / "gen-profile"
 
 
 @attrs.frozen
@@ -57,6 +58,8 @@ class Outcome:
 
 def run_here(*arguments: str | Path) -> Outcome:
     """Call the entry point in this process, where coverage sees it; hold its JSON to the documentation."""
+    if STANDALONE:
+        return run_process(*arguments)
     out, err = (TextIOWrapper(BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     code: Any = 0

@@ -3,6 +3,9 @@
 import os
 import subprocess
 import sys
+import tarfile
+from functools import partial
+from importlib import metadata
 from pathlib import Path
 
 import fmu_manipulation_toolbox
@@ -14,7 +17,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import sample
 from gen_profile.plants.registry import find_plant
 from gen_profile_fmu.building import platforms
-from gen_profile_fmu.building.compiler import compile_library, find_compiler
+from gen_profile_fmu.building.compiler import PACKED, Compiler, compile_library, find_compiler
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Version, sources, standard_headers
 from gen_profile_fmu.running.called_fmu import loop_sources
@@ -112,6 +115,44 @@ def test_what_a_failing_compiler_says_is_passed_on(tmp_path, cache):
     (tmp_path / "fmu.c").write_text("int broken = ;")
     with pytest.raises(CosimulationError, match=r"exit code 1(.|\n)*broken"):
         compile_library(find_compiler(), tmp_path, "fmu.c", "library.so", zig_cache=cache / "zig")
+
+
+@pytest.fixture
+def packed(tmp_path):
+    """A folder whose compiler is packed: it writes what its library is to hold."""
+    (tmp_path / "zig").write_text("#!/bin/sh\nwhile [ $1 != -o ]; do shift; done; pwd >$2\n")
+    (tmp_path / "zig").chmod(0o755)
+    with tarfile.open(tmp_path / PACKED, "w:xz") as archive:
+        archive.add(tmp_path / "zig", "zig")
+    (tmp_path / "zig").unlink()
+    (tmp_path / "cache").mkdir()
+    command = (str(tmp_path / "zig"), "cc")
+    return partial(
+        compile_library,
+        Compiler(command=command, libraries=(), identity="packed"),
+        tmp_path,
+        "fmu.c",
+        zig_cache=tmp_path / "cache" / "zig",
+    )
+
+
+def test_a_packed_compiler_is_unpacked_once(packed, tmp_path):
+    packed("first.so")
+    (tmp_path / PACKED).write_bytes(b"no archive any more")
+    packed("second.so")
+    assert (tmp_path / "second.so").read_text() == (tmp_path / "first.so").read_text() == f"{tmp_path}\n"
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == [
+        f"ziglang-{metadata.version('ziglang')}"
+    ]
+
+
+def test_a_damaged_packed_compiler_is_a_sentence_and_leaves_nothing(packed, tmp_path):
+    whole = (tmp_path / PACKED).read_bytes()
+    for damaged in (whole[: len(whole) // 2], b"", whole[:99] + bytes(9) + whole[108:]):
+        (tmp_path / PACKED).write_bytes(damaged)
+        with pytest.raises(CosimulationError, match=r"zig.tar.xz is damaged .* unpack gen-profile anew"):
+            packed("library.so")
+        assert list((tmp_path / "cache").iterdir()) == []
 
 
 def test_other_computers_are_told_what_to_do(monkeypatch):

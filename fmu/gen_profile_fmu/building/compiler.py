@@ -7,8 +7,10 @@ import os
 import shlex
 import subprocess
 import sys
+import tarfile
 from functools import cache
 from importlib.metadata import version
+from lzma import LZMAError
 from pathlib import Path
 from platform import machine
 from tempfile import TemporaryDirectory
@@ -16,9 +18,11 @@ from tempfile import TemporaryDirectory
 import attrs
 
 from gen_profile.errors import CosimulationError
+from gen_profile.private_folder import temporary_folder
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CC"
+PACKED = "zig.tar.xz"  # what a standalone folder has in Zig's place
 FLAGS = (
     "-std=c99",
     "-O2",
@@ -98,7 +102,7 @@ def _zig_compiler(target: str) -> Compiler:
             "There is no compiler for the plant's FMU. Install the package ziglang, "
             f"or name a C compiler in the environment variable {ENVIRONMENT_VARIABLE}."
         )
-    program = Path(spec.submodule_search_locations[0]) / ("zig.exe" if sys.platform == "win32" else "zig")
+    program = Path(spec.submodule_search_locations[0], "zig.exe" if sys.platform == "win32" else "zig")
     windows = "windows" in target
     libraries = WINDOWS_LIBRARIES if windows else ("-lm",)
     options = ("-target", target, *FLAGS, *(WINDOWS_FLAGS if windows else ()), *DEFINITIONS, "-s")
@@ -128,6 +132,10 @@ def compile_library(compiler: Compiler, folder: Path, source: str, output: str, 
     CosimulationError
         With the compiler's words.
     """
+    program, *options = compiler.command
+    if not Path(program).exists() and (packed := Path(program).with_name(PACKED)).exists():
+        program = str(_unpacked(packed, zig_cache.parent) / Path(program).name)
+    command = (program, *options)
     # old Zigs at work side by side take each other's object files from a shared local cache
     with TemporaryDirectory(prefix="zig-") as local_cache:
         environment = {
@@ -138,11 +146,30 @@ def compile_library(compiler: Compiler, folder: Path, source: str, output: str, 
         sources = [source]
         if compiler.own_entry:
             # first, for without its runtime Zig takes away the headers, too
-            _run((*compiler.command, "-I.", "-c", "-o", "library.obj", source), folder, environment)
+            _run((*command, "-I.", "-c", "-o", "library.obj", source), folder, environment)
             (folder / "entry.c").write_text(WINDOWS_ENTRY, encoding="ascii")
             sources = ["library.obj", "entry.c"]
-        link = (*compiler.command, "-I.", "-shared", "-o", output, *sources, *compiler.libraries)
+        link = (*command, "-I.", "-shared", "-o", output, *sources, *compiler.libraries)
         _run(link, folder, environment)
+
+
+def _unpacked(packed: Path, cache: Path) -> Path:
+    """Unpack Zig once; another process that does so meanwhile unpacks the same."""
+    folder = cache / f"ziglang-{version('ziglang')}"
+    if not folder.exists():
+        with temporary_folder(cache, "unpacked-") as new:
+            try:
+                with tarfile.open(packed, "r:xz") as archive:
+                    archive.extraction_filter = lambda member, _: member  # our own, whatever Python's default
+                    archive.extractall(new / "zig")
+            except (tarfile.TarError, LZMAError, EOFError) as error:
+                raise CosimulationError(f"{packed} is damaged ({error}); unpack gen-profile anew.") from error
+            try:
+                (new / "zig").rename(folder)
+            except OSError:
+                if not folder.exists():
+                    raise
+    return folder
 
 
 def _run(command: tuple[str, ...], folder: Path | None, environment: dict[str, str] | None) -> str:
