@@ -1,7 +1,7 @@
 """Machines as independent judges of damping by a sensor; nothing is shared with the block.
 
-A bay crane: two masses on two rods, in absolute angles, by Lagrange's equations of the places x − L1 sin a and
-x − L1 sin a − L2 sin b. An arm on a torsion spring. Liquid in a tank, by two of its modes.
+A bay crane: two masses on two rods, in absolute angles, by Lagrange's equations of the places x − L1 sin a
+and x − L1 sin a − L2 sin b. An arm on a torsion spring. Liquid in a tank, by two of its modes.
 """
 
 from math import cos, pi, sin, tanh
@@ -98,7 +98,7 @@ class MeasuredCrane(MeasuredMachine):
 
 
 class MeasuredJoint(MeasuredMachine):
-    """An arm behind a torsion spring; measured is by how much it trails the hub, as of an encoder at the arm."""
+    """An arm behind a torsion spring; measured is by how much it trails the hub, by an encoder at the arm."""
 
     def __init__(self, block, *, swing=(0.0, 0.0), inertia=0.0035, stiffness=1.3, damping=0.004, cycle=0.001):
         """`swing`: m of the tip, and its phase in rad."""

@@ -108,7 +108,9 @@ def sensor_constants(
     others = [_others(spec, sensor, disturbance, one) - rows(point)[-1] for point, one in sensed.items()]
     raised = rows.coefficients.copy()
     raised[-1, ~rows.exponents.any(axis=0)] += max(0.0, *others)  # none is less than what is true
-    return _constants(spec, sensor, disturbance, list(sensed.values())), attrs.evolve(rows, coefficients=raised)
+    return _constants(spec, sensor, disturbance, list(sensed.values())), attrs.evolve(
+        rows, coefficients=raised
+    )
 
 
 def _constants(
@@ -250,18 +252,18 @@ def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
 
 
 def _floor(sensor: SensorSpec, one: SensedModes) -> Array:
-    """Find the standard deviations in m that the sensor's noise gives the modes' estimates, shape (modes,)."""
+    """Find the standard deviations in m that noise gives the modes' estimates, shape (modes,)."""
     state, measured, gain = _filter(sensor, one)
     kicks = np.outer(gain, gain) * sensor.noise**2 * NOISE_TIME
     spread = np.diag(solve_continuous_lyapunov(state - np.outer(gain, measured[0]), -kicks))
     return np.asarray(np.sqrt(spread[:-1:2] + spread[1:-1:2] / one.frequencies**2))
 
 
-def known_sway(spec: Spec, one: SensedModes) -> Array:
+def _known_sway(spec: Spec, one: SensedModes) -> Array:
     """Find to how many m each mode's sway is known at least, shape (modes,).
 
-    To four standard deviations of noise; of faster modes, which are not damped, and what gusts made of them that
-    the observer has not corrected within two slow periods, too: of one that the sensor does not show, all.
+    To four standard deviations of noise. Of faster modes, which are not damped, what gusts made of them and
+    the observer has not corrected within two slow periods counts, too: of one that does not show, all.
     """
     sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
     assert sensor is not None and disturbance is not None
@@ -306,9 +308,10 @@ def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: S
 
 
 def _rows(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]) -> Array:
-    """Values of the model's rows: push, shown, end load's sway, gains of z and z' by mode, the offset's, `_others`.
+    """Values of the model's rows: push, shown, end load's sway, gains of z and z' by mode; then two.
 
-    The gains are those for a cycle, of what differed as long ago as a value usually is old.
+    These are the offset's gain, and `_others`. The gains are those for a cycle, of what differed as long ago
+    as a value usually is old.
     """
     one = _sensed(spec, sensor, disturbance, point)
     state, _, gain = _filter(sensor, one)
@@ -375,17 +378,18 @@ def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
         raise SpecError(
             f"planner.sensor.of: {sensor.of} does not show the slowest swing; measure another coordinate."
         )
-    needed, (known, *others) = (AGAIN - BEGIN) * min(spec.check.residual_sway.values()), known_sway(spec, one)
+    needed = (AGAIN - BEGIN) * min(spec.check.residual_sway.values())
+    known, *others = _known_sway(spec, one)
     if known > needed:
         raise SpecError(
-            f"planner.sensor.noise: the load's sway would be known to {known:.2g} m only, and {needed:.2g} m are "
-            "needed to damp to check.residual_sway; take a better sensor, or allow more."
+            f"planner.sensor.noise: the load's sway would be known to {known:.2g} m only, and {needed:.2g} m "
+            "are needed to damp to check.residual_sway; take a better sensor, or allow more."
         )
     if max(others, default=0.0) > needed:
         raise SpecError(
-            f"planner.sensor.of: {sensor.of} does not show the faster swings well enough: {max(others):.2g} m that "
-            f"gusts make of them would not be seen, and {needed:.2g} m at most may be; measure another coordinate, "
-            'or the sway of a load (quantity = "sway").'
+            f"planner.sensor.of: {sensor.of} does not show the faster swings well enough: {max(others):.2g} "
+            f"m that gusts make of them would not be seen, and {needed:.2g} m may be; measure another "
+            'coordinate, or the sway of a load (quantity = "sway").'
         )
     late, unknown = slowest * sensor.delay[1], 0.5 * slowest * (sensor.delay[1] - sensor.delay[0])
     if late > LARGEST_DELAY or unknown > UNKNOWN_DELAY:
@@ -417,7 +421,14 @@ def _require_accurate(
     true = np.array([_rows(spec, sensor, disturbance, point) for point in points])
     modes = (true.shape[1] - 2) // 5
     error = np.abs(np.array([rows(point) for point in points]) - true)[:, : 3 * modes]
-    worst = float((error / np.maximum(np.abs(true[:, : 3 * modes]).max(axis=0), LEAST_SHOWN * np.abs(true[:, : 3 * modes]).max())).max())
+    worst = float(
+        (
+            error
+            / np.maximum(
+                np.abs(true[:, : 3 * modes]).max(axis=0), LEAST_SHOWN * np.abs(true[:, : 3 * modes]).max()
+            )
+        ).max()
+    )
     if worst > ACCURATE:
         raise SpecError(
             f"planner.live: over these ranges what the sensor shows would be known to {worst:.1g} only; "

@@ -272,9 +272,15 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
         return
     swing = [coordinate.name for coordinate in plant.unactuated]
     if sensor.quantity == "sway" and sensor.of not in plant.loads:
-        yield "planner.sensor.of", Phrase("no load of the machine{hint}", hint=suggestion(sensor.of, plant.loads))
+        yield (
+            "planner.sensor.of",
+            Phrase("no load of the machine{hint}", hint=suggestion(sensor.of, plant.loads)),
+        )
     elif sensor.quantity != "sway" and sensor.of not in swing:
-        yield "planner.sensor.of", Phrase("no coordinate that swings{hint}", hint=suggestion(sensor.of, swing))
+        yield (
+            "planner.sensor.of",
+            Phrase("no coordinate that swings{hint}", hint=suggestion(sensor.of, swing)),
+        )
     if not disturbance.swing:
         yield "planner.disturbance.swing", "must name a load"
     for name in ("live_rate", "zones"):
