@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
-from exporters.measured_crane import MeasuredCrane
+from exporters.measured_machines import MeasuredCrane, MeasuredJoint, MeasuredTank
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.design import planner_block
@@ -13,6 +13,7 @@ from gen_profile.spec.reading import preset_spec
 LIVE = "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}"
 SENSOR = 'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}'
 SWING = "planner.disturbance={swing={payload=0.5}, settle=12.0}"
+GUSTS = SWING.replace("settle", "gust={acceleration=0.1, longest=5.0}, settle")
 MEASURED = [LIVE, SENSOR, SWING]
 ALLOWED = 0.05  # m
 SHORTEST = {3.0: 5.3, 6.0: 5.7, 9.0: 5.9}  # s, of an independent linear programme, at the worst phase
@@ -158,8 +159,23 @@ def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compi
     assert np.abs(issued["sway"][-500:]).max() < 1e-3
     require_limits(issued)
     swung.run(0.1, bReset=1.0, bLoadAtRest=1.0)  # mended
-    again = swung.run(16.0, bReset=0.0, bExecute=0.0, noise=0.002, random=np.random.default_rng(3))
+    reset = len(swung.rows["sway"])
+    again = swung.run(9.0, bReset=0.0, bExecute=0.0, noise=0.002, random=np.random.default_rng(3))
+    assert not again["bDamping"][reset:].any()  # what the fault had left of the estimate is forgotten
     assert not again["nSensorFault"][-1] and again["bSensorUsed"][-1] and again["bPromise"][-1]
+
+
+@pytest.mark.slow
+def test_a_rate_sensor_of_the_wrong_sign_is_noticed_on_a_long_rope_as_soon_as_on_a_short_one():
+    rate = SENSOR.replace('"angle"', '"rate"').replace("offset=0.005", "offset=0.02")
+    compiled = compile_counting(planner_block(preset_spec("bay-crane", [LIVE, rate, GUSTS])).text)
+    swung = crane(compiled, 9.0, swing=(0.45, 3.0))
+    swung.shows = lambda: swung.state[2]
+    sound = {"noise": 0.002, "offset": 0.02, "random": np.random.default_rng(0)}
+    swung.run(10.0, **sound)
+    issued = swung.run(40.0, **sound, sensor=lambda _, rate: -rate)
+    assert issued["nSensorFault"][-1] in (5.0, 7.0)
+    assert np.abs(issued["sway"]).max() < 1.4  # and 1.8 where all ropes are judged as one
 
 
 def test_what_it_shows_of_the_axis_s_own_motion_is_told(compiled):
@@ -204,6 +220,80 @@ def test_the_kernel_leaves_the_fast_mode_alone():
         assert kernel.sum() == pytest.approx(1.0)
         for error, most in ((0.0, 1e-12), (0.03, 6e-3)):  # to first order
             assert abs(kernel @ np.exp(0.1j * np.pi * ratio * (1.0 + error) * out)) < most
+
+
+JOINT = [
+    "limits={velocity=4.0, acceleration=15.0, jerk=400.0, travel=[-3.0, 3.0]}",
+    "robustness.uncertain={J=0.05}",
+    'planner.sensor={quantity="angle", of="alpha", noise=0.0002, offset=0.001, drop_out=0.05}',
+    "planner.sensor.delay=[0.001, 0.003]",
+    "planner.disturbance={swing={tip=0.03}, gust={acceleration=3.0, longest=0.5}, settle=1.0}",
+]
+TANK = [
+    "limits={velocity=0.6, acceleration=0.4, jerk=3.0, travel=[-5.0, 5.0]}",
+    "robustness.uncertain={h=0.05}",
+    "export.cycle_time=0.002",
+    'planner.sensor={quantity="sway", of="surface", noise=0.0002, delay=[0.0, 0.01], drop_out=0.2}',
+    "planner.disturbance={swing={surface=0.02}, gust={acceleration=0.1, longest=1.5}, settle=4.0}",
+]
+
+
+def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
+    compiled = compile_counting(planner_block(preset_spec("flexible-joint", JOINT)).text)
+    random, sound = np.random.default_rng(0), {"noise": 0.0002, "offset": -0.001, "delay": 0.002}
+    arm = MeasuredJoint(CountedBlock(compiled), inertia=0.003368, swing=(0.03, -0.864))
+    arm.run(0.023, **sound, random=random, rOverride=0.67)
+    arm.run(0.094, **sound, random=random, bVelocity=1.0, fVelocityCommand=-0.191)
+    arm.run(0.04, **sound, random=random, sensor=lambda *_: None)
+    moves = arm.run(1.0, **sound, random=random)
+    assert not moves["nSensorFault"].any()
+    issued = arm.run(2.0, **sound, random=random, fVelocityCommand=0.0)
+    assert issued["bDamping"].any() and issued["bPromise"][-1] and not issued["bBusy"][-1]
+    assert np.abs(issued["sway"][-500:]).max() < 0.005
+
+
+@pytest.mark.slow
+def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes():
+    compiled = compile_counting(planner_block(preset_spec("slosh-tank", TANK)).text)
+    random = np.random.default_rng(0)
+    tank = MeasuredTank(CountedBlock(compiled), fill=0.26, swing=(0.02, 1.0))
+    tank.run(1.0, noise=0.0002, delay=0.005, random=random, fTarget=1.0, bExecute=1.0)
+    tank.run(8.0, noise=0.0002, delay=0.005, random=random)
+    assert tank.rows["bDone"][-1]
+    tank.gust = 0.1
+    tank.run(0.5, noise=0.0002, delay=0.005, random=random)
+    tank.gust = 0.0
+    issued = tank.run(6.0, noise=0.0002, delay=0.005, random=random)
+    assert issued["bDamping"][-3000:].any() and issued["bDone"][-1] and issued["bPromise"][-1]
+    assert not issued["nSensorFault"].any()
+    assert np.abs(issued["sway"][-1000:]).max() < 0.004
+    assert np.abs(issued["fSwayEstimated"] - issued["sway"])[-1000:].max() < 0.001
+
+
+OTHERS_REFUSED = {
+    "late": (
+        "flexible-joint",
+        [*JOINT, "planner.sensor.delay=[0.03, 0.05]"],
+        "at most 0.036 s, known to 0.026",
+    ),
+    "load": ("slosh-tank", [*TANK, 'planner.sensor.of="theta1"'], r"sensor\.of: no load of the machine"),
+    "unseen": (
+        "slosh-tank",
+        [
+            *TANK,
+            'planner.sensor={quantity="angle", of="theta1", noise=0.001}',
+            "planner.disturbance.gust.acceleration=1.0",
+        ],
+        "theta1 does not show the faster swings .* measure another coordinate, or the sway of a load",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS_REFUSED)
+def test_what_a_sensor_cannot_show_is_refused_in_a_sentence(name):
+    machine, changes, words = OTHERS_REFUSED[name]
+    with pytest.raises(SpecError, match=words):
+        planner_block(preset_spec(machine, changes))
 
 
 REFUSED = {

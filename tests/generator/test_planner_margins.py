@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
-from exporters.measured_crane import MeasuredCrane
+from exporters.measured_machines import MeasuredCrane
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.margins import sensor_margins
@@ -33,7 +33,7 @@ def text(spec):
 @pytest.mark.slow
 def test_damping_excites_beyond_the_margins_and_not_within(spec, text):
     margins = sensor_margins(spec, text)
-    compiled = compile_counting(re.sub("(cSensorOthers : LREAL :=) [^;]*", r"\1 1.0E+9", text))
+    compiled = compile_counting(re.sub("(cSensorScale : LREAL :=) [^;]*", r"\1 1.0E+9", text))
 
     def left(late, gain):
         """By how much the load sways after a minute, from 0.2 m."""

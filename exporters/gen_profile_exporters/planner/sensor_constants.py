@@ -16,10 +16,7 @@ Array = NDArray[np.float64]
 LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
 KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
 NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
-CORRELATED = (
-    0.15  # of what else may differ, that is a misreading where nothing differs otherwise for a period
-)
-SETTLES = 1.7  # times as much within two periods after it was first used
+CORRELATED = 0.15  # of what else may differ: a misreading where nothing differs otherwise for a period
 STEADY = 0.03  # share by which a live parameter may be another than planned with, while motions are judged
 MEMORY = 1.0  # slow periods, over which what it shows of the axis's own motions is
 ROWS_BEFORE = 4  # of the model by mode, where one axis is planned: frequency, decay, error and sway
@@ -45,9 +42,8 @@ class SensorConstants:
         where later at rest, where once it hung still, and where it ends.
     gains : (3,) sequence of float
         Of sway, its rate and position, in pulses of a slot.
-    misread, others : float
-        By which share the axis's own motions may show otherwise than expected; and how much else that differs
-        may look like them, in its unit, the root of an integral over the phase of the slowest mode.
+    misread : float
+        By which share the axis's own motions may show otherwise than expected.
     room : float
         m, by which damping may lead away.
     """
@@ -72,7 +68,6 @@ class SensorConstants:
     end: float
     gains: Sequence[float]
     misread: float
-    others: float
     room: float
 
 
@@ -136,9 +131,7 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cSensorNoisy": sensor.noisy,
         "cSensorSmoothing": min(1.0, cycle / NOISE_WATCHED),
         "cSensorScale": sensor.misread,
-        "cSensorOthers": sensor.others,
         "cSensorAlike": CORRELATED,
-        "cSensorSettles": SETTLES,
         "cSensorSteady": STEADY,
         "cSensorForgets": 1.0 / (2.0 * np.pi * MEMORY),
         "cSensorFloor": sensor.floor,

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.machine import linearized, planned_axes
-from gen_profile.planner.sensor import damping_kernel
+from gen_profile.planner.sensor import damping_kernel, shown_of_modes
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
@@ -104,13 +104,12 @@ def _loop(spec: Spec, written: Mapping[str, Array], point: Sequence[float]) -> C
     at, (axis,) = linearized(spec, point), planned_axes(spec)
     frequencies = at.distinct_frequencies
     modes, slowest, rate = len(frequencies), float(frequencies[0]), int(sensor.quantity == "rate")
-    names = [coordinate.name for coordinate in spec.machine().unactuated]
     rows = _model(spec, written, point)[ROWS_BEFORE * modes :]
     push, shown = rows[:modes], rows[modes : 2 * modes]
     gains = rows[3 * modes : 5 * modes + 1] / spec.export.cycle_time
     s = 1j * slowest * FREQUENCIES
     decays = at.distinct_damping_ratios * frequencies
-    moved = np.linalg.solve(at.modes, at.input)[:, axis] * at.modes[names.index(sensor.of)]
+    moved = np.linalg.solve(at.modes, at.input)[:, axis] * shown_of_modes(spec, at)
     machine, learnt = np.zeros_like(s), gains[-1] / s
     for mode in range(modes):
         own = s * s + 2.0 * decays[mode] * s + frequencies[mode] ** 2

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from math import hypot
 
 import attrs
 import numpy as np
@@ -106,7 +105,12 @@ def sensor_constants(
     degree = int(interpolated.exponents.max(initial=0))
     rows = interpolate(lambda at: _rows(spec, sensor, disturbance, at), interpolated.curvatures, degree)
     _require_accurate(spec, sensor, disturbance, rows, list(sensed))
-    return _constants(spec, sensor, disturbance, list(sensed.values())), rows
+    others = [_others(spec, sensor, disturbance, one) - rows(point)[-1] for point, one in sensed.items()]
+    raised = rows.coefficients.copy()
+    raised[-1, ~rows.exponents.any(axis=0)] += max(0.0, *others)  # none is less than what is true
+    return _constants(spec, sensor, disturbance, list(sensed.values())), attrs.evolve(
+        rows, coefficients=raised
+    )
 
 
 def _constants(
@@ -128,10 +132,10 @@ def _constants(
     )
     slope = own_slope + disturbed * max(float(one.frequencies[0]) for one in sensed)
     noise = sensor.noise
-    floor = max(_floor(sensor, one) for one in sensed)
-    (unit,) = (axis.unit for axis in spec.machine().unactuated if axis.name == of)
+    floor = max(float(_floor(sensor, one)[0]) for one in sensed)
+    unit = next((one.unit for one in spec.machine().unactuated if one.name == of), "m")
     return SensorConstants(
-        words=f"the rate of {of}" if rate else of,
+        words={"angle": of, "rate": f"the rate of {of}", "sway": f"the sway of the {of}"}[sensor.quantity],
         unit=f"{unit}/s" if rate else unit,
         load=spec.machine().end_load_name,
         rate=rate,
@@ -151,7 +155,6 @@ def _constants(
         end=END * allowed,
         gains=_law().tolist(),
         misread=MISREAD,
-        others=max(_others(spec, sensor, disturbance, one) for one in sensed),
         room=damping_room(spec),
     )
 
@@ -197,17 +200,25 @@ def _sensed(
     driven = np.linalg.solve(at.modes, at.input)[:, axis]
     largest = _largest(spec)
     scale = shown[largest, range(len(driven))] * np.sign(driven * shown[largest, range(len(driven))])
-    names = [coordinate.name for coordinate in spec.machine().unactuated]
     end = spec.machine().end_load.start
     by_load = dict(zip(spec.machine().loads, (shown[:, 0] / scale[0]).tolist(), strict=True))
     return SensedModes(
         frequencies=at.distinct_frequencies,
         decays=at.distinct_damping_ratios * at.distinct_frequencies,
         push=driven * scale,
-        shown=at.modes[names.index(sensor.of)] / scale,
+        shown=shown_of_modes(spec, at) / scale,
         end_load=shown[end] / scale,
         swing=min(swing / abs(by_load[load]) for load, swing in disturbance.swing.items()),
     )
+
+
+def shown_of_modes(spec: Spec, at: Linearization) -> Array:
+    """Give what the sensor shows of each mode's coordinate (or of its rate), shape (modes,)."""
+    sensor, plant = spec.planner.sensor, spec.machine()
+    assert sensor is not None
+    if sensor.quantity == "sway":
+        return np.asarray(at.sway_gain[list(plant.loads).index(sensor.of)] @ at.modes)
+    return np.asarray(at.modes[[one.name for one in plant.unactuated].index(sensor.of)])
 
 
 def _largest(spec: Spec) -> list[int]:
@@ -240,12 +251,34 @@ def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
     return state, measured, np.asarray(covariance @ measured.T / noise)[:, 0]
 
 
-def _floor(sensor: SensorSpec, one: SensedModes) -> float:
-    """Find the standard deviation in m that the sensor's noise gives the slowest mode's estimate."""
+def _floor(sensor: SensorSpec, one: SensedModes) -> Array:
+    """Find the standard deviations in m that noise gives the modes' estimates, shape (modes,)."""
     state, measured, gain = _filter(sensor, one)
     kicks = np.outer(gain, gain) * sensor.noise**2 * NOISE_TIME
-    spread = solve_continuous_lyapunov(state - np.outer(gain, measured[0]), -kicks)
-    return hypot(np.sqrt(spread[0, 0]), np.sqrt(spread[1, 1]) / float(one.frequencies[0]))
+    spread = np.diag(solve_continuous_lyapunov(state - np.outer(gain, measured[0]), -kicks))
+    return np.asarray(np.sqrt(spread[:-1:2] + spread[1:-1:2] / one.frequencies**2))
+
+
+def _known_sway(spec: Spec, one: SensedModes) -> Array:
+    """Find to how many m each mode's sway is known at least, shape (modes,).
+
+    To four standard deviations of noise. Of faster modes, which are not damped, what gusts made of them and
+    the observer has not corrected within two slow periods counts, too: of one that does not show, all.
+    """
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    assert sensor is not None and disturbance is not None
+    state, measured, gain = _filter(sensor, one)
+    rates = range(1, len(state) - 1, 2)
+    state[rates, rates] = -2.0 * one.decays
+    period = 2.0 * np.pi / float(one.frequencies[0])
+    later = expm((state - np.outer(gain, measured[0])) * 2.0 * period)
+    gust = disturbance.gust.acceleration if disturbance.gust else 0.0
+    known = SURE * _floor(sensor, one)
+    for mode, frequency in enumerate(one.frequencies[1:].tolist(), start=1):
+        scale, own = np.array([1.0, frequency]), slice(2 * mode, 2 * mode + 2)
+        kept = np.linalg.norm(later[own, own] * scale / scale[:, None], 2)
+        known[mode] += kept * 2.0 * abs(float(one.push[mode])) * gust / frequency**2
+    return known
 
 
 def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
@@ -275,14 +308,16 @@ def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: S
 
 
 def _rows(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]) -> Array:
-    """Values of the model's rows: push, shown, end load's sway, gains of z and z' by mode, and the offset's.
+    """Values of the model's rows: push, shown, end load's sway, gains of z and z' by mode; then two.
 
-    The gains are those for a cycle, of what differed as long ago as a value usually is old.
+    These are the offset's gain, and `_others`. The gains are those for a cycle, of what differed as long ago
+    as a value usually is old.
     """
     one = _sensed(spec, sensor, disturbance, point)
     state, _, gain = _filter(sensor, one)
     now = spec.export.cycle_time * expm(state * _age(sensor)) @ gain
-    return np.concatenate([one.push, one.shown, one.end_load, now[:-1:2], now[1:-1:2], now[-1:]])
+    others = _others(spec, sensor, disturbance, one)
+    return np.array([*one.push, *one.shown, *one.end_load, *now[:-1:2], *now[1:-1:2], now[-1], others])
 
 
 def _law() -> Array:
@@ -343,12 +378,18 @@ def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
         raise SpecError(
             f"planner.sensor.of: {sensor.of} does not show the slowest swing; measure another coordinate."
         )
-    allowed, floor = min(spec.check.residual_sway.values()), _floor(sensor, one)
-    if SURE * floor > (AGAIN - BEGIN) * allowed:
+    needed = (AGAIN - BEGIN) * min(spec.check.residual_sway.values())
+    known, *others = _known_sway(spec, one)
+    if known > needed:
         raise SpecError(
-            f"planner.sensor.noise: the load's sway would be known to {SURE * floor:.2g} m only, and "
-            f"{(AGAIN - BEGIN) * allowed:.2g} m are needed to damp to check.residual_sway; take a better "
-            "sensor, or allow more."
+            f"planner.sensor.noise: the load's sway would be known to {known:.2g} m only, and {needed:.2g} m "
+            "are needed to damp to check.residual_sway; take a better sensor, or allow more."
+        )
+    if max(others, default=0.0) > needed:
+        raise SpecError(
+            f"planner.sensor.of: {sensor.of} does not show the faster swings well enough: {max(others):.2g} "
+            f"m that gusts make of them would not be seen, and {needed:.2g} m may be; measure another "
+            'coordinate, or the sway of a load (quantity = "sway").'
         )
     late, unknown = slowest * sensor.delay[1], 0.5 * slowest * (sensor.delay[1] - sensor.delay[0])
     if late > LARGEST_DELAY or unknown > UNKNOWN_DELAY:
@@ -378,9 +419,16 @@ def _require_accurate(
 ) -> None:
     """Refuse live ranges over which what the sensor shows would be known too roughly."""
     true = np.array([_rows(spec, sensor, disturbance, point) for point in points])
-    error = np.abs(np.array([rows(point) for point in points]) - true)
-    modes = (true.shape[1] - 1) // 5
-    worst = float((error / np.abs(true).max(axis=0))[:, : 3 * modes].max())
+    modes = (true.shape[1] - 2) // 5
+    error = np.abs(np.array([rows(point) for point in points]) - true)[:, : 3 * modes]
+    worst = float(
+        (
+            error
+            / np.maximum(
+                np.abs(true[:, : 3 * modes]).max(axis=0), LEAST_SHOWN * np.abs(true[:, : 3 * modes]).max()
+            )
+        ).max()
+    )
     if worst > ACCURATE:
         raise SpecError(
             f"planner.live: over these ranges what the sensor shows would be known to {worst:.1g} only; "

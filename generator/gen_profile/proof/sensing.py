@@ -189,9 +189,9 @@ class SensedHistory:
                 age[first:] = round(LATER * self.delay / cycle)
             case "drop-outs":
                 valid[first:] = _coming_and_going(LOST * sensor.drop_out / cycle, cycles - first, random)
-        rate = sensor.quantity == "rate"
+        quantities = {"angle": "{}", "rate": "{}.rate", "sway": "sway.{}"}
         return Measurement(
-            quantity=f"{sensor.of}.rate" if rate else sensor.of,
+            quantity=quantities[sensor.quantity].format(sensor.of),
             shows=list(inputs).index("fSensor"),
             valid=list(inputs).index("bSensorValid"),
             cycles=rows,

@@ -17,14 +17,15 @@ Span = Annotated[tuple[float, float], Rising()]
 
 @attrs.frozen(kw_only=True)
 class SensorSpec(Checked, table="planner.sensor"):
-    """A sensor of one coordinate of the machine, in m (or rad) and s.
+    """A sensor of one coordinate or load of the machine, in m (or rad) and s.
 
     Attributes
     ----------
     quantity : str
-        Whether it measures the coordinate (``angle``, in m where that is a length) or its rate.
+        Whether it measures a coordinate (``angle``, in m where that is a length) or its rate, or the
+        ``sway`` of a load in m.
     of : str
-        Name of the coordinate, positive as in the machine's equations.
+        Name of the coordinate or load, positive as in the machine's equations.
     noise : float
         One standard deviation, independent from value to value.
     offset : float
@@ -35,7 +36,7 @@ class SensorSpec(Checked, table="planner.sensor"):
         Time without a good value after which the sensor counts as lost.
     """
 
-    quantity: Literal["angle", "rate"]
+    quantity: Literal["angle", "rate", "sway"]
     of: str
     noise: Positive
     offset: NotNegative = 0.0

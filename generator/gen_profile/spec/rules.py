@@ -270,10 +270,17 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
             missing, of = ("disturbance", "sensor") if disturbance is None else ("sensor", "disturbance")
             yield f"planner.{missing}", Phrase("required by planner.{of}", of=of), f"planner.{of}"
         return
-    known = [coordinate.name for coordinate in plant.unactuated]
-    if sensor.of not in known:
-        hint = suggestion(sensor.of, known)
-        yield "planner.sensor.of", Phrase("no coordinate that swings{hint}", hint=hint)
+    swing = [coordinate.name for coordinate in plant.unactuated]
+    if sensor.quantity == "sway" and sensor.of not in plant.loads:
+        yield (
+            "planner.sensor.of",
+            Phrase("no load of the machine{hint}", hint=suggestion(sensor.of, plant.loads)),
+        )
+    elif sensor.quantity != "sway" and sensor.of not in swing:
+        yield (
+            "planner.sensor.of",
+            Phrase("no coordinate that swings{hint}", hint=suggestion(sensor.of, swing)),
+        )
     if not disturbance.swing:
         yield "planner.disturbance.swing", "must name a load"
     for name in ("live_rate", "zones"):
