@@ -69,8 +69,8 @@ class Followed:
     rest_reports : sequence of int
         Cycles in which the load is seen to hang still.
     zones : sequence of Zone
-    drifts : (cycles,) array of bool
-        Whether a live parameter is other than at first.
+    drifts, retold : (cycles,) array of bool
+        Whether a live parameter is other than at first, and whether plans are for another machine.
     live_changes : sequence of (int, int)
         Cycles in which a live parameter changes for the first time, and from which the block must know of it.
     steps, speeds : (axes, cycles) array
@@ -93,6 +93,7 @@ class Followed:
     rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
+    retold: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
     live_changes: Sequence[tuple[int, int]] = ()
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))

@@ -361,7 +361,7 @@ def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
 def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
     unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
-    unknown += [*followed.rest_reports, *np.flatnonzero(followed.drifts)[:1].tolist()]
+    unknown += [*followed.rest_reports, *np.flatnonzero(followed.retold)[:1].tolist()]
     until = min(unknown, default=followed.cycles)
     ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
     if followed.modes is None or not ends:

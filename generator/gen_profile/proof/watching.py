@@ -40,6 +40,7 @@ STATED = 1.05  # sway by what the block states: between the machines that it wat
 MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 SURELY = 3  # times that the block needs to see a live parameter change
+RETOLD = 0.5  # of the change of a live parameter that counts, from which on plans are for another machine
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
 _STATED = re.compile(r"\bcReaction\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
@@ -192,7 +193,8 @@ class BlockWatch:
             sway_limit=min(self.spec.check.residual_sway.values()),
             rest_reports=self._rest_reports(script, run.cycles),
             zones=list(self._zones(start_cycles, rows, run.cycles)),
-            drifts=self._drifts(script, now),
+            drifts=self._drifts(script, now, 1.0, self.known.held // 2),
+            retold=self._drifts(script, now, RETOLD, 1),
             live_changes=list(self._live_changes(script, run.cycles)),
             steps=steps,
             speeds=speeds,
@@ -245,16 +247,16 @@ class BlockWatch:
                         number=number + 1,
                     )
 
-    def _drifts(self, script: Script, now: NDArray[np.int64]) -> Flags:
-        """Tell where a live parameter is other than at first for as long as counts."""
-        drifts, held = np.zeros(len(now), dtype=bool), self.known.held
+    def _drifts(self, script: Script, now: NDArray[np.int64], share: float, cycles: int) -> Flags:
+        """Tell where a live parameter is other than at first, by a share of what counts, for longer."""
+        drifts = np.zeros(len(now), dtype=bool)
         for name, (low, high) in self.known.live.items():
             if name in self.spec.planner.live_rate:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")][now]
-            apart = (np.abs(value - value[0]) > STEADY * high) & (value >= low) & (value <= high)
+            apart = (np.abs(value - value[0]) > share * STEADY * high) & (value >= low) & (value <= high)
             for begin, end in runs_of(apart):
-                drifts[begin + held // 2 : end] |= end - begin > held // 2
+                drifts[begin + cycles : end] |= end - begin > cycles
         return drifts
 
     def _live_changes(self, script: Script, cycles: int) -> Iterator[tuple[int, int]]:
