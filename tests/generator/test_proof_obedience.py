@@ -221,6 +221,8 @@ def test_every_fault_is_found(what):
 
 def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginning():
     assert kinds(attrs.evolve(FAULTS["swings"], retold=np.ones(CYCLES, dtype=bool))) == set()
+    last = attrs.evolve(obedient(), last_modes=MODES, last_known=50, sway_limit=0.05)
+    assert kinds(last) == {kind_of(WORDS["swings"])}
 
 
 @pytest.mark.parametrize(

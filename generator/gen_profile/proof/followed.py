@@ -76,8 +76,10 @@ class Followed:
     steps, speeds : (axes, cycles) array
         How far axes are from the setpoints of the cycle before, in m, and how fast they go where they are not
         guided.
-    modes : GivenModes or None
-        Of the machine that the block is given, where its live parameters stay as they are.
+    modes, last_modes : GivenModes or None
+        Of the machine that the block is given, where that is known: first and, where it is another, last.
+    last_known : int
+        Cycle from which the block must know the last one.
     """
 
     cycle: float
@@ -98,6 +100,8 @@ class Followed:
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     modes: GivenModes | None = None
+    last_modes: GivenModes | None = None
+    last_known: int = 0
 
     @property
     def enabled(self) -> list[int]:

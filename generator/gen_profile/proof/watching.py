@@ -41,6 +41,7 @@ MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 SURELY = 3  # times that the block needs to see a live parameter change
 RETOLD = 0.5  # of the change of a live parameter that counts, from which on plans are for another machine
+MEDIAN = 3  # cycles, of which the median of a live parameter counts
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
 _STATED = re.compile(r"\bcReaction\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
@@ -129,7 +130,7 @@ class BlockWatch:
 
     def faults(
         self,
-        given: tuple[float, GivenModes | None],
+        given: tuple[float, GivenModes | None, GivenModes | None],
         script: Script,
         expected: Sequence[TimedOrder],
         block: CalledBlock,
@@ -139,8 +140,8 @@ class BlockWatch:
 
         Parameters
         ----------
-        given : (float, GivenModes or None)
-            Slowest period in s, and modes, of the machine that the block is given.
+        given : (float, GivenModes or None, GivenModes or None)
+            Slowest period in s, and modes, of the machine that the block is given: first and last.
         script : Script
             Of a history.
         expected : sequence of TimedOrder
@@ -150,7 +151,7 @@ class BlockWatch:
             With its trace, and copies of the block before `marks`.
         """
         followed, reactions = self.followed(given[0], script, expected, block, run)
-        followed = attrs.evolve(followed, modes=given[1])
+        followed = attrs.evolve(followed, modes=given[1], last_modes=given[2])
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
         return (*faults(met, followed.cycle), *self._understated(run, followed)), left
@@ -196,6 +197,7 @@ class BlockWatch:
             drifts=self._drifts(script, now, 1.0, self.known.held // 2),
             retold=self._drifts(script, now, RETOLD, 1),
             live_changes=list(self._live_changes(script, run.cycles)),
+            last_known=self._last_known(script, expected),
             steps=steps,
             speeds=speeds,
         )
@@ -258,6 +260,13 @@ class BlockWatch:
             for begin, end in runs_of(apart):
                 drifts[begin + cycles : end] |= end - begin > cycles
         return drifts
+
+    def _last_known(self, script: Script, orders: Sequence[TimedOrder]) -> int:
+        """Tell the cycle from which the block must know the last live parameters: at once with an order."""
+        live = script.inputs[:, [self.inputs.index(f"f{name}") for name in self.known.live]]
+        row = np.flatnonzero((live[1:] != live[:-1]).any(axis=1))[-1:] + 1
+        begin = int(np.asarray(script.start_cycles)[row].sum())
+        return begin + (MEDIAN if any(one.begin == begin for one in orders) else SURELY * self.known.held)
 
     def _live_changes(self, script: Script, cycles: int) -> Iterator[tuple[int, int]]:
         """Give cycles in which a live parameter changes, and from which that is certain."""
