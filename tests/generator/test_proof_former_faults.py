@@ -16,6 +16,12 @@ FORMER = {  # machine: how many are drawn, seed, number
         (400, 12, 233),  # a pulse beyond the ends that were stated meanwhile, by 0.5 mm
         (400, 12, 237),  # error 8, where a plan began beside a blocked interval
         (400, 7, 167),  # 19 mm beyond the stated ends of a stop
+        (300, 12, 23),  # judged by the rope of its beginning, while it planned for another one
+    ],
+    "slow": [
+        (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
+        (300, 8, 58),  # 15 cm beyond the stated ends, as a pulse was weighed where the override became 0
+        (300, 5, 39),  # fTimeToGo half of what it took pulses to turn round
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded

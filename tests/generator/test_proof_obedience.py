@@ -203,6 +203,7 @@ FAULTS = {
     "distance": with_output("fDistanceToGo", 300, 1.0),
     "time": with_output("fTimeToGo", slice(720, 820), 3.0),
     "stop distance": with_output("fStopDistance", 300, 1.0),
+    "back": with_output("fVelocity", slice(300, 310), -0.1),
     "beyond": with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.7,)), STOPS),
     "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
     "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
@@ -218,6 +219,12 @@ FAULTS = {
 @pytest.mark.parametrize("what", FAULTS)
 def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
+
+
+def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginning():
+    assert kinds(attrs.evolve(FAULTS["swings"], retold=np.ones(CYCLES, dtype=bool))) == set()
+    last = attrs.evolve(obedient(), last_modes=MODES, last_known=50, sway_limit=0.05)
+    assert kinds(last) == {kind_of(WORDS["swings"])}
 
 
 @pytest.mark.parametrize(

@@ -119,14 +119,19 @@ class ClosedLoop:
                     progress("proving", number, numbering.count)
         return judged
 
-    def known(self, history: History) -> tuple[float, GivenModes | None]:
-        """Tell the slowest period in s and, where they stay the same, the modes of the machine as given."""
+    def known(self, history: History) -> tuple[float, GivenModes | None, GivenModes | None]:
+        """Tell the slowest period in s and, where known, modes of the machine as given, first and last."""
         spec = self._spec
         steady = not (history.hoisting or history.sensed or spec.planner.live_noise or spec.planner.live_rate)
         modes = GivenModes.of(spec, history.live, history.commands[-1].time) if steady else None
-        return self._histories.slowest(history), modes
+        lasting = [one.inputs for one in history.changes if math.isinf(one.lasts)]
+        live = {name: given[f"f{name}"] for given in lasting for name in history.live if f"f{name}" in given}
+        last = GivenModes.of(spec, {**history.live, **live}) if steady and live else None
+        return self._histories.slowest(history), modes, last
 
-    def watched(self, history: History, period: float, modes: GivenModes | None = None) -> WatchedRun:
+    def watched(
+        self, history: History, period: float, modes: GivenModes | None = None, last: GivenModes | None = None
+    ) -> WatchedRun:
         """Let the machine of a history follow the block, and see whether the block obeys.
 
         Parameters
@@ -134,8 +139,8 @@ class ClosedLoop:
         history : History
         period : float
             s, of the slowest swing that the block is given.
-        modes : GivenModes, optional
-            Of the machine that it is given.
+        modes, last : GivenModes, optional
+            Of the machine that it is given, and where that is another, of that in the end.
 
         Raises
         ------
@@ -149,7 +154,7 @@ class ClosedLoop:
         run = self._followed(history, block, script, rows=orders[-1].end, marks=marks)
         if run.fault:
             return WatchedRun(run=run)
-        faults, left = self._watch.faults((period, modes), script, orders, block, run)
+        faults, left = self._watch.faults((period, modes, last), script, orders, block, run)
         faults = (*faults, *self._sensor_faults(history, run))
         return WatchedRun(run=attrs.evolve(run, trace=None, copies=None), faults=faults, left=left)
 

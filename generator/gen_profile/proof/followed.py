@@ -69,15 +69,17 @@ class Followed:
     rest_reports : sequence of int
         Cycles in which the load is seen to hang still.
     zones : sequence of Zone
-    drifts : (cycles,) array of bool
-        Whether a live parameter is other than at first.
+    drifts, retold : (cycles,) array of bool
+        Whether a live parameter is other than at first, and whether plans are for another machine.
     live_changes : sequence of (int, int)
         Cycles in which a live parameter changes for the first time, and from which the block must know of it.
     steps, speeds : (axes, cycles) array
         How far axes are from the setpoints of the cycle before, in m, and how fast they go where they are not
         guided.
-    modes : GivenModes or None
-        Of the machine that the block is given, where its live parameters stay as they are.
+    modes, last_modes : GivenModes or None
+        Of the machine that the block is given, where that is known: first and, where it is another, last.
+    last_known : int
+        Cycle from which the block must know the last one.
     """
 
     cycle: float
@@ -93,10 +95,13 @@ class Followed:
     rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
+    retold: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
     live_changes: Sequence[tuple[int, int]] = ()
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
     modes: GivenModes | None = None
+    last_modes: GivenModes | None = None
+    last_known: int = 0
 
     @property
     def enabled(self) -> list[int]:

@@ -419,9 +419,12 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
-    """Tell another live parameter on the way, faster than may be, and that of before later."""
+    """Tell another live parameter on the way, faster than may be, and later that of before, or not."""
     inputs = {f"f{name}": _between(ends, _fraction(how, 5)) for name, ends in around.live.items()}
-    change = _change(command, around.part(how, 3), _log(0.1, around.period, _fraction(how, 4)), inputs)
+    later, lasts = around.part(how, 3), _log(0.1, around.period, _fraction(how, 4))
+    if how > 0.3:  # for good; some together with the command
+        later, lasts = later * (how < 0.6), inf
+    change = _change(command, later, lasts, inputs)
     return Manner(commands=(command,), changes=(change,) if inputs and not around.hoists else ())
 
 

@@ -44,6 +44,7 @@ from gen_profile.proof.statements import (
 MORE = (
     0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
 )
+BACK = 0.01  # likewise, at which an axis may go back (0.002)
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 WORDS = {
@@ -52,6 +53,7 @@ WORDS = {
     STOP: "a stop ends later than allowed by {over:.3g} s",
     "left": "a target is left again by {needed:.3g} m",
     "unasked": "an axis moves that was not commanded to by {needed:.3g} m/s",
+    "back": "an axis goes back on its way from rest by {needed:.3g} m/s",
     "beyond": "a velocity is above the stick's by {over:.3g} m/s",
     "against": "an axis moves against its command longer than allowed by {over:.3g} s",
     "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
@@ -248,7 +250,7 @@ def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allow
 
 
 def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
-    """Judge that from rest no axis is faster than its stick, and that one left alone stays where it is."""
+    """Judge that from rest no axis is faster than its stick or goes back, and that one left alone stays."""
     for before, order in pairwise(followed.orders):
         begin, end = order.begin, order.end
         if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
@@ -264,6 +266,9 @@ def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             elif order.kind == VELOCITY:
                 top = abs(way) + MORE * followed.limits[k].velocity
                 yield from greatest("beyond", velocity * np.sign(way), top, begin)
+            elif not followed.issued["bBusy"][begin - 1]:
+                back = BACK * followed.limits[k].velocity
+                yield from greatest("back", -velocity * np.sign(way), back, begin)
 
 
 def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

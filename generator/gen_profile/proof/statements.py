@@ -239,6 +239,9 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     apart = np.abs(followed.of("fStopDistance") - np.maximum(high - motion.position, motion.position - low))
     yield from greatest("stop distance", apart, EXACT)
     yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
+    widest = max(limits.margin for limits in followed.limits) + EXACT
+    apart = np.maximum(high - motion.position, motion.position - low) * ~motion.guided
+    yield from greatest("loose", apart, widest)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
         begin = max(
@@ -360,8 +363,9 @@ def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
 
 def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
+    yield from _remains_at_last(followed, motion)
     unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
-    unknown += [*followed.rest_reports, *np.flatnonzero(followed.drifts)[:1].tolist()]
+    unknown += [*followed.rest_reports, *np.flatnonzero(followed.retold)[:1].tolist()]
     until = min(unknown, default=followed.cycles)
     ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
     if followed.modes is None or not ends:
@@ -386,3 +390,17 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         above = at_most - stated[ends] - BESIDE * limit * np.clip(TURNED * long, 1.0, MOST_TURNED)
         worst = int(np.argmax(above))
         yield Allowance("understated", ends[worst], float(above[worst]), 0.0)
+
+
+def _remains_at_last(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+    """Judge what motions leave that begin and end at rest after the last live parameters were given."""
+    if followed.last_modes is None or followed.last_modes.damped:
+        return
+    lost = [order.end for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
+    known = max(followed.last_known, *lost, 0)
+    rests = [max(begin, known) for begin, end in runs_of(motion.stands) if end > known]
+    if len(rests) > 1:
+        ends = [at - rests[0] for at in rests[1:]]
+        left, *_ = followed.last_modes.left(motion.acceleration[:, rests[0] :], ends, followed.cycle)
+        worst = int(np.argmax(left))
+        yield Allowance("swings", rests[1 + worst], float(left[worst]), UNDISTURBED * followed.sway_limit)

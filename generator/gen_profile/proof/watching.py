@@ -40,6 +40,8 @@ STATED = 1.05  # sway by what the block states: between the machines that it wat
 MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 SURELY = 3  # times that the block needs to see a live parameter change
+RETOLD = 0.5  # of the change of a live parameter that counts, from which on plans are for another machine
+MEDIAN = 3  # cycles, of which the median of a live parameter counts
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
 _STATED = re.compile(r"\bcReaction\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
@@ -128,7 +130,7 @@ class BlockWatch:
 
     def faults(
         self,
-        given: tuple[float, GivenModes | None],
+        given: tuple[float, GivenModes | None, GivenModes | None],
         script: Script,
         expected: Sequence[TimedOrder],
         block: CalledBlock,
@@ -138,8 +140,8 @@ class BlockWatch:
 
         Parameters
         ----------
-        given : (float, GivenModes or None)
-            Slowest period in s, and modes, of the machine that the block is given.
+        given : (float, GivenModes or None, GivenModes or None)
+            Slowest period in s, and modes, of the machine that the block is given: first and last.
         script : Script
             Of a history.
         expected : sequence of TimedOrder
@@ -149,7 +151,7 @@ class BlockWatch:
             With its trace, and copies of the block before `marks`.
         """
         followed, reactions = self.followed(given[0], script, expected, block, run)
-        followed = attrs.evolve(followed, modes=given[1])
+        followed = attrs.evolve(followed, modes=given[1], last_modes=given[2])
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
         return (*faults(met, followed.cycle), *self._understated(run, followed)), left
@@ -192,8 +194,10 @@ class BlockWatch:
             sway_limit=min(self.spec.check.residual_sway.values()),
             rest_reports=self._rest_reports(script, run.cycles),
             zones=list(self._zones(start_cycles, rows, run.cycles)),
-            drifts=self._drifts(script, now),
+            drifts=self._drifts(script, now, 1.0, self.known.held // 2),
+            retold=self._drifts(script, now, RETOLD, 1),
             live_changes=list(self._live_changes(script, run.cycles)),
+            last_known=self._last_known(script, expected),
             steps=steps,
             speeds=speeds,
         )
@@ -245,17 +249,24 @@ class BlockWatch:
                         number=number + 1,
                     )
 
-    def _drifts(self, script: Script, now: NDArray[np.int64]) -> Flags:
-        """Tell where a live parameter is other than at first for as long as counts."""
-        drifts, held = np.zeros(len(now), dtype=bool), self.known.held
+    def _drifts(self, script: Script, now: NDArray[np.int64], share: float, cycles: int) -> Flags:
+        """Tell where a live parameter is other than at first, by a share of what counts, for longer."""
+        drifts = np.zeros(len(now), dtype=bool)
         for name, (low, high) in self.known.live.items():
             if name in self.spec.planner.live_rate:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")][now]
-            apart = (np.abs(value - value[0]) > STEADY * high) & (value >= low) & (value <= high)
+            apart = (np.abs(value - value[0]) > share * STEADY * high) & (value >= low) & (value <= high)
             for begin, end in runs_of(apart):
-                drifts[begin + held // 2 : end] |= end - begin > held // 2
+                drifts[begin + cycles : end] |= end - begin > cycles
         return drifts
+
+    def _last_known(self, script: Script, orders: Sequence[TimedOrder]) -> int:
+        """Tell the cycle from which the block must know the last live parameters: at once with an order."""
+        live = script.inputs[:, [self.inputs.index(f"f{name}") for name in self.known.live]]
+        row = np.flatnonzero((live[1:] != live[:-1]).any(axis=1))[-1:] + 1
+        begin = int(np.asarray(script.start_cycles)[row].sum())
+        return begin + (MEDIAN if any(one.begin == begin for one in orders) else SURELY * self.known.held)
 
     def _live_changes(self, script: Script, cycles: int) -> Iterator[tuple[int, int]]:
         """Give cycles in which a live parameter changes, and from which that is certain."""
