@@ -2,6 +2,7 @@
 
 import re
 
+import attrs
 import numpy as np
 import pytest
 from command_line import run_here
@@ -11,11 +12,14 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
+from gen_profile.designs.plan import plan
 from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.identification.learning import LEAST, Machines, learn
 from gen_profile.identification.measurements import DirectReading, SwingLog, parse_reading
-from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, read_spec
+from gen_profile.motion.profile import Profile, SampledProfile, sample
+from gen_profile.spec.reading import HERE, parse_spec, preset_spec, preset_text, read_spec
+from gen_profile.spec.text import changed_text
+from gen_profile.verification.from_python import cosimulate
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 
@@ -89,10 +93,27 @@ def test_a_machine_that_changed_is_named(rope):
     assert found == pytest.approx(rope - 1.0, rel=0.01)
 
 
+def test_a_log_in_another_unit_is_refused():
+    log = log_of(noise=1e-4)
+    with pytest.raises(InfeasibleProblem, match=r"shows 3 times the rate .* look at its unit"):
+        learn(SPEC, PLAYED, [attrs.evolve(log, values=3.2 * log.values)])
+
+
+def test_a_table_in_a_line_keeps_its_spaces():
+    text = preset_text("bay-crane")
+    spec = parse_spec(text)
+    learned = spec.changed({"robustness.uncertain": {"L1": 0.04, "c1": 0.061}, "plant.parameters.c1": 9.0})
+    assert "uncertain = { L1 = 0.04, c1 = 0.061 } #" in changed_text(text, (), spec, learned, HERE)
+
+
 @pytest.mark.slow
 def test_a_log_of_another_run_is_refused():
     with pytest.raises(InfeasibleProblem, match=r"it is of no whole run of this motion|as this run shows"):
-        learn(SPEC, PLAYED, [log_of(move=lambda time, order: 0.4 * np.sin(2.2 * time) * (time < 14.0))])
+        learn(
+            SPEC,
+            PLAYED,
+            [log_of(after=7.0, move=lambda time, order: 0.4 * np.sin(2.2 * time) * (time < 9.0))],
+        )
 
 
 def test_a_sway_that_was_seen_excludes_ropes():
@@ -213,3 +234,24 @@ def test_a_crane_is_learned_by_three_runs():
     assert all(held)
     assert remained[-1] < 0.1 * remained[0]
     assert max(np.diff(remained)) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("machine", "name", "signal"),
+    [("gantry-crane", "L", "angle:payload-x"), ("tower-crane", "L", "sway:payload-tangential"),
+     ("single-pendulum-crane", "L0", "rate:payload"), ("slosh-tank", "h", "sway:surface"),
+     ("flexible-joint", "J", "sway:tip")],
+)  # fmt: skip
+def test_every_machine_is_learned(machine, name, signal):
+    spec = preset_spec(machine)
+    true, (quantity, load) = 1.04 * spec.plant.parameters[name], signal.split(":")
+    setpoints = sample(plan(spec).command, CYCLE)
+    run = cosimulate(spec, setpoints, {name: true})
+    column = spec.machine().loads.index(load)
+    values = run.sway[:, column] if quantity == "sway" else run.angle[:, column]
+    values = np.gradient(values, run.times) if quantity == "rate" else values
+    values = values + np.random.default_rng(0).normal(0.0, 0.01 * np.std(values), values.size)
+    log = SwingLog(times=run.times, values=values, quantity=quantity, load=load)
+    low, high = learn(spec, setpoints, [log]).spec.checked_ranges()[name]
+    assert low <= true <= high < 1.02 * low

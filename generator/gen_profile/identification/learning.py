@@ -36,7 +36,6 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.suggestion import suggestion
-from gen_profile.summary import Summarised
 
 CONFIDENCE = 0.999  # of each log, so that the ranges after ten of them hold with 99 %
 DRAWN, BEST = 256, 2  # machines of the ranges that are tried, and of these the ones from which a fit begins
@@ -44,6 +43,7 @@ SAMPLES = 1500  # of a log that are fitted
 LOOSE = 3.0  # half-ranges: the standard deviation of a parameter of which a log tells nothing
 IMPOSSIBLE = 25.0  # by which the squares that a log leaves are more by chance once in a million times
 GROSS = 0.5  # of a log's standard deviation: a machine that leaves more of it explains nothing
+SHOWN = (0.5, 1.5)  # times a swing that a sensor may show: it may lie askew, by 60° at most
 WIDE = np.geomspace(0.25, 4.0, 33)  # times a parameter of the spec, where one is looked for that changed
 SLABS, PER_SLAB = 16, 8  # into which a range is cut, and machines that are looked at in each
 MOST = 2  # ranges for which these multiply: more of them have no more machines
@@ -118,11 +118,16 @@ def narrowed_by_log(
     excess = len(model.log.times) * (left**2 / float(np.var(free.left(beyond)[0])) - 1.0)
     if lines is not None or excess > IMPOSSIBLE:
         _require_unchanged(fit, model, unknowns, certain=excess > IMPOSSIBLE)
+    begin, gain, _ = unknowns[-3:].tolist()
+    if not SHOWN[0] < abs(gain) < SHOWN[1]:
+        raise InfeasibleProblem(
+            f"The log of {log.load} shows {abs(gain):.2g} times the {log.quantity} that this motion leads "
+            "to: look at its unit, and at what it is of (signal)."
+        )
     sigma = noise if lines is None else np.array([lines.widened(float(noise[0]), len(model.log.times))])
     factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     half = uncertainty(fit, unknowns, sigma).half_ranges(factor)
     ends = np.stack([unknowns[: len(half)] - half, unknowns[: len(half)] + half], axis=1) * fit.scale[:, None]
-    begin, gain, _ = unknowns[-3:].tolist()
     evidence = {
         "load": log.load,
         "quantity": log.quantity,
@@ -266,31 +271,22 @@ def _explained(
     return [] if found is None else [found]
 
 
-@attrs.frozen(kw_only=True, eq=False, repr=False)
-class Learning(Summarised):
+@attrs.frozen(kw_only=True, eq=False)
+class Learning:
     """What runs told of a machine.
 
     Attributes
     ----------
-    given, spec : Spec
-        Before and after; what has a range has its middle as value now.
+    spec : Spec
+        With the ranges that are left, and their middles as values.
     before : Machines
     lessons : tuple of Lesson
         One of each run.
     """
 
-    given: Spec
     spec: Spec
     before: Machines
     lessons: tuple[Lesson, ...]
-
-    def summary(self) -> dict[str, object]:
-        """Tell what a reader looks for first."""
-        ranges = self.spec.checked_ranges()
-        return {
-            "name": self.spec.name,
-            **{name: f"{ranges[name][0]:.4g} to {ranges[name][1]:.4g}" for name in self.before.ranges},
-        }
 
     def warnings(self) -> tuple[str, ...]:
         """Say what no machine of the ranges explains, though it excludes some; a sentence each."""
@@ -365,7 +361,7 @@ def learn(
             else:
                 lessons.append(narrowed_by_sight(machines, played, run, observation_time(spec)))
             machines = lessons[-1].machines
-    return Learning(given=spec, spec=_learned(spec, machines), before=before, lessons=tuple(lessons))
+    return Learning(spec=_learned(spec, machines), before=before, lessons=tuple(lessons))
 
 
 def _learned(spec: Spec, machines: Machines) -> Spec:

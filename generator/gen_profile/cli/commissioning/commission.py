@@ -38,14 +38,6 @@ UNCHANGED = "as it is"
 Words = tuple[str, ...]
 
 
-def _options_of_others(command: click.Command) -> click.Command:
-    """Add the options that are handed on."""
-    for other, names in TAKEN.items():
-        command.params += [one for one in other.params if one.name in names]
-    return command
-
-
-@_options_of_others
 @cli.command(epilog="Example: gen-profile commission crane.toml --export plc --to opc.tcp://10.0.0.5:4840")
 @click.argument("path", metavar="SPEC.toml", type=PathType())
 @click.option(
@@ -112,6 +104,9 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
     }
     written = ", ".join(str(one) for one in (path, *files, page, record) if one)
     print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.", as_json)
+
+
+commission.params += [one for other, names in TAKEN.items() for one in other.params if one.name in names]
 
 
 def _announce(step: str) -> None:
