@@ -78,11 +78,15 @@ def test_a_wrong_answer_is_asked_for_again(site):
     assert ended.returncode == 130, ended.stderr
     assert "plant.m2: must be a number" in ended.stderr
     assert "write NAME=VALUE±UNCERTAINTY" in ended.stderr
-    assert "L2, rope from hook to payload, in m" in ended.stderr
+    assert "L2, rope from hook to payload, in m (or as 6.2±0.1) [1.5]" in ended.stderr
     assert sorted(one.name for one in site.iterdir()) == ["run.csv"]
 
 
-def test_a_log_that_is_not_there_is_refused_before_anything_is_written(site):
-    refused = commissioned(site, "--preset", "bay-crane", "--yes", "--swing", "nun.csv", answers=[])
-    assert refused.returncode == 2 and "There is no log nun.csv" in refused.stderr
+@pytest.mark.parametrize(
+    ("option", "reason"),
+    [(("--swing", "nun.csv"), "There is no log nun.csv"), (("--export", "plk"), "unknown format 'plk'")],
+)
+def test_what_is_not_there_is_refused_before_anything_is_written(site, option, reason):
+    refused = commissioned(site, "--preset", "bay-crane", "--yes", *option, answers=[])
+    assert refused.returncode == 2 and reason in refused.stderr
     assert not (site / "hall.toml").exists()

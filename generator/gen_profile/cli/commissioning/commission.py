@@ -12,14 +12,17 @@ from gen_profile.cli.commands import cli, design
 from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
-from gen_profile.cli.options import PathType, SpecChoice, complete_presets, output_options
+from gen_profile.cli.options import PathType, SpecChoice, complete_presets, output_options, require_formats
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.report import report
 from gen_profile.errors import GenProfileError, OutputError
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
+
+    from gen_profile.spec.model import Spec
 
 # what it takes of each of the others
 TAKEN: dict[click.Command, tuple[str, ...]] = {
@@ -27,14 +30,16 @@ TAKEN: dict[click.Command, tuple[str, ...]] = {
     design: ("folder",),
     deploy: ("data_block", "instance", "fingerprint", "user", "certificate", "security", "by", "key_path"),
 }
-ASKED = {
-    "move.distance": "How far it shall go, in m",
-    "move.duration": "in how many s",
-    "limits.velocity": "The drive's greatest velocity, in m/s",
-    "limits.acceleration": "and acceleration, in m/s²",
-    "check.residual_sway": "Sway that may remain, in m",
+ASKED: dict[str, tuple[str, Callable[[Spec], object]]] = {  # of a machine with one axis; what stands there
+    "move.distance": ("How far it shall go, in m", lambda spec: spec.move.distance[0]),
+    "move.duration": ("in how many s", lambda spec: spec.move.duration),
+    "limits.velocity": ("The drive's greatest velocity, in m/s", lambda spec: spec.limits.velocity),
+    "limits.acceleration": ("and acceleration, in m/s²", lambda spec: spec.limits.acceleration),
+    "check.residual_sway": (
+        "Sway that may remain, in m",
+        lambda spec: min(spec.check.residual_sway.values()),
+    ),
 }
-UNCHANGED = "as it is"
 Words = tuple[str, ...]
 
 
@@ -72,6 +77,7 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
     """
     require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
     run = _Guide(click.get_current_context(), options, yes)
+    require_formats(options["formats"])
     with redirect_stdout(sys.stderr) if as_json else nullcontext():
         _announce("1. The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
@@ -138,21 +144,29 @@ class _Guide:
             return given, readings
         self._preset = self.answer("preset", "Most like which of gen-profile presets", "bay-crane")
         spec = SpecChoice(None, self._preset, given).spec()
-        asked = {
-            f"plant.{q.name}": f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)"
+        asked: dict[str, tuple[str, object]] = {
+            f"plant.{q.name}": (
+                f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)",
+                spec.plant.parameters[q.name],
+            )
             for q in spec.machine().parameters
             if q.name != "g" and not any(one.startswith(f"{q.name}=") for one in readings)
-        } | (ASKED if len(spec.machine().actuated) == 1 else {})
-        for key, question in asked.items():
+        }
+        if len(spec.machine().actuated) == 1:
+            asked |= {key: (question, value(spec)) for key, (question, value) in ASKED.items()}
+        for key, (question, value) in asked.items():
             if not any(one.startswith(f"{key}=") for one in given):
-                given, readings = self._taken(key, question, given, readings)
+                unchanged = "" if value is None else f"{value}"
+                given, readings = self._taken(key, question, unchanged, given, readings)
         return given, readings
 
-    def _taken(self, key: str, question: str, given: Words, readings: Words) -> tuple[Words, Words]:
+    def _taken(
+        self, key: str, question: str, unchanged: str, given: Words, readings: Words
+    ) -> tuple[Words, Words]:
         """Add an answer to the keys or the readings, once it is one that the spec takes."""
         from gen_profile.identification.measurements import parse_reading
 
-        while (text := self.answer("", question, UNCHANGED)) != UNCHANGED:
+        while (text := self.answer("", question, unchanged)) != unchanged:
             try:
                 if "±" in text or "+-" in text:
                     reading = f"{key.removeprefix('plant.')}={text}"
