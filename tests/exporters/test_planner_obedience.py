@@ -314,11 +314,12 @@ def test_a_damped_machine_obeys_soon_after_it_is_enabled(again):
     assert 0.0 < np.argmax(moves) * 1e-3 < 0.42  # cReaction
 
 
-@pytest.mark.parametrize("spike", [3.0, 9.0])
-def test_a_spike_of_a_live_parameter_costs_nothing(text, spike):
+@pytest.mark.parametrize(("spike", "seconds"), [(3.0, CYCLE), (9.0, CYCLE), (3.0, 0.18), (9.0, 0.18)])
+def test_a_spike_of_a_live_parameter_costs_nothing(text, spike, seconds):
     plain, spiked = standing(text, 2.0), standing(text, 2.0)
     for driver, rope in ((plain, 6.0), (spiked, spike)):
-        driver.hold(4.0, bExecute=1, fTarget=20.0).hold(CYCLE, fL1=rope).hold(30.0, fL1=6.0)
+        driver.hold(4.0, bExecute=1, fTarget=20.0).hold(seconds - 2 * CYCLE, fL1=rope, bExecute=0)
+        driver.hold(2 * CYCLE, bExecute=1, fTarget=12.0).hold(30.0, fL1=6.0)  # planned for the other rope
     np.testing.assert_array_equal(plain.outputs["fPosition"], spiked.outputs["fPosition"])
     assert spiked.outputs["bPromise"][500:].all()
 

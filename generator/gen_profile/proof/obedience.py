@@ -44,7 +44,7 @@ from gen_profile.proof.statements import (
 MORE = (
     0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
 )
-BACK = 0.01  # likewise, at which an axis may go back (0.002)
+BACK = 0.03  # likewise, at which an axis may go back (0.013)
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 WORDS = {

@@ -40,6 +40,7 @@ from gen_profile_exporters.planner.error_constants import SPREAD
 BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
+TAKES_OVER = 0.1  # periods beyond the stated reaction, at which a plan that was found then takes over (0.04)
 USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
@@ -115,7 +116,8 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         rests = order.begin + int(moving[-1]) + 1
         if rests >= order.end or not _is_end(motion, order, rests):
             continue
-        planned = order.begin + followed.after(followed.reaction)  # before, it tells of the former motion
+        takes = followed.reaction + TAKES_OVER * followed.period
+        planned = order.begin + followed.after(takes)  # before, it tells of the former motion
         first = min(rests, max(planned, rests - followed.after(0.5 * followed.period)))
         error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * followed.cycle)
         yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
