@@ -79,7 +79,7 @@ def read_table(folder: Path, grid: Grid) -> Table:
     """
     path = folder / TABLE
     try:
-        table = pq.read_table(path, page_checksum_verification=True)
+        table = pq.ParquetFile(path, page_checksum_verification=True).read()
         columns = {axis.key: pa.float64() if axis.numeric else pa.string() for axis in grid.axes} | COLUMNS
         for name, type_ in columns.items():
             if table.schema.field(name).type != type_:
