@@ -447,10 +447,8 @@ def test_a_block_that_disobeys_fails(bay, before, after, what):
 @pytest.mark.parametrize("value", ["1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200"])
 def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
     spec, text, histories, drawn, _ = bay
-    wrong = disobedient(
-        text, after=f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;"
-    )
-    assert shown(spec, wrong, histories, drawn[:1]) == [{"a setpoint is no number"}]
+    fault = f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;"
+    assert shown(spec, disobedient(text, after=fault), histories, drawn[:1]) == [{"a setpoint is no number"}]
 
 
 def test_histories_hold_what_operators_and_controllers_do(bay):
