@@ -109,9 +109,13 @@ def narrowed_by_log(
     drawn, plant = machines.drawn(DRAWN), machines.plant
     stood = tuple(map(float, played.position[-1]))
     model = driven_model(plant, drawn[0], played, shortened(log, plant, drawn[0], stood, SAMPLES))
+    starts, missed = model.guesses(drawn)
+    model = attrs.evolve(model, lead=max(float(starts[np.argmin(missed), -3]), 0.0) + model.fastest)
     free = _free_fit(machines, drawn[0], model)
     fit = attrs.evolve(free, bounds=np.array([machines.ranges[name] for name in free.names]).T / free.scale)
-    unknowns, noise = _fitted(fit, drawn, model)
+    best = np.argsort(missed)[:BEST]
+    begun = [np.array([drawn[k][name] for name in fit.names]) / fit.scale for k in best]
+    unknowns, noise = _fitted(fit, [np.concatenate(pair) for pair in zip(begun, starts[best], strict=True)])
     progress("looking at what is left of it")
     (lines,), left = misfits(fit, unknowns), float(np.std(fit.left(unknowns)[0]))
     beyond = _fitted_from(free, [unknowns], noise)
@@ -206,14 +210,9 @@ def _free_fit(machines: Machines, middle: Mapping[str, float], model: DrivenMode
     return fit_of(machine, list(machines.ranges), known, [model])
 
 
-def _fitted(fit: Fit, drawn: Sequence[Mapping[str, float]], model: DrivenModel) -> tuple[Array, Array]:
-    """Find what agrees best with the log, from the best of many machines; and the noise."""
-    starts, left = model.guesses(drawn)
-    begun = [
-        np.concatenate([np.array([drawn[k][name] for name in fit.names]) / fit.scale, starts[k]])
-        for k in np.argsort(left)[:BEST].tolist()
-    ]
-    unknowns = _fitted_from(fit, begun, np.array([max(float(np.std(model.log.values)), STILL)]))
+def _fitted(fit: Fit, begun: Sequence[Array]) -> tuple[Array, Array]:
+    """Find what agrees best with the log, from the best of several places; and the noise."""
+    unknowns = _fitted_from(fit, begun, np.array([max(float(np.std(fit.models[0].log.values)), STILL)]))
     try:
         return fit.near(unknowns)
     except InfeasibleProblem:  # at a bound that is far off
@@ -345,13 +344,13 @@ def learn(
             f"robustness.uncertain: no parameter has a range of more than ±{LEAST:.1%}, so there is nothing "
             "to learn; state how far each may be off, as in { L1 = 0.2 }."
         )
-    if spec.move.initial:
-        raise SpecError("move.initial: a run tells of machines only where the load hung at rest before.")
     if not runs:
         raise SpecError("Name a log of a run, or what was seen after one, as in payload=0.03±0.01.")
-    for run in runs:
-        if isinstance(run, DirectReading) and run.parameter not in plant.loads:
-            raise SpecError(f"seen: unknown load {run.parameter!r}{suggestion(run.parameter, plant.loads)}")
+    for seen in (run for run in runs if isinstance(run, DirectReading)):
+        if seen.parameter not in plant.loads:
+            raise SpecError(f"seen: unknown load {seen.parameter!r}{suggestion(seen.parameter, plant.loads)}")
+        if spec.move.initial:
+            raise SpecError("seen: tells of machines only where the load hung at rest before; log a run.")
     machines = before = Machines(plant=plant, parameters=spec.plant.parameters, ranges=ranges)
     lessons = []
     with one_thread():
