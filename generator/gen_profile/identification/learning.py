@@ -49,6 +49,8 @@ SLABS, PER_SLAB = 16, 8  # into which a range is cut, and machines that are look
 MOST = 2  # ranges for which these multiply: more of them have no more machines
 LEAST = 0.005  # relative half-range that is left in any case: a machine in service is not known any better
 
+NARROWER = 0.99  # of a range, down to which it stays as it was stated
+
 Ranges = Mapping[str, tuple[float, float]]
 
 
@@ -109,11 +111,11 @@ def narrowed_by_log(
     drawn, plant = machines.drawn(DRAWN), machines.plant
     stood = tuple(map(float, played.position[-1]))
     model = driven_model(plant, drawn[0], played, shortened(log, plant, drawn[0], stood, SAMPLES))
-    starts, missed = model.guesses(drawn)
-    model = attrs.evolve(model, lead=max(float(starts[np.argmin(missed), -3]), 0.0) + model.fastest)
+    starts, residual = model.guesses(drawn)
+    model = attrs.evolve(model, lead=max(float(starts[np.argmin(residual), -3]), 0.0) + model.fastest)
     free = _free_fit(machines, drawn[0], model)
     fit = attrs.evolve(free, bounds=np.array([machines.ranges[name] for name in free.names]).T / free.scale)
-    best = np.argsort(missed)[:BEST]
+    best = np.argsort(residual)[:BEST]
     begun = [np.array([drawn[k][name] for name in fit.names]) / fit.scale for k in best]
     unknowns, noise = _fitted(fit, [np.concatenate(pair) for pair in zip(begun, starts[best], strict=True)])
     progress("looking at what is left of it")
@@ -339,10 +341,10 @@ def learn(
     """
     plant = spec.machine()
     ranges = {name: ends for name, ends in spec.checked_ranges().items() if ends[1] > ends[0]}
-    if all(high - low <= LEAST * abs(low + high) for low, high in ranges.values()):
+    if not ranges:
         raise SpecError(
-            f"robustness.uncertain: no parameter has a range of more than ±{LEAST:.1%}, so there is nothing "
-            "to learn; state how far each may be off, as in { L1 = 0.2 }."
+            "robustness.uncertain: no parameter has a range, so there is nothing to learn; state how far "
+            "each may be off, as in { L1 = 0.2 }."
         )
     if not runs:
         raise SpecError("Name a log of a run, or what was seen after one, as in payload=0.03±0.01.")
@@ -372,7 +374,8 @@ def _learned(spec: Spec, machines: Machines) -> Spec:
         values[name] = middle = sum(ends) / 2.0
         if name in spec.check.spans:
             changed[f"check.spans.{name}"] = ends
-        share = float(f"{(ends[1] - middle) / abs(middle):.3g}")
+        inside = min(middle - given[name][0], given[name][1] - middle)  # which rounding must not leave
+        share = min(float(f"{(ends[1] - middle) / abs(middle):.3g}"), inside / abs(middle))
         for table, shares in {"robustness": spec.robustness.uncertain, "check": spec.check.uncertain}.items():
             if shares and name in shares:
                 changed[f"{table}.uncertain.{name}"] = min(share, shares[name])
@@ -384,7 +387,7 @@ def _rounded(ends: tuple[float, float], given: tuple[float, float]) -> tuple[flo
     """Leave `LEAST` at least, in digits worth a hundredth of that, and nothing beyond the given ends."""
     middle = sum(ends) / 2.0
     half = max((ends[1] - ends[0]) / 2.0, LEAST * abs(middle))
-    if 2.0 * half >= given[1] - given[0]:
+    if 2.0 * half > NARROWER * (given[1] - given[0]):
         return given
     middle = min(max(middle, given[0] + half), given[1] - half)
     unit = 10.0 ** (math.floor(math.log10(half)) - 2)
