@@ -94,6 +94,10 @@ knobs *arguments:
 mutants *arguments:
     python tests/generator/mutants.py {{ arguments }}
 
+# Random cranes, and what three logged runs of each tell of them.
+learning *arguments:
+    python tests/generator/learning_trials.py {{ arguments }}
+
 # Random programs of Structured Text: do the C made of them and the tests' interpreter agree?
 interpreters *arguments:
     python tests/exporters/interpreters.py {{ arguments }}

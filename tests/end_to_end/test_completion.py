@@ -37,7 +37,7 @@ def test_offers(words, expected):
 
 
 def test_offers_only_what_begins_so():
-    assert offered("com") == {"compare"}
+    assert offered("com") == {"commission", "compare"}
     assert offered("--export", "p") == {"plc", "plcopen-xml"}
 
 

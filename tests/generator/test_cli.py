@@ -80,7 +80,7 @@ def test_plants_tell_every_name_that_a_spec_may_need():
 @pytest.mark.parametrize(
     ("words", "incomplete", "offered"),
     [
-        ([], "com", {"compare"}),
+        ([], "com", {"commission", "compare"}),
         ([], "--ex", {"--export"}),
         (["--export"], "p", {"plc", "plcopen-xml"}),
         (["compare", "--preset"], "paper-beta5", {"paper-beta50"}),

@@ -24,7 +24,7 @@ OUTSIDE = 2.0  # periods of the slowest mode by which a log may begin after the 
 class DrivenModel(SwingModel):
     """A log beside the machine that follows a motion.
 
-    Its start has three numbers more than how the load swung when the motion began: when in the log that was
+    Its start has three numbers more than how the load swung before the motion: when in the log that began
     (what the drives delay is part of it), how many times greater the sensor shows the swing (a phone that
     does not lie straight shows less, one that lies the other way round the opposite), and the sensor's zero.
 
@@ -34,6 +34,8 @@ class DrivenModel(SwingModel):
         Of the axes, through all setpoints.
     slowest, fastest : float
         Periods of the machine's modes, roughly, in s.
+    lead : float
+        s for which the axes stand before the motion; how the load swings is an unknown from then on.
     period : float
         Infinite: it takes the whole log to tell when the motion began, so no part of it is fitted first.
     """
@@ -41,6 +43,7 @@ class DrivenModel(SwingModel):
     motion: Profile
     slowest: float
     fastest: float
+    lead: float = 0.0
 
     @property
     def unknowns(self) -> int:
@@ -66,6 +69,8 @@ class DrivenModel(SwingModel):
         starts : (machines, unknowns) array
         left : (machines,) array
         """
+        if self.lead > 0.0:
+            return attrs.evolve(self, lead=0.0).guesses(machines)
         log, step = self.log, self.fastest / COARSE
         logged = np.interp(np.arange(0.0, log.times[-1], step), log.times, log.values)
         logged = logged - logged.mean()
@@ -94,17 +99,23 @@ class DrivenModel(SwingModel):
         begin, gain, zero = start[-3:]
         machines, starts, by = self.lanes(parameters, names, steps, start[:-3], SWUNG)
         step = self.fastest / FINE
-        grid = np.arange(4.0 + np.ceil(max(float(times[-1] - begin), self.fastest) / step)) * step
+        places = np.maximum(times - begin + self.lead, 0.0)
+        grid = np.arange(4.0 + np.ceil(max(float(places[-1]), self.fastest) / step)) * step
         spline = CubicSpline(grid, self._shown(machines, starts, grid))
-        places = np.maximum(times - begin, 0.0)
-        outputs, pace = spline(places), np.where(times > begin, spline(places, 1)[:, 0], 0.0)
+        outputs, pace = spline(places), np.where(places > 0.0, spline(places, 1)[:, 0], 0.0)
         slopes = gain * (outputs[:, 1:] - outputs[:, :1]) / by
         more = np.column_stack([-gain * pace, outputs[:, 0], np.ones(len(times))])
         return gain * outputs[:, 0] + zero - self.log.values[: len(times)], np.column_stack([slopes, more])
 
     def _shown(self, machines: Array, starts: Array, times: Array) -> Array:
-        """Say what the log would show of machines from the motion's begin on, shape (times, machines)."""
-        motion, load = motion_of(self.motion), self.plant.loads.index(self.log.load)
+        """Say what the log would show of machines, from `lead` before the motion on: (times, machines)."""
+        moving, load = motion_of(self.motion), self.plant.loads.index(self.log.load)
+
+        def motion(nodes: Array) -> Array:
+            values = moving(np.maximum(nodes - self.lead, 0.0))
+            values[nodes < self.lead, self.motion.axes :] = 0.0
+            return values
+
         sway, angle = driven_swing(self.plant, machines, motion=motion, starts=starts, times=times)
         shown = (sway if self.log.quantity == "sway" else angle)[:, :, load].T
         return np.asarray(CubicSpline(times, shown)(times, 1) if self.log.quantity == "rate" else shown)

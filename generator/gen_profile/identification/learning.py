@@ -49,6 +49,8 @@ SLABS, PER_SLAB = 16, 8  # into which a range is cut, and machines that are look
 MOST = 2  # ranges for which these multiply: more of them have no more machines
 LEAST = 0.005  # relative half-range that is left in any case: a machine in service is not known any better
 
+NARROWER = 0.99  # of a range, down to which it stays as it was stated
+
 Ranges = Mapping[str, tuple[float, float]]
 
 
@@ -109,9 +111,13 @@ def narrowed_by_log(
     drawn, plant = machines.drawn(DRAWN), machines.plant
     stood = tuple(map(float, played.position[-1]))
     model = driven_model(plant, drawn[0], played, shortened(log, plant, drawn[0], stood, SAMPLES))
+    starts, residual = model.guesses(drawn)
+    model = attrs.evolve(model, lead=max(float(starts[np.argmin(residual), -3]), 0.0) + model.fastest)
     free = _free_fit(machines, drawn[0], model)
     fit = attrs.evolve(free, bounds=np.array([machines.ranges[name] for name in free.names]).T / free.scale)
-    unknowns, noise = _fitted(fit, drawn, model)
+    best = np.argsort(residual)[:BEST]
+    begun = [np.array([drawn[k][name] for name in fit.names]) / fit.scale for k in best]
+    unknowns, noise = _fitted(fit, [np.concatenate(pair) for pair in zip(begun, starts[best], strict=True)])
     progress("looking at what is left of it")
     (lines,), left = misfits(fit, unknowns), float(np.std(fit.left(unknowns)[0]))
     beyond = _fitted_from(free, [unknowns], noise)
@@ -206,14 +212,9 @@ def _free_fit(machines: Machines, middle: Mapping[str, float], model: DrivenMode
     return fit_of(machine, list(machines.ranges), known, [model])
 
 
-def _fitted(fit: Fit, drawn: Sequence[Mapping[str, float]], model: DrivenModel) -> tuple[Array, Array]:
-    """Find what agrees best with the log, from the best of many machines; and the noise."""
-    starts, left = model.guesses(drawn)
-    begun = [
-        np.concatenate([np.array([drawn[k][name] for name in fit.names]) / fit.scale, starts[k]])
-        for k in np.argsort(left)[:BEST].tolist()
-    ]
-    unknowns = _fitted_from(fit, begun, np.array([max(float(np.std(model.log.values)), STILL)]))
+def _fitted(fit: Fit, begun: Sequence[Array]) -> tuple[Array, Array]:
+    """Find what agrees best with the log, from the best of several places; and the noise."""
+    unknowns = _fitted_from(fit, begun, np.array([max(float(np.std(fit.models[0].log.values)), STILL)]))
     try:
         return fit.near(unknowns)
     except InfeasibleProblem:  # at a bound that is far off
@@ -340,18 +341,18 @@ def learn(
     """
     plant = spec.machine()
     ranges = {name: ends for name, ends in spec.checked_ranges().items() if ends[1] > ends[0]}
-    if all(high - low <= LEAST * abs(low + high) for low, high in ranges.values()):
+    if not ranges:
         raise SpecError(
-            f"robustness.uncertain: no parameter has a range of more than ±{LEAST:.1%}, so there is nothing "
-            "to learn; state how far each may be off, as in { L1 = 0.2 }."
+            "robustness.uncertain: no parameter has a range, so there is nothing to learn; state how far "
+            "each may be off, as in { L1 = 0.2 }."
         )
-    if spec.move.initial:
-        raise SpecError("move.initial: a run tells of machines only where the load hung at rest before.")
     if not runs:
         raise SpecError("Name a log of a run, or what was seen after one, as in payload=0.03±0.01.")
-    for run in runs:
-        if isinstance(run, DirectReading) and run.parameter not in plant.loads:
-            raise SpecError(f"seen: unknown load {run.parameter!r}{suggestion(run.parameter, plant.loads)}")
+    for seen in (run for run in runs if isinstance(run, DirectReading)):
+        if seen.parameter not in plant.loads:
+            raise SpecError(f"seen: unknown load {seen.parameter!r}{suggestion(seen.parameter, plant.loads)}")
+        if spec.move.initial:
+            raise SpecError("seen: tells of machines only where the load hung at rest before; log a run.")
     machines = before = Machines(plant=plant, parameters=spec.plant.parameters, ranges=ranges)
     lessons = []
     with one_thread():
@@ -373,7 +374,8 @@ def _learned(spec: Spec, machines: Machines) -> Spec:
         values[name] = middle = sum(ends) / 2.0
         if name in spec.check.spans:
             changed[f"check.spans.{name}"] = ends
-        share = float(f"{(ends[1] - middle) / abs(middle):.3g}")
+        inside = min(middle - given[name][0], given[name][1] - middle)  # which rounding must not leave
+        share = min(float(f"{(ends[1] - middle) / abs(middle):.3g}"), inside / abs(middle))
         for table, shares in {"robustness": spec.robustness.uncertain, "check": spec.check.uncertain}.items():
             if shares and name in shares:
                 changed[f"{table}.uncertain.{name}"] = min(share, shares[name])
@@ -385,7 +387,7 @@ def _rounded(ends: tuple[float, float], given: tuple[float, float]) -> tuple[flo
     """Leave `LEAST` at least, in digits worth a hundredth of that, and nothing beyond the given ends."""
     middle = sum(ends) / 2.0
     half = max((ends[1] - ends[0]) / 2.0, LEAST * abs(middle))
-    if 2.0 * half >= given[1] - given[0]:
+    if 2.0 * half > NARROWER * (given[1] - given[0]):
         return given
     middle = min(max(middle, given[0] + half), given[1] - half)
     unit = 10.0 ** (math.floor(math.log10(half)) - 2)
