@@ -80,9 +80,8 @@ def _copy_python(folder: Path) -> None:
     standard = f"python{sysconfig.get_python_version()}"
     (folder / "bin").mkdir(parents=True)
     shutil.copy(Path(sys._base_executable).resolve(), folder / "bin" / "python3")  # type: ignore[attr-defined]
-    for path in {sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")}:
-        ignored = shutil.ignore_patterns(*CONTENTS["standard_library"])
-        shutil.copytree(path, folder / "lib" / standard, ignore=ignored, dirs_exist_ok=True)
+    ignored = shutil.ignore_patterns(*CONTENTS["standard_library"])
+    shutil.copytree(sysconfig.get_path("stdlib"), folder / "lib" / standard, ignore=ignored)
     paths = f"../lib/{standard}.zip", f"../lib/{standard}/lib-dynload", "../../packages", "import site"
     (folder / "bin" / "python3._pth").write_text("\n".join(paths) + "\n", "utf-8")
 

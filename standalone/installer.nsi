@@ -1,7 +1,7 @@
 ; The installer for Windows, from a folder that build.py made:
 ;     makensis -DFOLDER=dist/gen-profile-windows -DVERSION=0.1.0 -DOUT=dist/gen-profile-setup.exe standalone/installer.nsi
 ; It is for the user who runs it and asks for no administrator. `gen-profile-setup.exe /S` installs silently.
-Unicode true
+Target amd64-unicode
 ManifestDPIAware true
 RequestExecutionLevel user
 SetCompressor lzma
@@ -12,7 +12,10 @@ InstallDirRegKey HKCU "Software\gen-profile" "Folder"
 
 !define UNINSTALL "Software\Microsoft\Windows\CurrentVersion\Uninstall\gen-profile"
 ; Python adds to and takes from PATH, as NSIS cuts texts after 1024 characters
-!define PATH '"$INSTDIR\python\python.exe" "$INSTDIR\windows_path.py"'
+!macro Path Action
+    nsExec::Exec '"$INSTDIR\python\python.exe" "$INSTDIR\windows_path.py" ${Action} "$INSTDIR"'
+    Pop $0
+!macroend
 
 Page directory
 Page instfiles
@@ -30,7 +33,7 @@ Section
     SetOutPath "$INSTDIR"
     File /r "${FOLDER}/*"
     File "${__FILEDIR__}/windows_path.py"
-    ExecWait '${PATH} add "$INSTDIR"'
+    !insertmacro Path add
     CreateShortcut "$SMPROGRAMS\gen-profile studio.lnk" "$INSTDIR\gen-profile.cmd" "studio --preset bay-crane"
     WriteUninstaller "$INSTDIR\uninstall.exe"
     WriteRegStr HKCU "Software\gen-profile" "Folder" "$INSTDIR"
@@ -43,7 +46,7 @@ Section
 SectionEnd
 
 Section "Uninstall"
-    ExecWait '${PATH} remove "$INSTDIR"'
+    !insertmacro Path remove
     !insertmacro Remove
     Delete "$INSTDIR\gen-profile.cmd"
     Delete "$INSTDIR\windows_path.py"
