@@ -109,7 +109,7 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     late = faults(silent, *followed(0.2, fault=1.0 * (times > 4.1)))
     assert "not noticed" in late[0]
     assert not faults(silent, *followed(0.2, fault=1.0 * (times > 3.4)))
-    scaled, (run, outputs) = attrs.evolve(sound, fault="scale"), followed(0.2)
+    scaled, (run, outputs) = attrs.evolve(sound, fault="scale", fails=3.0), followed(0.2)
     assert not faults(scaled, run, outputs)  # as long as the promise tells
     assert "neither noticed nor harmless" in faults(scaled, attrs.evolve(run, promise=False), outputs)[0]
     swings, _ = followed(2.0 * (times > 5.0), fault=7.0 * (times > 6.0))
