@@ -6,12 +6,13 @@ import attrs
 import numpy as np
 import pytest
 
+from gen_profile.charts.proof import damping_figures, worst_damped
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.planner import Planner
 from gen_profile.planner.sensor_log import read_sensor_log
-from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import prove
@@ -108,10 +109,10 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     late = faults(silent, *followed(0.2, fault=1.0 * (times > 4.1)))
     assert "not noticed" in late[0]
     assert not faults(silent, *followed(0.2, fault=1.0 * (times > 3.4)))
-    scaled, (run, outputs) = attrs.evolve(sound, fault="scale"), followed(0.2)
+    scaled, (run, outputs) = attrs.evolve(sound, fault="scale", fails=3.0), followed(0.2)
     assert not faults(scaled, run, outputs)  # as long as the promise tells
     assert "neither noticed nor harmless" in faults(scaled, attrs.evolve(run, promise=False), outputs)[0]
-    swings = attrs.evolve(run, residual=np.array([0.0, 2.0]))
+    swings, _ = followed(2.0 * (times > 5.0), fault=7.0 * (times > 6.0))
     assert "makes the load swing by 2 m" in faults(scaled, swings, outputs)[0]
 
 
@@ -137,6 +138,14 @@ def test_a_block_with_a_sensor_passes_its_proof(spec, text):
     assert proof.passed, proof.reasons()
     assert proof.apart <= 1e-9  # FMPy finds the same, with what swings at first and gusts
     assert any("sensor" in one.to_dict() for one in proof.judged)
+    one = worst_damped(proof)
+    damping, remains = damping_figures(spec, proof, trace(spec, text, Histories.of(spec), one.history))
+    gusts, shown, sway = (panel.lines for panel in damping.panels)
+    strongest = max(abs(gust.acceleration) for gust in one.history.sensed.gusts)
+    assert np.abs(gusts[0].y).max() == pytest.approx(strongest, rel=0.02)
+    assert np.abs(sway[0].y - sway[1].y)[-300:].max() < 15.0  # mm, true and estimated
+    assert np.nanmax(np.abs(shown[0].y)) > 0.01
+    assert np.nanmax(remains.panels[0].values) >= 100.0 * proof.fraction(one) - 1e-9
 
 
 @pytest.mark.slow

@@ -158,7 +158,8 @@ class BlockRun:
     ----------
     axes : tuple of AxisExtremes
     on_the_way, residual : (loads,) arrays
-        Greatest sway in m, at any time, and once the axes stand.
+        Greatest sway in m, at any time, and once the axes stand; with a sensor, since it was promised first
+        while they do.
     cycles : int
     stands : int
         Cycle from which the axes stand for good; -1 if they never do.
@@ -171,6 +172,8 @@ class BlockRun:
     trace : (cycles, outputs + loads) array or None
     copies : (marks, bytes) array or None
         Of the block's instance, as they were before marked cycles.
+    shown : (cycles,) array
+        What a sensor measures of, at the beginning of each cycle; empty without one.
     """
 
     axes: tuple[AxisExtremes, ...]
@@ -183,6 +186,7 @@ class BlockRun:
     fault: int
     trace: Array | None = None
     copies: NDArray[np.uint8] | None = None
+    shown: Array = attrs.field(factory=lambda: np.zeros(0))
 
 
 class _Block(Structure):
@@ -328,6 +332,7 @@ class BlockFollower:
             residual=kept["residual"],
             trace=kept["trace"][:, : outcome.cycles].T if rows else None,
             copies=copies if marks else None,
+            shown=shown[: outcome.cycles],
             **{name: getattr(outcome, name) for name in _SIMPLE},
         )
 

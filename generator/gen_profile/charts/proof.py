@@ -44,9 +44,12 @@ def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = n
         The file cannot be written.
     ExportError, CosimulationError
     """
-    followed = trace(spec, text, Histories.of(spec), proof.worst.history, progress)
+    histories = Histories.of(spec)
+    followed = trace(spec, text, histories, proof.worst.history, progress)
     progress("drawing")
     figures = [history_figure(spec, proof, followed)]
+    if (one := worst_damped(proof)) is not None:
+        figures += damping_figures(spec, proof, trace(spec, text, histories, one.history, progress))
     if len(proof.judged) > 1:
         figures.append(map_figure(spec, proof))
     save(figures, path, spec.name, f"{spec.name}: history {proof.worst.number} of {proof.count}")
@@ -124,25 +127,87 @@ def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
         )
 
 
+def worst_damped(proof: Proof) -> JudgedHistory | None:
+    """Find where most remained of histories with a sound sensor and gusts."""
+    damped = [one for one in _sound(proof) if one.promise]
+    return max(damped, key=proof.fraction, default=None)
+
+
+def _sound(proof: Proof) -> list[JudgedHistory]:
+    sensed = [(one, one.history.sensed) for one in proof.judged]
+    return [one for one, sensor in sensed if sensor is not None and sensor.gusts and not sensor.fault]
+
+
+def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
+    """Draw gusts, what the sensor showed, true and estimated sway; then what remained of all histories."""
+    sensor, sensed = spec.planner.sensor, trace.history.sensed
+    assert sensor is not None and sensed is not None
+    few, end_load = slice(None, None, -(-len(trace.times) // SAMPLES)), spec.machine().end_load_name
+    times, cycle = trace.times[few], float(trace.times[1])
+    edges = cycle * np.arange(-1.0, len(trace.times) + 1.0, dtype=np.float64)
+    pushed = np.diff(sensed.pushed(edges), 2)[few] / cycle**2
+    bands, limit = [*_unpromised(trace)], 1e3 * proof.limit[end_load]
+    unit = next((one.unit for one in spec.machine().unactuated if one.name == sensor.of), "m")
+    estimated = Line(name="estimated", x=times, y=1e3 * trace.issued["fSwayEstimated"][few], style=COMMAND)
+    truth = Line(name="true", x=times, y=1e3 * trace.sway["this history"][few], style=Style(colour=INK))
+    shown = Line(name="shown", x=times, y=trace.measured[few], style=SETPOINT)
+    gusts = Line(name="gusts", x=times, y=pushed, style=SETPOINT)
+    panels = [
+        Panel(title="Gusts", x_label=TIME, y_label="push (m/s²)", lines=[gusts], bands=bands),
+        Panel(
+            title=f"What the sensor shows: {sensor.quantity} of {sensor.of}",
+            x_label=TIME,
+            y_label=f"{sensor.quantity} ({unit}/s)"
+            if sensor.quantity == "rate"
+            else f"{sensor.quantity} ({unit})",
+            lines=[shown],
+            bands=bands,
+        ),
+        Panel(
+            title=f"Sway of the {end_load}",
+            x_label=TIME,
+            y_label="sway (mm)",
+            lines=[truth, estimated],
+            levels=[Level(value=sign * limit) for sign in (1.0, -1.0)],
+            bands=bands,
+        ),
+    ]
+    caption = "Shaded: not promised. Dashed in red: what may remain."
+    return [Figure(caption=caption, panels=panels, columns=1), _remains_figure(spec, proof)]
+
+
+def _remains_figure(spec: Spec, proof: Proof) -> Figure:
+    """Draw what remains by the strongest gust, and by the first live parameter where there is one."""
+    sensed = [(one, one.history.sensed) for one in _sound(proof)]
+    gusts = [max(abs(gust.acceleration) for gust in sensor.gusts) for _, sensor in sensed if sensor]
+    shares = 100.0 * np.array([proof.fraction(one) for one, _ in sensed])
+    title, gust_label, stated = "What remains after gusts", "strongest gust (m/s²)", spec.planner.disturbance
+    assert stated is not None and stated.gust is not None
+    panel: Panel | Map = Panel(
+        title=title,
+        x_label=gust_label,
+        y_label="share of its limit (%)",
+        lines=[Line(name="history", x=np.array(gusts), y=shares, style=Style(dash="points"))],
+        levels=[Level(value=100.0)],
+    )
+    for name, across in [*spec.planner.live.items()][:1]:
+        places = np.array([[one.history.live[name] for one, _ in sensed], gusts])
+        labels = (_labelled(spec, name), gust_label)
+        panel = _map(title, labels, places, (across, (0.0, stated.gust.acceleration)), shares)
+    return Figure(
+        caption="Every history with a sound sensor and gusts; white: none there.", panels=[panel], columns=1
+    )
+
+
 def map_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw the worst share of the limit in cells of two live parameters, or of every history over one."""
     live = spec.planner.live
     shares = 100.0 * np.array([proof.fraction(one) for one in proof.judged])
     title = "Worst residual sway"
     if len(live) == 2:
-        (x, across), (y, upwards) = live.items()
-        panel: Panel | Map = Map(
-            title=title,
-            x_label=_labelled(spec, x),
-            y_label=_labelled(spec, y),
-            unit="% of limit",
-            x=_centres(across),
-            y=_centres(upwards),
-            values=_cells(proof.judged, shares, (across, upwards), (x, y)).T,
-            limit=100.0,
-            cells=True,
-            headroom=1.0,
-        )
+        places = np.array([[one.history.live[name] for one in proof.judged] for name in live])
+        labels = [_labelled(spec, name) for name in live]
+        panel: Panel | Map = _map(title, labels, places, [*live.values()], shares)
     else:
         name = next(iter(live), "")
         places = np.array([one.history.live.get(name, one.number) for one in proof.judged])
@@ -196,18 +261,30 @@ def _centres(ends: tuple[float, float]) -> Array:
     return low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
 
 
-def _cells(
-    judged: Sequence[JudgedHistory],
-    shares: Array,
+def _map(
+    title: str,
+    labels: Sequence[str],
+    places: Array,
     ranges: Sequence[tuple[float, float]],
-    names: Sequence[str],
-) -> Array:
-    """Find the greatest share in each cell; where no history was, not a number."""
+    shares: Array,
+) -> Map:
+    """Draw the greatest share in each cell of two ranges; where no history was, not a number."""
     worst = np.full((CELLS, CELLS), np.nan)
-    for one, fraction in zip(judged, shares, strict=True):
+    for place, share in zip(places.T.tolist(), shares, strict=True):
         cell = tuple(
-            min(CELLS - 1, int(CELLS * (one.history.live[name] - low) / (high - low)))
-            for name, (low, high) in zip(names, ranges, strict=True)
+            min(CELLS - 1, int(CELLS * (value - low) / (high - low)))
+            for value, (low, high) in zip(place, ranges, strict=True)
         )
-        worst[cell] = np.fmax(worst[cell], fraction)
-    return worst
+        worst[cell] = np.fmax(worst[cell], share)
+    return Map(
+        title=title,
+        x_label=labels[0],
+        y_label=labels[1],
+        unit="% of limit",
+        x=_centres(ranges[0]),
+        y=_centres(ranges[1]),
+        values=worst.T,
+        limit=100.0,
+        cells=True,
+        headroom=1.0,
+    )

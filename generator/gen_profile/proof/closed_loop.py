@@ -200,6 +200,15 @@ class ClosedLoop:
         finally:
             self._followers.put(follower)
 
+    def measured(self, history: History, run: BlockRun) -> Array:
+        """Give what the sensor told the block in each cycle of a run, not a number where nothing."""
+        found = self._script(history).measured
+        if found is None:
+            return np.full(run.cycles, np.nan)
+        gain, added, age, valid, _ = found.cycles[: run.cycles].T
+        then = np.maximum(np.arange(run.cycles) - age.astype(np.int64), 0)
+        return np.where(valid != 0.0, gain * run.shown[then] + added, np.nan)
+
     def distance_from_fmpy(self, history: History, cycles: int) -> float:
         """Let FMPy's own importer co-simulate what the block issued in so many cycles.
 
@@ -398,12 +407,15 @@ class Trace:
     sway : mapping of str to (cycles,) array
         Of the end load in m (its magnitude where it has two directions), by machines: that of the history,
         the one that the block is given, and some at corners of the uncertain ranges.
+    measured : (cycles,) array
+        What the sensor told the block, not a number where nothing.
     """
 
     history: History
     times: Array
     issued: Mapping[str, Array]
     sway: Mapping[str, Array]
+    measured: Array
 
 
 def trace(
@@ -424,14 +436,16 @@ def trace(
     with ClosedLoop(spec, text, histories) as loop:
         cycles = loop.run(history).cycles
         for name, parameters in machines.items():
-            kept = loop.run(attrs.evolve(history, parameters=parameters), rows=cycles).trace
+            run = loop.run(attrs.evolve(history, parameters=parameters), rows=cycles)
+            kept = run.trace
             assert kept is not None
             outputs = len(loop.outputs)
             sways[name] = length(kept[:, outputs:][:, end_load])[:, 0]
             if name == "this history":
                 issued = dict(zip(loop.outputs, kept.T, strict=False))
+                measured = loop.measured(history, run)
         times = np.arange(cycles, dtype=np.float64) * loop.cycle
-    return Trace(history=history, times=times, issued=issued, sway=sways)
+    return Trace(history=history, times=times, issued=issued, sway=sways, measured=measured)
 
 
 def _errors(histories: Histories) -> list[dict[str, float]]:

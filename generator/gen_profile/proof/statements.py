@@ -49,8 +49,8 @@ BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
 AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
 OVERSTATED = 0.12  # likewise, by which it may be too large
 BESIDE, MOST_BESIDE = 1e-4, 500.0  # of the allowed sway, likewise; and how often that may be after long
-TURNED = 5.0  # times BESIDE, by what rounded frequencies turn in EXACTLY periods
-MOST_TURNED = 250.0  # likewise at most, until the block's finer machines begin anew
+FAR_TURNED = 0.5  # of SPREAD: where errors have turned a mode so far, machines between those that a
+UNWATCHED = 0.02  # block watches may be left with more than BETWEEN says, by this share at most
 EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
@@ -389,7 +389,8 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        above = at_most - stated[ends] - BESIDE * limit * np.clip(TURNED * long, 1.0, MOST_TURNED)
+        far = np.array(ends) * followed.cycle * followed.modes.turns > FAR_TURNED * SPREAD
+        above = at_most - (1.0 + UNWATCHED * far) * stated[ends] - BESIDE * limit
         worst = int(np.argmax(above))
         yield Allowance("understated", ends[worst], float(above[worst]), 0.0)
 

@@ -12,7 +12,7 @@ import tomli_w
 
 from gen_profile.artefacts.manifest import sha256, versions
 from gen_profile.artefacts.reading import read_artefact
-from gen_profile.charts.proof import history_figure, map_figure
+from gen_profile.charts.proof import damping_figures, history_figure, map_figure, worst_damped
 from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, number
 from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
@@ -66,13 +66,15 @@ def planner_report(
     require_pages()
     judgement = check_block(path, progress=progress)
     spec, worst = judgement.spec, judgement.check.worst
-    followed = trace(spec, judgement.text, Histories.of(spec), worst.history, progress)
+    histories, damped = Histories.of(spec), worst_damped(judgement.check)
+    followed = trace(spec, judgement.text, histories, worst.history, progress)
+    gusty = trace(spec, judgement.text, histories, damped.history, progress) if damped else None
     progress("writing the report")
-    page = _page(judgement, followed).with_fields(fields)
+    page = _page(judgement, followed, gusty).with_fields(fields)
     return PlannerReport(judgement=judgement, content=render(page))
 
 
-def _page(judgement: BlockJudgement, followed: Trace) -> Page:
+def _page(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Page:
     spec, proof = judgement.spec, judgement.check
     units = spec.machine().units
     live = ", ".join(
@@ -84,7 +86,7 @@ def _page(judgement: BlockJudgement, followed: Trace) -> Page:
         subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
         verdicts=[_verdict(proof, judgement.path)],
         facts=_facts(proof),
-        sections=[*_sections(judgement, followed)],
+        sections=[*_sections(judgement, followed, gusty)],
         colophon=f"Made by {libraries}.",
     )
 
@@ -125,7 +127,7 @@ def _facts(proof: Proof) -> list[tuple[str, str]]:
     ]
 
 
-def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
+def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Iterator[Section]:
     """Put the page in the order in which an engineer asks."""
     spec, proof = judgement.spec, judgement.check
     worst = proof.worst
@@ -142,6 +144,9 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
             Listing(title="Its commands", text=_commands(worst.history)),
         ],
     )
+    if gusty is not None:
+        words = "Of the histories with a sound sensor and gusts the one after which most remains."
+        yield Section(title="Damping by the sensor", words=words, blocks=damping_figures(spec, proof, gusty))
     if len(proof.judged) > 1:
         yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(spec, proof)])
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])

@@ -138,6 +138,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
     long last = history->start_cycles[history->n_rows - 1], end = last + history->longest;
     long again = history->n_measured > 0 ? history->again : 0;
     size_t row = 0, mark = 0;
+    bool promised = history->n_measured == 0; /* since it stands: a sensor may tell only later that the load is calm */
     begin_axes(block, found);
     found->stands = -1;
     found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
@@ -164,6 +165,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         if (k >= last && found->stands < 0 && standing(block, now)) {
             found->stands = k;
             end = k + history->settle + history->watch;
+            promised = history->n_measured == 0;
             for (size_t i = 0; i < block->n_axes; i++) stood[i] = now[block->axes[3 * i]];
         }
         for (size_t i = 0; i < block->n_axes; i++) {
@@ -181,6 +183,10 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         history->setpoints[history->led[0]] = alone;
         if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);
         if (found->status == GOOD) found->status = get(fmu, history->load_references, history->n_loads, sway);
+        if (found->stands >= 0 && found->promise && !promised) {
+            promised = true;
+            memset(found->residual, 0, history->n_loads * sizeof(double));
+        }
         take_loads(history, sway, found->stands >= 0 && k >= found->stands + history->settle, found);
         if (found->trace != NULL && k < found->n_rows) {
             double *kept = found->trace + k;
