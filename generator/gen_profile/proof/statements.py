@@ -58,6 +58,7 @@ STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
 SHOWN = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs show, too
+COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
 PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
 
 
@@ -176,6 +177,7 @@ def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     if "nEvents" not in issued:
         return
     found, expected = Counter[tuple[int, int]](), Counter(_shown(followed))
+    given = {order.begin: order.values[0] for order in followed.orders if order.values}
     for cycle in np.flatnonzero(np.diff(issued["nEvents"], prepend=0.0)).tolist():
         count = int(issued["nEvents"][cycle])
         for k in range(int(issued["nEvents"][cycle - 1]) if cycle else 0, count):
@@ -187,6 +189,8 @@ def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             )
             if code in PLANNED:
                 yield Allowance("event", cycle, abs(value - issued["fTimeToGo"][cycle]), EXACT)
+            if code in COMMANDED and cycle in given:
+                yield Allowance("event", cycle, abs(value - given[cycle]), EXACT)
             found[cycle, int(code)] += 1
     judged = Counter({one: times for one, times in found.items() if one[1] in SHOWN})
     for cycle, _ in (judged - expected) + (expected - judged):
