@@ -5,6 +5,7 @@ import pytest
 from generator.free_swings import inside, swing
 
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.identification import misfit
 from gen_profile.identification.estimation import estimate
 from gen_profile.identification.fit import SwingingMachine, fit_of
 from gen_profile.identification.identify import identify
@@ -93,6 +94,17 @@ def test_what_no_parameter_explains_widens_the_range():
     assert left.rms == pytest.approx(0.005 / np.sqrt(2.0), rel=0.1)
     assert left.frequency == pytest.approx(3.1, abs=0.2)
     assert torn.half_range["L0"] > 20.0 * clean.half_range["L0"]
+
+
+@pytest.mark.parametrize(("plant", "rope", "axes"), [(CRANE, "L1", (0.0,)), (HOIST, "L0", (0.0, 4.0))])
+def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monkeypatch, plant, rope, axes):
+    """They took more than ten minutes for 6,000 rows of a gyroscope that drifts."""
+    monkeypatch.setattr(misfit, "nothing_left", lambda *_: pytest.fail("large swings were tried"))
+    values = np.cumsum(np.random.default_rng(0).normal(0.0, 2e-3, len(TIMES)))
+    machine = SwingingMachine(plant=plant, parameters=plant.nominal(), q_a=axes)
+    known = parse_reading(f"{rope}={plant.nominal()[rope]}±0.01")
+    found = estimate(machine, [rope], [known], [log_of(values, load=plant.loads[0])])
+    assert found.misfits[0] is not None
 
 
 def test_noise_is_no_misfit():

@@ -24,7 +24,7 @@ from gen_profile.identification.driven_model import COARSE, DrivenModel, driven_
 from gen_profile.identification.estimation import taken_as_exact
 from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
 from gen_profile.identification.measurements import DirectReading, SwingLog
-from gen_profile.identification.misfit import Explanation, likeliest, misfits, nothing_left
+from gen_profile.identification.misfit import GROSS, Explanation, likeliest, misfits, nothing_left
 from gen_profile.identification.swing_model import STILL, shortened
 from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.motion.metrics import peak
@@ -42,7 +42,6 @@ DRAWN, BEST = 256, 2  # machines of the ranges that are tried, and of these the 
 SAMPLES = 1500  # of a log that are fitted
 LOOSE = 3.0  # half-ranges: the standard deviation of a parameter of which a log tells nothing
 IMPOSSIBLE = 25.0  # by which the squares that a log leaves are more by chance once in a million times
-GROSS = 0.5  # of a log's standard deviation: a machine that leaves more of it explains nothing
 SHOWN = (0.5, 1.5)  # times a swing that a sensor may show: it may lie askew, by 60° at most
 WIDE = np.geomspace(0.25, 4.0, 33)  # times a parameter of the spec, where one is looked for that changed
 SLABS, PER_SLAB = 16, 8  # into which a range is cut, and machines that are looked at in each

@@ -36,6 +36,7 @@ DISTINCT = 12.0  # by which the squares of an explanation are more by chance onc
 STARTS = (1.0, 0.5, 0.7, 1.4, 2.0)  # times a parameter of the spec, where it is looked for
 ROUGHLY = 1200  # samples, four of each of the fastest swings, by which parameters are chosen
 TRIED = 2  # parameters at once that may explain what is left
+GROSS = 0.5  # of a log's standard deviation: a machine that leaves more of it explains nothing
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -168,8 +169,8 @@ def elsewhere(fit: Fit) -> Explanation | None:
     if not fit.models:
         return None
     rough, read = _rough(fit), {getattr(reading, "parameter", "") for reading in fit.readings}
-    begun = (_of_small_swings(rough, name).fit for name in fit.names if name not in read)
-    found = (nothing_left(attrs.evolve(one, models=fit.models), ()) for one in begun)
+    begun = (_of_small_swings(rough, name) for name in fit.names if name not in read)
+    found = (nothing_left(attrs.evolve(one.fit, models=fit.models), ()) for one in begun if one.explains)
     return next((one for one in found if one is not None), None)
 
 
@@ -205,10 +206,13 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
         equivalent = {
             freed: one for freed, one in tried.items() if one.squares <= EQUIVALENT * least < math.inf
         }
+        if not equivalent:
+            return ()
         candidates = [
             explained
             for freed, one in equivalent.items()
-            if (explained := nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
+            if one.explains
+            and (explained := nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
         ]
         if likely := likeliest(candidates):
             return likely
@@ -240,6 +244,12 @@ class _SmallSwings:
 
     fit: Fit
     squares: float = math.inf
+
+    @property
+    def explains(self) -> bool:
+        """Whether it leaves so little that it is worth its while to try large swings, which takes seconds."""
+        squares = (float(np.var(model.log.values)) * len(model.log.times) for model in self.fit.models)
+        return self.squares <= GROSS**2 * sum(squares)
 
 
 def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
