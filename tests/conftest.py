@@ -23,8 +23,8 @@ if sys.platform != "win32":
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Give `-n auto` one process more than processors, since many tests wait for other programs."""
-    return (os.cpu_count() or 1) + 1
+    """Give `-n auto` two processes more than processors, since many tests wait for other programs."""
+    return (os.cpu_count() or 1) + 2
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -9,6 +9,7 @@ from documentation import PAGES, ROOT, blocks, run
 from end_to_end.studios import studio
 
 from gen_profile.proof import prove
+from gen_profile.sweep import run as sweep
 
 README = PAGES[0]
 
@@ -30,6 +31,7 @@ def test_the_first_blocks_install_and_test():
 def test_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(prove, "HISTORIES", 24)  # what the pages' commands do is the same
+    monkeypatch.setattr(sweep, "CPU_COUNT", 1)
     scope = {}
     for block in tour(page):
         if block.title == "until Ctrl-C":

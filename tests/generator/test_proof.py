@@ -124,7 +124,7 @@ def test_sway_on_the_way_is_told_where_it_is_limited(proof):
 def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypatch):
     begun = []
 
-    def watched(self, history, period, modes):
+    def watched(self, history, *_):
         begun.append(history)
         sleep(0.01)
         return GOOD, ()
