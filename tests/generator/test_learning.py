@@ -177,6 +177,8 @@ def test_what_teaches_nothing_is_refused():
         learn(point, PLAYED, [log_of()])
     with pytest.raises(SpecError, match=r"seen: unknown load 'paylod'; did you mean 'payload'"):
         learn(SPEC, PLAYED, [DirectReading(parameter="paylod", value=0.1, uncertainty=0.1)])
+    with pytest.raises(SpecError, match=r"sway of payload is no less than 0 m, found -0\.1"):
+        learn(SPEC, PLAYED, [DirectReading(parameter="payload", value=-0.1, uncertainty=0.01)])
     swinging = SPEC.changed({"move.initial": {"phi": 0.1}})
     with pytest.raises(SpecError, match="the load hung at rest before; log a run"):
         learn(swinging, PLAYED, [DirectReading(parameter="payload", value=0.1, uncertainty=0.1)])

@@ -350,6 +350,10 @@ def learn(
     for seen in (run for run in runs if isinstance(run, DirectReading)):
         if seen.parameter not in plant.loads:
             raise SpecError(f"seen: unknown load {seen.parameter!r}{suggestion(seen.parameter, plant.loads)}")
+        if seen.value < 0.0:
+            raise SpecError(
+                f"seen: the greatest sway of {seen.parameter} is no less than 0 m, found {seen.value:g}."
+            )
         if spec.move.initial:
             raise SpecError("seen: tells of machines only where the load hung at rest before; log a run.")
     machines = before = Machines(plant=plant, parameters=spec.plant.parameters, ranges=ranges)
