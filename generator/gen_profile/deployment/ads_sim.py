@@ -31,6 +31,11 @@ class AdsError(Exception):
     """A request cannot be answered; with the protocol's error code."""
 
 
+class _Server(ThreadingTCPServer):
+    allow_reuse_address = True
+    daemon_threads = True
+
+
 class SimulatedAdsController:
     """The server: the block as ``MAIN.fbMotion``, with its inputs, which clients write, and its outputs.
 
@@ -55,9 +60,8 @@ class SimulatedAdsController:
         OutputError
             The port cannot be had.
         """
-        ThreadingTCPServer.allow_reuse_address = ThreadingTCPServer.daemon_threads = True
         try:
-            server = ThreadingTCPServer((LOOPBACK, self._port), self._handler())
+            server = _Server((LOOPBACK, self._port), self._handler())
         except OSError as error:
             raise OutputError(f"port {self._port}: {error.strerror}; name another one.") from error
         with server:
