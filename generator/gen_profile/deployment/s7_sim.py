@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from snap7.error import S7Error
@@ -13,7 +13,7 @@ from snap7.server import Server
 from snap7.type import SrvArea
 
 from gen_profile.deployment.s7 import DOUBLE, REPLY_AT, STATE_AT
-from gen_profile.deployment.simulated_block import LONGEST, LOOPBACK, SimulatedBlock
+from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedBlock
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, state_length
@@ -58,12 +58,7 @@ class SimulatedS7Controller:
             raise OutputError(f"port {self._port}: cannot be had; name another one.") from error
         try:
             ready(f"s7://{LOOPBACK}:{self._port}/0/1")
-            begun, called = time.monotonic(), 0
-            while not self.ended.wait(min(self._cycle, LONGEST)):
-                due = int((time.monotonic() - begun) / self._cycle)
-                if due > called:
-                    self.turn(server, due - called)
-                    called = due
+            self.block.play(partial(self.turn, server), self._cycle, self.ended)
         finally:
             server.stop()
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
+from threading import Event
 
 import numpy as np
 
@@ -57,6 +59,15 @@ class SimulatedBlock:
         self.outputs = {name: issued[places] for name, places in self._places.items()}
         if any(self.outputs[name][0] for name in GUIDING):
             self.set("fActPosition", self.outputs["fPosition"])
+
+    def play(self, turn: Callable[[int], None], cycle: float, ended: Event) -> None:
+        """Until an event is set, take a turn of so many cycles as the time that has passed asks for."""
+        begun, called = time.monotonic(), 0
+        while not ended.wait(min(cycle, LONGEST)):
+            due = int((time.monotonic() - begun) / cycle)
+            if due > called:
+                turn(due - called)
+                called = due
 
     def request(self, values: Array) -> None:
         """Write a request."""

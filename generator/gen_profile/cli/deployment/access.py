@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 _OPC_UA = re.compile(r"opc\.tcp://[^\s/@]+:(\d{1,5})(/\S*)?", re.ASCII)
 _S7 = re.compile(r"s7://([^\s/@:]+)(?::(\d{1,5}))?/([0-7])/(\d{1,2})", re.ASCII)
-MOST_PORT, MOST_SLOT, MOST_BLOCKS = 65535, 31, 65535
+_ADS = re.compile(r"ads://(?:([^\s/@]+)/)?((?:\d{1,3}\.){5}\d{1,3}):(\d{1,5})", re.ASCII)
+MOST_PORT, MOST_SLOT, MOST_BLOCKS, MOST_BYTE = 65535, 31, 65535, 255
 PASSWORD = "GEN_PROFILE_PASSWORD"  # of the environment: command lines are seen by all
 
 
@@ -72,6 +73,8 @@ class Access:
     def __attrs_post_init__(self) -> None:
         if self.url.startswith("s7:"):
             self._require_s7()
+        elif self.url.startswith("ads:"):
+            self._require_ads()
         else:
             self._require_opcua()
 
@@ -82,6 +85,18 @@ class Access:
         ------
         DeploymentError
         """
+        if self.url.startswith("ads:"):
+            from gen_profile.deployment.ads import AdsAccess, AdsLink
+
+            host, net_id, ams_port = _matched(_ADS, self.url)
+            ads = AdsAccess(
+                url=self.url,
+                host=host or ".".join(net_id.split(".")[:4]),
+                net_id=net_id,
+                port=int(ams_port),
+                instance=self.instance,
+            )
+            return AdsLink(ads, table)
         if self.data_block is None:
             from gen_profile.deployment.opcua import OpcUaLink
 
@@ -108,22 +123,40 @@ class Access:
                 "--db: S7 cannot be browsed; name the number of the data block that was exported with the "
                 "block."
             )
+        self._require_no_security("S7")
+        if self.instance:
+            raise SpecError("--instance: means nothing with S7, where --db names the block; leave it out.")
+        require_s7()
+
+    def _require_ads(self) -> None:
+        match = _ADS.fullmatch(self.url)
+        if match is None or int(match[3]) > MOST_PORT or max(map(int, match[2].split("."))) > MOST_BYTE:
+            raise SpecError(
+                f"--to {self.url}: is no address such as ads://10.0.0.5.1.1:851 (AMS NetId and port), or "
+                "ads://10.0.0.5/5.80.2.1.1.1:851 where the NetId does not begin with the address."
+            )
+        if self.data_block is not None:
+            raise SpecError("--db: is for S7; leave it out, since ADS finds the block by its name.")
+        self._require_no_security("ADS")
+        require_ads()
+
+    def _require_no_security(self, protocol: str) -> None:
         if self.security != "none":
             raise SpecError(
-                "--security: S7 has none, and any client may write to the controller; ask for --security "
-                "none if its network is kept apart, or use OPC UA."
+                f"--security: {protocol} has none, and any client may write to the controller; ask for "
+                "--security none if its network is kept apart, or use OPC UA."
             )
-        if self.certificate is not None or self.fingerprint or self.user or self.instance:
+        if self.certificate is not None or self.fingerprint or self.user:
             raise SpecError(
-                "--certificate, --fingerprint, --user, --instance: mean nothing with S7; leave them out."
+                f"--certificate, --fingerprint, --user: mean nothing with {protocol}; leave them out."
             )
-        require_s7()
 
     def _require_opcua(self) -> None:
         match = _OPC_UA.fullmatch(self.url)
         if match is None or int(match[1]) > MOST_PORT:
             raise SpecError(
-                f"--to {self.url}: is no address such as opc.tcp://10.0.0.5:4840 or s7://10.0.0.5/0/1."
+                f"--to {self.url}: is no address such as opc.tcp://10.0.0.5:4840, ads://10.0.0.5.1.1:851 or "
+                "s7://10.0.0.5/0/1."
             )
         if self.data_block is not None:
             raise SpecError("--db: is for S7; leave it out, since OPC UA finds the block by itself.")
@@ -154,6 +187,11 @@ def require_opcua() -> None:
 def require_s7() -> None:
     """Refuse to begin without the package."""
     require_installed("S7 needs the package python-snap7", "s7", "snap7")
+
+
+def require_ads() -> None:
+    """Refuse to begin without the package."""
+    require_installed("ADS needs the package pyads", "ads", "pyads")
 
 
 def password(user: str) -> str:

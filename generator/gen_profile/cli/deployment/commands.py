@@ -15,6 +15,7 @@ from gen_profile.cli.deployment.access import (
     access_options,
     client_options,
     password,
+    require_ads,
     require_opcua,
     require_s7,
 )
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     "url",
     metavar="URL",
     required=True,
-    help="Controller, as opc.tcp://HOST:PORT or s7://HOST/RACK/SLOT.",
+    help="Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
 )
 @click.option(
     "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
@@ -216,21 +217,28 @@ def _user() -> str:
     type=Count(1, MOST_BLOCKS),
     help="Speak S7 in place of OPC UA, with the block's arrays in this data block, and bExecute in M0.0.",
 )
+@click.option("--ads", is_flag=True, help="Speak ADS in place of OPC UA, with the block as MAIN.fbMotion.")
 @output_options
-def plc_sim(artefact: Path, *, data_block: int | None, as_json: bool, **options: Any) -> None:
-    """Simulate a controller that runs a playback block, behind an OPC UA or S7 server."""
+def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool, **options: Any) -> None:
+    """Simulate a controller that runs a playback block, behind an OPC UA, ADS or S7 server."""
     given = options["user"] or options["certificate"] is not None
     if options["no_security"] and given:
         raise SpecError("--no-security: lets everybody in; leave --user and --certificate out.")
-    if data_block is not None and not options["no_security"]:
+    if ads and data_block is not None:
+        raise SpecError("--ads, --db: are of two protocols; leave one of them out.")
+    if (ads or data_block is not None) and not options["no_security"]:
+        option, protocol = ("--ads", "ADS") if ads else ("--db", "S7")
         raise SpecError(
-            "--db: S7 has no security; add --no-security, which lets any program of this computer in."
+            f"{option}: {protocol} has no security; add --no-security, which lets any program of this "
+            "computer in."
         )
     try:
-        if data_block is None:
-            _simulate_opcua(artefact, as_json, **options)
-        else:
+        if ads:
+            _simulate_ads(artefact, options["port"], as_json)
+        elif data_block is not None:
             _simulate_s7(artefact, data_block, options["port"], as_json)
+        else:
+            _simulate_opcua(artefact, as_json, **options)
     except KeyboardInterrupt:
         click.echo("The simulated controller is switched off.", err=True)
 
@@ -263,6 +271,17 @@ def _simulate_s7(artefact: Path, data_block: int, port: int, as_json: bool) -> N
         tell("compiling the block")
         controller = SimulatedS7Controller(read_table(artefact), data_block, port)
     controller.serve(lambda address: _show_simulated(f"DB{data_block}", address, "", as_json))
+
+
+def _simulate_ads(artefact: Path, port: int, as_json: bool) -> None:
+    require_ads()
+    from gen_profile.deployment.ads_sim import INSTANCE, SimulatedAdsController
+    from gen_profile.deployment.table import read_table
+
+    with progress() as tell:
+        tell("compiling the block")
+        controller = SimulatedAdsController(read_table(artefact), port)
+    controller.serve(lambda address: _show_simulated(INSTANCE, address, "", as_json))
 
 
 def _show_simulated(name: str, address: str, fingerprint: str, as_json: bool) -> None:
