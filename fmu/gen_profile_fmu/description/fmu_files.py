@@ -15,7 +15,7 @@ import fmpy
 
 from gen_profile_fmu.description.model_description import build_description, model_description
 from gen_profile_fmu.description.terminals import terminals_and_icons
-from gen_profile_fmu.model.c_sources import hand_written
+from gen_profile_fmu.model.c_sources import filled, hand_written
 from gen_profile_fmu.model.contents import Model
 
 SOURCE_FILE = "fmu.c"  # includes all others
@@ -94,21 +94,14 @@ def standard_headers(version: Version) -> dict[str, str]:
 
 def _translation_unit(model: Model, version: Version, identity: str) -> str:
     host, *interface = version.own_files
-    prefix = f"FMI{version.value}_FUNCTION_PREFIX"
     names = [host, "model.h", *model.order, *_COMMON, *interface]
-    includes = "\n".join(f'#include "{name}"' for name in names if name != "instance.h")
-    return f"""\
-/*
- * The whole FMU as one translation unit, so that nothing but FMI's functions has a name outside of it.
- * FMI's headers are the importer's. For a shared library, define {prefix[:5]}OVERRIDE_{prefix[5:]}.
- */
-#ifndef {prefix[:5]}OVERRIDE_{prefix[5:]}
-#define {prefix} {model.identifier}_
-#endif
-#define MODEL_IDENTITY "{identity}"
-
-{includes}
-"""
+    return filled(
+        SOURCE_FILE,
+        fmi=f"FMI{version.value}",
+        model=model.identifier,
+        identity=identity,
+        includes="\n".join(f'#include "{name}"' for name in names if name != "instance.h"),
+    )
 
 
 def fmu_files(made: Sources, binaries: Mapping[str, bytes], *, with_extras: bool = True) -> dict[str, bytes]:
