@@ -29,7 +29,7 @@ from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import live_modes
 from gen_profile.spec.reading import parse_spec, preset_spec
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_compiler")]
+pytestmark = pytest.mark.slow
 
 FOLLOWING = ["planner.live_rate={L1=0.25}", "check.residual_sway=0.05"]  # the block that has most to do
 
