@@ -1,7 +1,6 @@
 """For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache; options."""
 
 import os
-import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -62,16 +61,3 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         environment.setenv("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))  # which takes HOME else
         environment.delenv("GEN_PROFILE_CC", raising=False)
         yield folder
-
-
-@pytest.fixture(scope="module", autouse=True)
-def quick_compiler(request: pytest.FixtureRequest, cache: Path) -> Iterator[None]:
-    """Compile planner blocks by gcc, in a third of the time, where no test is about the compiler.
-
-    The bits are the same, and what runs takes half as long again.
-    """
-    folder = request.path.relative_to(Path(__file__).parent).parts[0]
-    with pytest.MonkeyPatch.context() as environment:
-        if folder in {"generator", "exporters"} and shutil.which("gcc"):
-            environment.setenv("GEN_PROFILE_CC", "gcc -Og")
-        yield

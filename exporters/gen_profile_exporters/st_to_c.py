@@ -89,6 +89,7 @@ FAULTS = (
     "takes the square root of a negative number",
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
+PART = 40  # lines beyond which a branch is a function: one of thousands compiles four times as slowly
 CHECKS = Path(__file__).with_name("checks.c").read_text("ascii")  # of what a block does, where it is CHECKED
 _NUMBERS = ("LREAL", "DINT")
 _PLAIN: dict[tuple[str, ...], str] = {  # C of an operator or a function, and the types that it takes
@@ -161,20 +162,24 @@ def translate(text: str) -> Translation:
     ExportError
         It is no function block of this subset of the language.
     """
-    name, variables, body = translate_statements(text, {}, checked=True)
+    name, variables, body, parts = translate_statements(text, {}, checked=True)
     inputs, outputs = (
         tuple(one for v in variables if v.section == section for one in elements(v))
         for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
-    return Translation(name, inputs, outputs, _header(name, variables), _source(name, variables, body))
+    return Translation(name, inputs, outputs, _header(name, variables), _source(name, variables, body, parts))
 
 
 class Statements(NamedTuple):
-    """A function block's name, its declarations, and its statements as lines of C."""
+    """A function block's name, its declarations, and its statements as lines of C.
+
+    Parts are what the lines call by ``PART(part_0)`` and so on, a part those before it.
+    """
 
     name: str
     variables: list[StVariable]
     body: list[str]
+    parts: list[list[str]]
 
 
 def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool = False) -> Statements:
@@ -186,7 +191,7 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     owners : mapping of str to str
         What stands before the names of a section's variables, such as ``in->``; ``fb->`` if not given.
     checked : bool
-        Whether the lines use the macros by which an altered text is ended.
+        Whether the lines use the macros by which an altered text is ended, and are divided into parts.
 
     Raises
     ------
@@ -197,7 +202,8 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
         tree = _parser().parse(text)
         variables = declared(tree)
         _require_writable(tree, variables)
-        translated: Any = _Translator(variables, owners, checked).transform(tree)
+        translator = _Translator(variables, owners, checked)
+        translated: Any = translator.transform(tree)
     except UnexpectedInput as error:
         place = f"line {error.line}, column {error.column}"
         raise ExportError(f"{NO_BLOCK}: {place} is not understood.") from error
@@ -206,7 +212,7 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     except RecursionError as error:
         raise ExportError("The text is nested too deeply to be executed here.") from error
     name, *_, body = translated.children
-    return Statements(str(name), list(variables.values()), body)
+    return Statements(str(name), list(variables.values()), body, translator.parts)
 
 
 @cache
@@ -241,6 +247,7 @@ class _Translator(Transformer[Token, object]):
         self._variables, self._checked = variables, checked
         self._owners = {"VAR CONSTANT": "", **owners}
         self._templates = _PLAIN | _CHECKED if checked else _PLAIN
+        self.parts: list[list[str]] = []
 
     def real(self, parts):  # type: ignore[no-untyped-def]
         return _Code(c_literal(parts[0]), "LREAL", parts[0].line)
@@ -326,9 +333,9 @@ class _Translator(Transformer[Token, object]):
         word = "if"
         for condition, body in branches:
             self._require(condition, "BOOL", "a condition")
-            lines += [f"{word} ({condition.text}) {{", *_indented(body)]
+            lines += [f"{word} ({condition.text}) {{", *self._within(body)]
             word = "} else if"
-        return [*lines, *(["} else {", *_indented(otherwise)] if otherwise else []), "}"]
+        return [*lines, *(["} else {", *self._within(otherwise)] if otherwise else []), "}"]
 
     def switch(self, parts):  # type: ignore[no-untyped-def]
         selector, *labels, otherwise = parts
@@ -340,8 +347,8 @@ class _Translator(Transformer[Token, object]):
                     raise refused(number, f"CASE has {case} twice")
                 known.add(case)
                 lines.append(f"case {case}:")
-            lines += _indented([*body, "break;"])
-        return [*lines, "default:", *_indented([*(otherwise or []), "break;"]), "}"]
+            lines += [*self._within(body), "    break;"]
+        return [*lines, "default:", *self._within(otherwise or []), "    break;", "}"]
 
     def count(self, parts):  # type: ignore[no-untyped-def]
         name, first, last, body = parts
@@ -356,7 +363,7 @@ class _Translator(Transformer[Token, object]):
             "{",
             f"    const int32_t {end} = {last.text};",
             *_indented(
-                [f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *_indented(body), "}"]
+                [f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *self._within(body), "}"]
             ),
             "}",
         ]
@@ -366,7 +373,14 @@ class _Translator(Transformer[Token, object]):
         self._require(condition, "BOOL", "a condition")
         counted = f"OPERATIONS({condition.work}), " if condition.work and self._checked else ""
         test = f"({counted}{condition.text}){self._turn}" if self._checked else condition.text
-        return [f"while ({test}) {{", *_indented(body), "}"]
+        return [f"while ({test}) {{", *self._within(body), "}"]
+
+    def _within(self, body: list[str]) -> list[str]:
+        """Indent a branch or a loop's body, or call it as a part."""
+        if self._checked and len(body) > PART:
+            self.parts.append(body)
+            body = [f"PART(part_{len(self.parts) - 1});"]
+        return _indented(body)
 
     @property
     def _turn(self) -> str:
@@ -389,7 +403,7 @@ def _header(name: str, variables: list[StVariable]) -> str:
 typedef struct {{
 {members}
 #ifdef CHECKED
-    int32_t fault_;
+    int32_t fault_, turns_;
 #endif
 }} {name};
 
@@ -403,8 +417,8 @@ static void {name}_step({name} *fb);
 """
 
 
-def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
-    constants = c_constants(variables, body)
+def _source(name: str, variables: list[StVariable], body: list[str], parts: list[list[str]]) -> str:
+    constants = c_constants(variables, sum(parts, body))
     initials = c_initials(variables, dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->"))
     return "\n".join(
         [
@@ -428,11 +442,15 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             *_indented(initials),
             "}",
             "",
-            f"static void {name}_step({name} *fb) {{",
-            "    BEGIN();",
-            *_indented(body),
-            "    END();",
-            "}",
-            "",
+            *(
+                line
+                for k, part in enumerate(parts)
+                for line in _function("APART void", f"part_{k}", name, part)
+            ),
+            *_function("void", f"{name}_step", name, ["FIRST();", *body]),
         ]
     )
+
+
+def _function(kind: str, name: str, block: str, body: list[str]) -> list[str]:
+    return [f"static {kind} {name}({block} *fb) {{", "    BEGIN();", *_indented(body), "    END();", "}", ""]
