@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
@@ -32,53 +31,7 @@ from gen_profile_exporters.st_variables import (
     elements,
     refused,
 )
-
-_GRAMMAR = r"""
-    start: "FUNCTION_BLOCK"i NAME section* body "END_FUNCTION_BLOCK"i
-    section: SECTION CONSTANT? declaration* "END_VAR"i
-    declaration: NAME ":" type [":=" initial] ";"
-    type: TYPE | "ARRAY"i "[" INTEGER ".." INTEGER "]" "OF"i TYPE
-    ?initial: literal | "[" literal ("," literal)* "]" -> listed
-    literal: [SIGN] (REAL | INTEGER | TRUTH)
-    body: statement*
-    ?statement: variable ":=" expression ";" -> assignment
-        | "IF"i branch ("ELSIF"i branch)* [otherwise] "END_IF"i ";" -> choice
-        | "CASE"i expression "OF"i label+ [otherwise] "END_CASE"i ";" -> switch
-        | "FOR"i NAME ":=" expression "TO"i expression "DO"i body "END_FOR"i ";" -> count
-        | "WHILE"i expression "DO"i body "END_WHILE"i ";" -> repeat
-    otherwise: "ELSE"i body
-    branch: expression "THEN"i body
-    label: INTEGER ("," INTEGER)* ":" body
-    ?expression: conjunction | expression OR conjunction -> binary
-    ?conjunction: equality | conjunction AND equality -> binary
-    ?equality: comparison | equality EQUALS comparison -> binary
-    ?comparison: sum | comparison ORDER sum -> binary
-    ?sum: term | sum SIGN term -> binary
-    ?term: unary | term FACTOR unary -> binary
-    ?unary: primary | NOT unary -> prefixed | SIGN unary -> prefixed
-    ?primary: REAL -> real | INTEGER -> whole | TRUTH -> truth
-        | "(" expression ")" -> grouped
-        | FUNCTION "(" expression ")" -> call
-        | variable
-    variable: NAME ["[" expression "]"]
-    SECTION.3: /VAR_INPUT\b|VAR_OUTPUT\b|VAR\b/i
-    CONSTANT.3: /CONSTANT\b/i
-    TYPE.3: /BOOL\b|INT\b|DINT\b|LREAL\b/i
-    TRUTH.3: /TRUE\b|FALSE\b/i
-    FUNCTION.3: /ABS\b|SQRT\b|LREAL_TO_DINT\b|DINT_TO_LREAL\b/i
-    OR.3: /OR\b/i
-    AND.3: /AND\b/i
-    NOT.3: /NOT\b/i
-    REAL.2: /[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?/
-    INTEGER: /[0-9]+/
-    EQUALS.2: "=" | "<>"
-    ORDER: "<=" | ">=" | "<" | ">"
-    SIGN: "+" | "-"
-    FACTOR: "*" | "/"
-    NAME: /[A-Za-z](_?[A-Za-z0-9])*/
-    %ignore /\(\*(.|\n)*?\*\)/
-    %ignore /\s+/
-"""
+from gen_profile_exporters.text_parts import FOLDER, filled, indented
 
 FAULTS = (
     "",
@@ -90,7 +43,6 @@ FAULTS = (
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
 PART = 40  # lines beyond which a branch is a function: one of thousands compiles four times as slowly
-CHECKS = Path(__file__).with_name("checks.c").read_text("ascii")  # of what a block does, where it is CHECKED
 _NUMBERS = ("LREAL", "DINT")
 _PLAIN: dict[tuple[str, ...], str] = {  # C of an operator or a function, and the types that it takes
     **{(o, t, t): f"{{}} {o} {{}}" for o in ("+", "-", "*", "/", "<", "<=", ">", ">=") for t in _NUMBERS},
@@ -167,7 +119,18 @@ def translate(text: str) -> Translation:
         tuple(one for v in variables if v.section == section for one in elements(v))
         for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
-    return Translation(name, inputs, outputs, _header(name, variables), _source(name, variables, body, parts))
+    members = indented(f"{c_member(v)};" for v in variables if v.section != "VAR CONSTANT")
+    initials = c_initials(variables, dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->"))
+    source = filled(
+        "c/block.c",
+        name=name,
+        most_turns=MOST_TURNS,
+        constants="\n".join(c_constants(variables, sum(parts, body))),
+        initials=indented(initials),
+        parts="\n".join(_function(f"part_{k}", name, part) for k, part in enumerate(parts)),
+        body=indented(body),
+    )
+    return Translation(name, inputs, outputs, filled("c/block.h", name=name, members=members), source)
 
 
 class Statements(NamedTuple):
@@ -217,7 +180,8 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
 
 @cache
 def _parser() -> Lark:
-    return Lark(_GRAMMAR, parser="lalr", propagate_positions=False)
+    grammar = (FOLDER / "structured_text.lark").read_text("ascii")
+    return Lark(grammar, parser="lalr", propagate_positions=False)
 
 
 def _require_writable(tree: Any, variables: Mapping[str, StVariable]) -> None:
@@ -391,66 +355,5 @@ def _indented(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
-def _header(name: str, variables: list[StVariable]) -> str:
-    members = "\n".join(f"    {c_member(v)};" for v in variables if v.section != "VAR CONSTANT")
-    return f"""\
-#ifndef {name}_H
-#define {name}_H
-
-#include <stdbool.h>
-#include <stdint.h>
-
-typedef struct {{
-{members}
-#ifdef CHECKED
-    int32_t fault_, turns_;
-#endif
-}} {name};
-
-/* Once, before all else. */
-static void {name}_init({name} *fb);
-
-/* Once in every cycle, the inputs set; then read the outputs. */
-static void {name}_step({name} *fb);
-
-#endif
-"""
-
-
-def _source(name: str, variables: list[StVariable], body: list[str], parts: list[list[str]]) -> str:
-    constants = c_constants(variables, sum(parts, body))
-    initials = c_initials(variables, dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->"))
-    return "\n".join(
-        [
-            "/* Compile without contraction of products and sums (-ffp-contract=off). */",
-            f'#include "{name}.h"',
-            "#include <math.h>",
-            "#include <string.h>",
-            "",
-            "#ifdef COUNT_OPERATIONS",
-            f"long {name}_operations;",
-            f"#define OPERATIONS(number) ({name}_operations += (number))",
-            "#else",
-            "#define OPERATIONS(number) ((void)0)",
-            "#endif",
-            *CHECKS.replace("MOST_TURNS", str(MOST_TURNS)).splitlines(),
-            "",
-            *constants,
-            "",
-            f"static void {name}_init({name} *fb) {{",
-            "    memset(fb, 0, sizeof *fb);",
-            *_indented(initials),
-            "}",
-            "",
-            *(
-                line
-                for k, part in enumerate(parts)
-                for line in _function("APART void", f"part_{k}", name, part)
-            ),
-            *_function("void", f"{name}_step", name, ["FIRST();", *body]),
-        ]
-    )
-
-
-def _function(kind: str, name: str, block: str, body: list[str]) -> list[str]:
-    return [f"static {kind} {name}({block} *fb) {{", "    BEGIN();", *_indented(body), "    END();", "}", ""]
+def _function(name: str, block: str, body: list[str]) -> str:
+    return f"static APART void {name}({block} *fb) {{\n    BEGIN();\n{indented(body)}\n    END();\n}}\n"

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from string import Template
+from textwrap import indent
 from typing import Any
 
 FOLDER = Path(__file__).parent
@@ -19,3 +22,13 @@ def text_parts(path: str) -> dict[str, Any]:
     """
     _, *pieces = _PART.split((FOLDER / path).read_text("ascii"))
     return {name: text.removesuffix("\n") for name, text in zip(pieces[::2], pieces[1::2], strict=True)}
+
+
+def filled(path: str, **values: object) -> str:
+    """Read a C file of this package, and put in what stands there as ``$name``."""
+    return Template((FOLDER / path).read_text("ascii")).substitute(values)
+
+
+def indented(lines: Iterable[str]) -> str:
+    """Put lines of C between braces."""
+    return indent("\n".join(lines), "    ")

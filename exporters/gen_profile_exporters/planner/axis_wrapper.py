@@ -24,119 +24,9 @@ from gen_profile_exporters.motion_libraries import (
     each,
 )
 from gen_profile_exporters.playback.structured_text import literal
+from gen_profile_exporters.text_parts import text_parts
 
-HEADER = """\
-(*
-    {name}: {block} on {axes}. Call it in their task, every fCycleTime.
-    Not tried on a controller: watch the first motion with the hand at the emergency stop.
-
-    bPower powers the axes, to be homed and moved otherwise, too. A rising edge of bEnable takes them over
-    at their setpoints, as fast as they go, and guides them: bEnabled is set, and commands are obeyed.
-    Dropping bEnable or bPower stops without sway first (with bQuickStop: at once) and then lets them go.
-
-    An axis that fails is let go and left to its own reaction, the others brake at once. Then it takes bReset,
-    which resets the axes, too, and another rising edge of bEnable: they are taken over where they stand.
-
-    nErrorId: as of {block} (7 lets the axes go, once they stand), and
-              20 an axis is in error
-              21 an axis has no power, or had none for {patience:g} s
-              22 {guide} reports an error, or does not work
-              23 something else took an axis
-              24 an axis is not homed
-*)
-"""
-BODY = """\
-bWanted := bEnable AND bPower;
-IF nStage = cOff THEN
-    IF bReset THEN nFault := 0; END_IF;
-    IF bWanted AND NOT bWantedBefore THEN
-        nStage := cPowering;
-        nWaited := 0;
-    END_IF;
-ELSIF NOT bWanted THEN
-    IF nStage = cGuiding THEN nStage := cStopping; END_IF;
-    IF nStage < cGuiding THEN nStage := cOff; END_IF;
-ELSIF NOT bWantedBefore AND (nStage = cStopping) THEN
-    nStage := cGuiding;
-END_IF;
-bWantedBefore := bWanted;
-
-bOn := bPower OR (nStage <> cOff);
-bAcknowledge := bReset AND (nStage = cOff);
-bPowered := TRUE;
-bReady := TRUE;
-bGuided := FALSE;
-{prepare}
-IF nFault <> 0 THEN
-    IF nStage < cGuiding THEN nStage := cOff; ELSE nStage := cStopping; END_IF;
-ELSIF (nStage = cPowering) AND bPowered THEN
-    nStage := cTaking;
-    nWaited := 0;
-{take}
-ELSIF (nStage = cTaking) AND bReady THEN
-    nStage := cGuiding;
-ELSIF (nStage = cPowering) OR (nStage = cTaking) THEN
-    nWaited := nWaited + 1;
-    IF nWaited > cPatience THEN
-        nFault := 21;
-        IF nStage = cTaking THEN nFault := 22; END_IF;
-    END_IF;
-END_IF;
-
-{lists}fbPlanner(
-    {arguments});
-IF nStage >= cGuiding THEN
-    IF (nFault = 0) AND ((fbPlanner.nErrorId = 7) OR NOT fbPlanner.bEnabled) THEN
-        nFault := fbPlanner.nErrorId;
-        nStage := cStopping;
-    END_IF;
-END_IF;
-
-{feed}
-IF (nStage = cStopping) AND NOT fbPlanner.bBusy THEN nStage := cOff; END_IF;
-
-{results}bBusy := fbPlanner.bBusy OR ((nStage <> cOff) AND (nStage <> cGuiding));
-IF nFault <> 0 THEN nErrorId := nFault; END_IF;
-bError := nErrorId <> 0;
-"""
-PREPARE = """\
-IF nStage = cOff THEN bTaken{n} := FALSE; END_IF;
-bResets := FALSE;
-{power}
-nCause := 0;
-{vendor}
-IF (nStage = cPowering) AND (nFault = 0) THEN
-    IF bResets OR (nCause = 21) THEN
-        bPowered := FALSE;
-    ELSIF nCause = 20 THEN
-        nFault := 20;
-    ELSIF NOT ({homed}) THEN
-        nFault := 24;
-    END_IF;
-END_IF;
-{let_go}
-bGuided := bGuided OR bTaken{n};
-(* Taken over where it is commanded to be, then supervised where it is. *)
-fPlace{n} := {setpoint} / cUnits{n};
-IF fbPlanner.bEnabled THEN fPlace{n} := {actual} / cUnits{n}; END_IF;"""
-# Until it is enabled, the block follows the axis, which goes on as fast as it does.
-FEED = """\
-bFeed := bTaken{n};
-fPosition := cUnits{n} * fbPlanner.fPosition{n};
-fVelocity := cUnits{n} * fbPlanner.fVelocity{n};
-fAcceleration := cUnits{n} * fbPlanner.fAcceleration{n};
-IF nStage = cTaking THEN fPosition := fPosition + fCycleTime * fVelocity; END_IF;
-nCause := 0;
-{vendor}
-{let_go}"""
-# Element by element, as matiec takes no whole array for a parameter.
-LIST = """\
-nIndex := {first};
-WHILE nIndex <= {last} DO
-    {to}[nIndex] := {of}[nIndex];
-    nIndex := nIndex + 1;
-END_WHILE;
-"""
+TEXTS = text_parts("planner/axis_wrapper.st")
 INTERFACE = ("VAR_INPUT", "VAR_OUTPUT")
 STAGES = ("cOff", "cPowering", "cTaking", "cGuiding", "cStopping")
 STAGE = BlockVariable(
@@ -212,13 +102,14 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: Mot
     if twice := [v.name for v in variables if counted[v.name.lower()] > 1]:
         raise ExportError(f"{name} has a variable {twice[0]} of its own; name the live parameter otherwise.")
     return BlockSource(
-        header=HEADER.format(
+        header=TEXTS["header"].format(
             name=name,
             block=block.name,
             axes="axes of the motion library" if library.axis_type else "frequency converters",
             guide=library.guide,
             patience=PATIENCE,
-        ),
+        )
+        + "\n",
         name=name,
         variables=variables,
         body=_body(block, units, library),
@@ -249,9 +140,10 @@ def _own(block: BlockSource, units: Mapping[str, float], library: MotionLibrary)
 
 def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary) -> str:
     places = [{"n": n} for n in units]
+    # until it is enabled, the block follows the axis, which goes on as fast as it does
     prepare, feed = (
         each(around(template, statements, library), places)
-        for template, statements in ((PREPARE, library.prepare), (FEED, library.feed))
+        for template, statements in ((TEXTS["prepare"], library.prepare), (TEXTS["feed"], library.feed))
     )
     inputs, outputs = ([v for v in block.variables if v.section == section] for section in INTERFACE)
     given = {v.name: v.name for v in inputs if not v.array} | {
@@ -264,7 +156,7 @@ def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary
             given[f"{key}{n}"] = place.format(n=n, speed=library.speed.format(n=n))
     setpoints = {f"{key}{n}" for n in units for key in SETPOINTS}
     copied = [v for v in outputs if v.name not in setpoints]
-    return BODY.format(
+    text = TEXTS["body"].format(
         prepare=prepare,
         take=each("    bTaken{n} := TRUE;", places),
         lists="".join(_list(v, f"fbPlanner.{v.name}", v.name) for v in inputs if v.array),
@@ -275,10 +167,12 @@ def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary
             for v in copied
         ),
     )
+    return f"{text}\n"
 
 
 def _list(variable: BlockVariable, to: str, of: str) -> str:
-    """Hand an array over."""
+    """Hand an array over, element by element: matiec takes no whole array for a parameter."""
     assert variable.array is not None
     first, last, _ = variable.array
-    return LIST.format(first=first, last=last, to=to, of=of)
+    text = TEXTS["list"].format(first=first, last=last, to=to, of=of)
+    return f"{text}\n"

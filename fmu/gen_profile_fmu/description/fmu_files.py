@@ -13,10 +13,9 @@ from pathlib import Path
 import attrs
 import fmpy
 
-from gen_profile_fmu.description import fmi2 as fmi2_description
-from gen_profile_fmu.description import fmi3 as fmi3_description
+from gen_profile_fmu.description.model_description import build_description, model_description
 from gen_profile_fmu.description.terminals import terminals_and_icons
-from gen_profile_fmu.model.c_sources import hand_written
+from gen_profile_fmu.model.c_sources import filled, hand_written
 from gen_profile_fmu.model.contents import Model
 
 SOURCE_FILE = "fmu.c"  # includes all others
@@ -77,20 +76,14 @@ def sources(model: Model, version: Version) -> Sources:
         **model.code,
         **hand_written("interface", *_COMMON, *version.own_files),
     }
-    identity = digest(_describe(model, version, ""), *flat(code))[:32]
+    identity = digest(model_description(model, version.value, "", SOURCE_FILE), *flat(code))[:32]
     return Sources(
         model=model,
         version=version,
         identity=identity,
-        description=_describe(model, version, identity),
+        description=model_description(model, version.value, identity, SOURCE_FILE),
         code={**code, SOURCE_FILE: _translation_unit(model, version, identity)},
     )
-
-
-def _describe(model: Model, version: Version, identity: str) -> bytes:
-    if version is Version.FMI2:
-        return fmi2_description.model_description(model, identity, SOURCE_FILE)
-    return fmi3_description.model_description(model, identity)
 
 
 def standard_headers(version: Version) -> dict[str, str]:
@@ -101,21 +94,14 @@ def standard_headers(version: Version) -> dict[str, str]:
 
 def _translation_unit(model: Model, version: Version, identity: str) -> str:
     host, *interface = version.own_files
-    prefix = f"FMI{version.value}_FUNCTION_PREFIX"
     names = [host, "model.h", *model.order, *_COMMON, *interface]
-    includes = "\n".join(f'#include "{name}"' for name in names if name != "instance.h")
-    return f"""\
-/*
- * The whole FMU as one translation unit, so that nothing but FMI's functions has a name outside of it.
- * FMI's headers are the importer's. For a shared library, define {prefix[:5]}OVERRIDE_{prefix[5:]}.
- */
-#ifndef {prefix[:5]}OVERRIDE_{prefix[5:]}
-#define {prefix} {model.identifier}_
-#endif
-#define MODEL_IDENTITY "{identity}"
-
-{includes}
-"""
+    return filled(
+        SOURCE_FILE,
+        fmi=f"FMI{version.value}",
+        model=model.identifier,
+        identity=identity,
+        includes="\n".join(f'#include "{name}"' for name in names if name != "instance.h"),
+    )
 
 
 def fmu_files(made: Sources, binaries: Mapping[str, bytes], *, with_extras: bool = True) -> dict[str, bytes]:
@@ -140,7 +126,7 @@ def fmu_files(made: Sources, binaries: Mapping[str, bytes], *, with_extras: bool
     laid["documentation/licenses/license.txt"] = licence
     if made.version is Version.FMI2:
         return laid | {"model.png": icon}
-    build = fmi3_description.build_description(made.model, SOURCE_FILE)
+    build = build_description(made.model, SOURCE_FILE)
     return laid | {
         "sources/buildDescription.xml": build,
         "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(made.model.variables),

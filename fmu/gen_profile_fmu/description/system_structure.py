@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 import attrs
 
 from gen_profile_fmu.description.base_units import BASE_UNITS
-from gen_profile_fmu.description.common import text_of, to_bytes
 from gen_profile_fmu.description.fmu_files import archive
+from gen_profile_fmu.description.model_description import text_of, to_bytes
 from gen_profile_fmu.model.contents import Model
 from gen_profile_fmu.model.variables import FmuVariable
 

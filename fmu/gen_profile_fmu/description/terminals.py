@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from xml.etree import ElementTree
 
-from gen_profile_fmu.description.common import to_bytes
+from gen_profile_fmu.description.model_description import to_bytes
 from gen_profile_fmu.model.variables import VariableTable
 
 BLOCKS = ("INPUTS", "COMMAND", "Q_A", "DQ_A", "PLACE")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from string import Template
 
 import numpy as np
 
@@ -30,6 +31,11 @@ def hand_written(folder: str, *names: str) -> dict[str, str]:
 def model_sources(*names: str) -> dict[str, str]:
     """Read the hand-written files of a model, and those that every model has."""
     return hand_written("models", "model.h", *names)
+
+
+def filled(name: str, **values: object) -> str:
+    """Read a C file that is the same in every FMU but for what stands there as ``$name``."""
+    return Template(hand_written("templates", name)[name]).substitute(values)
 
 
 def equations_source(equations: Dynamics) -> str:
@@ -86,37 +92,15 @@ def variables_header(table: VariableTable, n_a: int, n_u: int, constants: Mappin
     offsets = {block: table.offset(block) for block in table.blocks}
     offsets["STATES"] = 0 if states is None else table.offset(states)
     offsets.setdefault(DERIVATIVES, 0)
-    return f"""\
-/* The FMU's variables; a variable's value reference is its index. */
-#ifndef VARIABLES_H
-#define VARIABLES_H
-
-#include <float.h>
-
-enum {{ {", ".join(f"{name} = {value}" for name, value in counts.items())} }};
-
-/* First value reference of every block. */
-enum {{
-{_lines(f"    {block} = {offset}" for block, offset in offsets.items())}
-}};
-
-typedef enum {{ {", ".join(type_.name for type_ in Type)} }} Type;
-typedef enum {{ {", ".join(kind.name for kind in Kind)} }} Kind;
-enum {{ ACCELERATION_INPUT, VELOCITY_INPUT, SETPOINT_INPUT }};
-{"".join(f"#define {name} ({value}){chr(10)}" for name, value in constants.items())}
-typedef struct {{
-    const char *name;
-    Type type;
-    Kind kind;
-    double start, lower, upper, nominal;
-}} Variable;
-
-static const Variable VARIABLES[N_VALUES] = {{
-{_lines(map(_variable_row, table.variables))}
-}};
-
-#endif
-"""
+    return filled(
+        "variables.h",
+        counts=", ".join(f"{name} = {value}" for name, value in counts.items()),
+        offsets=_lines(f"    {block} = {offset}" for block, offset in offsets.items()),
+        types=", ".join(type_.name for type_ in Type),
+        kinds=", ".join(kind.name for kind in Kind),
+        constants="".join(f"#define {name} ({value})\n" for name, value in constants.items()),
+        rows=_lines(map(_variable_row, table.variables)),
+    )
 
 
 def motion_table(profile: Profile) -> str:
@@ -125,25 +109,16 @@ def motion_table(profile: Profile) -> str:
     padded = np.zeros((segments, max(powers, FEWEST_POWERS), axes))
     padded[:, :powers] = profile.coefficients
     rows = ("    {" + ", ".join("{" + _numbers(power) + "}" for power in segment) + "}" for segment in padded)
-    return f"""\
-/* A motion's knots in s; coefficients of its positions, lowest power first, by segment, power and axis. */
-#ifndef MOTION_TABLE_H
-#define MOTION_TABLE_H
-
-enum {{ N_SEGMENTS = {segments}, N_POWERS = {padded.shape[1]} }};
-
-static const double KNOTS[N_SEGMENTS + 1] = {{{_numbers(profile.knots)}}};
-
-static const double TARGET[] = {{{_numbers(profile.target)}}};
-
-static const double FINAL_VELOCITY[] = {{{_numbers(profile.final_velocity)}}};
-
-static const double COEFFICIENTS[N_SEGMENTS][N_POWERS][{axes}] = {{
-{_lines(rows)}
-}};
-
-#endif
-"""
+    return filled(
+        "motion_table.h",
+        segments=segments,
+        powers=padded.shape[1],
+        axes=axes,
+        knots=_numbers(profile.knots),
+        target=_numbers(profile.target),
+        final_velocity=_numbers(profile.final_velocity),
+        rows=_lines(rows),
+    )
 
 
 def _numbers(values: object) -> str:

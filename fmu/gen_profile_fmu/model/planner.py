@@ -12,7 +12,8 @@ from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.st_to_c import Translation, translate
 from gen_profile_exporters.st_variables import StVariable
-from gen_profile_fmu.model.c_sources import equations_source, model_sources, variables_header
+from gen_profile_exporters.text_parts import indented
+from gen_profile_fmu.model.c_sources import equations_source, filled, model_sources, variables_header
 from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model
 from gen_profile_fmu.model.dependencies import Structure, plant_structure
 from gen_profile_fmu.model.documentation import block_page, planned_system_page
@@ -73,7 +74,7 @@ class _PlacedBlock:
         return {
             f"{self.code.name}.h": self.code.header,
             f"{self.code.name}.c": self.code.source,
-            "planner_block.h": _block_header(self.code),
+            "planner_block.h": filled("planner_block.h", block=self.code.name),
         }
 
 
@@ -297,21 +298,6 @@ def _structure(block: _PlacedBlock, table: VariableTable, at: Mapping[str, int])
     return Structure(running=dict.fromkeys(outputs, running), starting=starting)
 
 
-def _block_header(block: Translation) -> str:
-    return f"""\
-/* The planner block that planner_model.c calls. */
-#ifndef PLANNER_BLOCK_H
-#define PLANNER_BLOCK_H
-
-#define CHECKED
-#include "{block.name}.h"
-
-typedef {block.name} PlannerBlock;
-
-#endif
-"""
-
-
 def _block_source(block: _PlacedBlock, at: Mapping[str, int]) -> str:
     code, taken = block.code, _taken_over(block.code, at)
     given = [
@@ -322,29 +308,11 @@ def _block_source(block: _PlacedBlock, at: Mapping[str, int]) -> str:
     shown = [f"values[{at[v.name]}] = block->{v.name};" for v in code.outputs]
     stands = [f"block->{output} = values[{at[given]}];" for output, given in taken.items()]
     changes = [f"tangent[{at[output]}] = tangent[{at[given]}];" for output, given in taken.items()]
-    return f"""\
-/* The planner block, and its inputs and outputs among the FMU's variables. */
-#include "{code.name}.c"
-
-static void block_begin(PlannerBlock *block, const double values[]) {{
-    {code.name}_init(block);
-    {_statements(stands)}
-}}
-
-static void block_begin_tangent(double tangent[]) {{
-    {_statements(changes)}
-}}
-
-static void block_call(PlannerBlock *block, const double values[]) {{
-    {_statements(given)}
-    {code.name}_step(block);
-}}
-
-static void block_show(const PlannerBlock *block, double values[]) {{
-    {_statements(shown)}
-}}
-"""
-
-
-def _statements(lines: list[str]) -> str:
-    return "\n    ".join(lines)
+    return filled(
+        "planner_block.c",
+        block=code.name,
+        stands=indented(stands),
+        changes=indented(changes),
+        given=indented(given),
+        shown=indented(shown),
+    )

@@ -27,6 +27,7 @@ from gen_profile.cli.options import (
     version_option,
 )
 from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
+from gen_profile.cli.progress import draw, progress
 from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
 from gen_profile.errors import CertificateError, OutputError, SpecError
 from gen_profile.plugins import require_installed
@@ -100,7 +101,6 @@ def design(
     key = signing_key(key_path)
     from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.designs.design import design as run
 
     with progress() as tell:
@@ -154,16 +154,11 @@ def compare(
     """Compare optimal profiles with shapers."""
     spec = chosen.changed({"solver.base": base}).spec()
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.comparison.compare import compare as run
 
     with progress() as tell:
         comparison = run(spec, tell)
-        if picture is not None:
-            from gen_profile.charts.plot import plot
-
-            tell("drawing")
-            plot(comparison, picture)
+        draw(comparison, picture, tell)
     print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
 
 
@@ -264,7 +259,6 @@ def _check_motion(
     artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **options: Any
 ) -> Judgement:
     from gen_profile.artefacts.writing import deliver
-    from gen_profile.cli.progress import progress
     from gen_profile.verification.check import check_artefact
     from gen_profile.verification.scenario_table import table
 
@@ -291,7 +285,6 @@ def _to_certify(judgement: Judgement, options: Mapping[str, Any]) -> bool:
 
 def _certified(path: Path, spec: Spec | None) -> Certificate:
     from gen_profile.certificate.from_file import certify_artefact
-    from gen_profile.cli.progress import progress
 
     with progress() as tell:
         return certify_artefact(
@@ -302,7 +295,6 @@ def _certified(path: Path, spec: Spec | None) -> Certificate:
 def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_json: bool) -> None:
     from gen_profile.certificate.from_file import check_certificate
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
 
     with progress() as tell:
         proved = check_certificate(
@@ -317,7 +309,6 @@ def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_js
 def _check_block(
     artefact: Path, spec: Spec | None, *, picture: Path | None, **options: Any
 ) -> BlockJudgement:
-    from gen_profile.cli.progress import progress
     from gen_profile.proof.check import check_block
 
     with progress() as tell:

@@ -9,6 +9,7 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
 from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
@@ -63,7 +64,6 @@ def fmu(
     if source_only and platform is not None:
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
     spec = chosen.spec()
-    from gen_profile.cli.progress import progress
     from gen_profile.designs.fmu import export_fmu, platform_names
     from gen_profile_fmu.description.fmu_files import Version
     from gen_profile_fmu.model.contents import AUTHOR

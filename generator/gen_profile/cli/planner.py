@@ -26,6 +26,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome, print_warnings, warn
+from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, sign_option, signing_key
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.progress import Progress
@@ -99,7 +100,6 @@ def write(
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
     from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.designs.planner import deploy_planner
     from gen_profile.planner.forms import require_forms
     from gen_profile.proof.prove import HISTORIES
@@ -178,7 +178,6 @@ def play(
 ) -> None:
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
-    from gen_profile.cli.progress import progress
     from gen_profile.planner.commands import play as run
     from gen_profile.planner.forms import read_block
     from gen_profile.planner.interface import LOST

@@ -7,11 +7,16 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gen_profile.progress import Progress
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gen_profile.charts.plot import Drawn
 
 FIRST_LINE, LONGEST_PAUSE = 2.0, 30.0  # s after which a log hears of work again, and at the longest
 REFRESH = 4.0  # times a second, on a terminal
@@ -46,6 +51,15 @@ class _Step:
                 left = seconds / (self.done - self.before) * (self.total - self.done)
                 parts.append(f"about {left:.0f} s left")
         return f"{', '.join(parts)} …"
+
+
+def draw(result: Drawn, picture: Path | None, tell: Progress) -> None:
+    """Draw a result in a file, where one is named."""
+    if picture is not None:
+        from gen_profile.charts.plot import plot
+
+        tell("drawing")
+        plot(result, picture)
 
 
 @contextmanager

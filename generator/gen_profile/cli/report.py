@@ -18,6 +18,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome
+from gen_profile.cli.progress import progress
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -77,7 +78,6 @@ def report(
 ) -> None:
     """Write everything about a design, or about a planner block and its proof, into one HTML file."""
     from gen_profile.artefacts.writing import deliver, require_place
-    from gen_profile.cli.progress import progress
     from gen_profile.report.print import printed, require_browser
 
     options = {

@@ -9,6 +9,7 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import Count, OutputFile, SpecChoice, output_options, plot_option, spec_options
 from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.progress import draw, progress
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,16 +61,11 @@ def robustness(
     spec = chosen.spec()
     from gen_profile.artefacts.writing import deliver
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.comparison.robustness import robustness as run
 
     with progress() as tell:
         curves = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
-        if picture is not None:
-            from gen_profile.charts.plot import plot
-
-            tell("drawing")
-            plot(curves, picture)
+        draw(curves, picture, tell)
         if path is not None:
             deliver(path, curves.table().encode("utf-8"))
     print_outcome(curves.to_dict(), words.robustness(curves), as_json)

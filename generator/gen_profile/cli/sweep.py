@@ -18,6 +18,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.progress import progress
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,7 +70,6 @@ def sweep(
     Cases that fail are rows of the table with their reason; the exit code is 0 once all are done.
     """
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.sweep.grid import parse_grid
     from gen_profile.sweep.plan import prepare, require_libraries
 
@@ -104,7 +104,6 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     away is no answer. Safe is what, played on the machine asked for, keeps the limits of the check.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.cli.progress import progress
     from gen_profile.sweep.plan import require_libraries
 
     require_libraries()
@@ -132,7 +131,6 @@ def library(folder: Path, path: Path, as_json: bool) -> None:
     An input of the block selects the profile.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.cli.progress import progress
     from gen_profile.sweep.plan import require_libraries
 
     require_libraries()

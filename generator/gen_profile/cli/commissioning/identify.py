@@ -20,6 +20,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
+from gen_profile.cli.progress import draw, progress
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
@@ -134,9 +135,7 @@ def identify(
     as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
-    from gen_profile.charts.plot import plot
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.identification.identify import identify as run
     from gen_profile.identification.identify import write_spec
     from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
@@ -153,9 +152,7 @@ def identify(
             tell("reading the log")
             measurements.append(read(log, spec, after))
         identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
-        if picture is not None:
-            tell("drawing")
-            plot(identified, picture)
+        draw(identified, picture, tell)
         write_spec(identified.spec, out, changed_text(text, chosen.overrides, spec, identified.spec, folder))
     print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out), as_json)
 
@@ -223,7 +220,6 @@ def learn(
     A run is a log of the swing, from before the motion until some swings after it, or what was seen then.
     """
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
     from gen_profile.designs.design import design
     from gen_profile.identification.identify import write_spec
     from gen_profile.identification.learning import learn as run

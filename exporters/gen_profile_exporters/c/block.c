@@ -1,3 +1,14 @@
+/* Compile without contraction of products and sums (-ffp-contract=off). */
+#include "$name.h"
+#include <math.h>
+#include <string.h>
+
+#ifdef COUNT_OPERATIONS
+long ${name}_operations;
+#define OPERATIONS(number) (${name}_operations += (number))
+#else
+#define OPERATIONS(number) ((void)0)
+#endif
 #ifdef __GNUC__
 #define APART __attribute__((noinline))
 #else
@@ -31,7 +42,7 @@ static inline int32_t within(int32_t *fault, int32_t index, int32_t length)
 }
 static inline bool turn(int32_t *fault, int32_t *turns)
 {
-    return sound(fault, ++*turns <= MOST_TURNS, 2) & (*fault == 0);
+    return sound(fault, ++*turns <= $most_turns, 2) & (*fault == 0);
 }
 static inline double nonzero(int32_t *fault, double divisor)
 {
@@ -67,3 +78,18 @@ static inline double root(int32_t *fault, double value)
 #define BOTH(one, other) ((one) && (other))
 #define EITHER(one, other) ((one) || (other))
 #endif
+
+$constants
+
+static void ${name}_init($name *fb) {
+    memset(fb, 0, sizeof *fb);
+$initials
+}
+
+$parts
+static void ${name}_step($name *fb) {
+    BEGIN();
+    FIRST();
+$body
+    END();
+}

@@ -1,0 +1,20 @@
+#ifndef ${name}_H
+#define ${name}_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {
+$members
+#ifdef CHECKED
+    int32_t fault_, turns_;
+#endif
+} $name;
+
+/* Once, before all else. */
+static void ${name}_init($name *fb);
+
+/* Once in every cycle, the inputs set; then read the outputs. */
+static void ${name}_step($name *fb);
+
+#endif
