@@ -127,7 +127,7 @@ def translate(text: str) -> Translation:
         most_turns=MOST_TURNS,
         constants="\n".join(c_constants(variables, sum(parts, body))),
         initials=indented(initials),
-        parts="\n".join(_function(f"part_{k}", name, part) for k, part in enumerate(parts)),
+        parts="\n".join(_function(f"{name}_part_{k}", name, part) for k, part in enumerate(parts)),
         body=indented(body),
     )
     return Translation(name, inputs, outputs, filled("c/block.h", name=name, members=members), source)
@@ -136,7 +136,7 @@ def translate(text: str) -> Translation:
 class Statements(NamedTuple):
     """A function block's name, its declarations, and its statements as lines of C.
 
-    Parts are what the lines call by ``PART(part_0)`` and so on, a part those before it.
+    Parts are what the lines call by ``PART(NAME_part_0)`` and so on, a part those before it.
     """
 
     name: str
@@ -165,7 +165,7 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
         tree = _parser().parse(text)
         variables = declared(tree)
         _require_writable(tree, variables)
-        translator = _Translator(variables, owners, checked)
+        translator = _Translator(str(tree.children[0]), variables, owners, checked)
         translated: Any = translator.transform(tree)
     except UnexpectedInput as error:
         place = f"line {error.line}, column {error.column}"
@@ -206,9 +206,11 @@ def _written(tree: Any) -> Iterator[Token]:
 class _Translator(Transformer[Token, object]):
     """Expressions become `_Code`, statements lines of C."""
 
-    def __init__(self, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool) -> None:
+    def __init__(
+        self, name: str, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool
+    ) -> None:
         super().__init__()
-        self._variables, self._checked = variables, checked
+        self._name, self._variables, self._checked = name, variables, checked
         self._owners = {"VAR CONSTANT": "", **owners}
         self._templates = _PLAIN | _CHECKED if checked else _PLAIN
         self.parts: list[list[str]] = []
@@ -343,7 +345,7 @@ class _Translator(Transformer[Token, object]):
         """Indent a branch or a loop's body, or call it as a part."""
         if self._checked and len(body) > PART:
             self.parts.append(body)
-            body = [f"PART(part_{len(self.parts) - 1});"]
+            body = [f"PART({self._name}_part_{len(self.parts) - 1});"]
         return _indented(body)
 
     @property
