@@ -18,7 +18,7 @@ from gen_profile.problem.dynamics import dynamics
 from gen_profile.problem.linearization import linear_terms
 from gen_profile.problem.symbolic import Function
 
-TIME_TERMS = 10  # of a series over a piece of `certify.PHASE` rad of the fastest mode
+TIME_TERMS = 10  # of a series over a piece of time, of `CertificateOptions.radians_per_piece`
 ACCURACY = 1e-10  # of the integration, relative
 FINE = 2.0**-36  # of the greatest value of each coordinate: what coefficients are rounded to
 NOISE = 2.0**-34  # likewise, below which coefficients are left out

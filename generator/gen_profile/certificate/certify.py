@@ -24,22 +24,55 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.problem.parameter_box import Box
 from gen_profile.spec.model import Spec
 
-PHASE = 3.0  # rad of the fastest mode that a piece of time covers at most
-TURN, WIDE_TURN = 2.5, 5.0  # rad by which a mode's phase at the end varies over a box at first
-FEW = 16  # boxes, up to which the first is taken
-FEWEST_TERMS, LEAST_TERM = 4, 1e-5  # of series in parameters; what they leave out, relative
-LEAST_POWER, WIDEST = 1e-6, 0.5  # likewise, where motions change little; how wide a range counts as, relative
+FEW = 16  # boxes, up to which `CertificateOptions.radians_per_box` holds
+FEWEST_TERMS = 4  # of series in parameters
+LEAST_POWER, WIDEST = 1e-6, 0.5  # what they leave out where motions change little; how wide a range counts as
 PLACES = 33  # along a range, at which phases are looked at
-CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
 SLACK = 1e-3  # relative, by which a bound is stated higher than found, as other rounding could break it
-CLOSE_TO_LIMIT = 2e-3  # of the limit, likewise
 NEAR = 1e-5  # of what is allowed: a smooth motion that is as near to the axes' is near enough
-MOST_NODES = 5 * 10**8  # at which equations are evaluated in all: some twenty minutes
-FRUITLESS = 4  # rounds in a row that bring no bound nearer, after which no more are tried
-FRUITFUL = 0.8  # of what the worst bound was too high by: how far it is to come down in a round
-DEEPEST = 8  # halvings beyond the first boxes, of all ranges in sum
 
 Progress = Callable[[int, int], None]
+
+
+@attrs.frozen(kw_only=True)
+class CertificateOptions:
+    """How close a bound is to come, and how far it goes for it; see docs/certificate.md for the evidence.
+
+    Attributes
+    ----------
+    close : float
+        Times the greatest sway met: a bound as low is close enough.
+    close_to_limit : float
+        Of what is allowed: likewise a bound that is above the sway by as much.
+    radians_per_box, radians_per_wide_box : float
+        rad by which a mode's phase at the end varies over a box at first, where boxes are few and many.
+    radians_per_piece : float
+        rad of the fastest mode that a piece of time covers at most.
+    truncation : float
+        What series in parameters leave out, relative.
+    max_nodes : int
+        At which equations are evaluated in all: some twenty minutes.
+    max_halvings : int
+        Beyond the first boxes, of all ranges in sum.
+    max_fruitless : int
+        Rounds in a row that bring no bound nearer, after which no more are tried.
+    worth_halving : float
+        Of what the worst bound is too high by, to which it comes down in a round that brings it nearer.
+    """
+
+    close: float = 1.03
+    close_to_limit: float = 2e-3
+    radians_per_box: float = 2.5
+    radians_per_wide_box: float = 5.0
+    radians_per_piece: float = 3.0
+    truncation: float = 1e-5
+    max_nodes: int = 5 * 10**8
+    max_halvings: int = 8
+    max_fruitless: int = 4
+    worth_halving: float = 0.8
+
+
+USUAL = CertificateOptions()
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -71,7 +104,13 @@ class Attempt:
     fraction: float
 
 
-def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _, __: None) -> Attempt:
+def attempt(
+    spec: Spec,
+    setpoints: SampledProfile,
+    progress: Progress = lambda _, __: None,
+    *,
+    options: CertificateOptions = USUAL,
+) -> Attempt:
     """Prove bounds for boxes of machines, the worst of them as tightly as is wanted.
 
     Parameters
@@ -81,6 +120,7 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
         Replayed from an artefact.
     progress : callable
         Told how many boxes are done, and of how many so far.
+    options : CertificateOptions
 
     Raises
     ------
@@ -89,29 +129,29 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
     CosimulationError
         Machines cannot be integrated.
     """
-    theorem, spans = _prepared(spec, setpoints)
-    most = MOST_NODES // theorem.nodes  # boxes
-    first = _first_boxes(theorem, spans, most)
+    theorem, spans = _prepared(spec, setpoints, options)
+    most = options.max_nodes // theorem.nodes  # boxes
+    first = _first_boxes(theorem, spans, most, options)
     limits = np.array([limit.allowed for limit in theorem.limits])
     waiting, done, tried = first, dict[DyadicBox, _Proof](), 0
     largest_met, fruitless, before = np.zeros(len(limits)), 0, np.inf
     while waiting:
-        prove = partial(_prove, theorem, _wanted(largest_met, limits))
+        prove = partial(_prove, theorem, _wanted(largest_met, limits, options))
         for batch, proofs, here in in_order(prove, _integrated(theorem, waiting)):
             done.update(zip(batch, proofs, strict=True))
             largest_met = np.fmax(largest_met, here)
             tried += len(batch)
             progress(tried, tried + len(waiting))
-        wanted = _wanted(largest_met, limits)
+        wanted = _wanted(largest_met, limits, options)
         coarse = [box for box, proof in done.items() if not (proof.bound <= wanted).all()]
-        deepest = sum(level for level, _ in first[0]) + DEEPEST
+        deepest = sum(level for level, _ in first[0]) + options.max_halvings
         coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
         above = np.array([done[box].bound - wanted for box in waiting])
         proved = np.isfinite(above).all(axis=1)
         worst = float(above.max()) if proved.all() else np.inf
-        nearer = worst < FRUITFUL * before if proved.all() else bool(proved.any())
+        nearer = worst < options.worth_halving * before if proved.all() else bool(proved.any())
         fruitless, before = 0 if nearer else fruitless + 1, min(before, worst)
-        if tried + 2 * len(coarse) > most or fruitless == FRUITLESS:
+        if tried + 2 * len(coarse) > most or fruitless == options.max_fruitless:
             break
         waiting = [part for box in coarse for part in halves(box, int(np.argmax(done[box].tails)))]
         for box in coarse:
@@ -119,7 +159,9 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
     return _attempt(theorem, done, largest_met)
 
 
-def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[DyadicBox]:
+def _first_boxes(
+    theorem: Theorem, spans: Sequence[float], most: int, options: CertificateOptions = USUAL
+) -> list[DyadicBox]:
     """Cut ranges until phases turn little over each box.
 
     Raises
@@ -127,7 +169,7 @@ def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[Dy
     CertificateError
         There are too many.
     """
-    levels = _halvings(spans)
+    levels = _halvings(spans, options)
     if 3 * 2 ** sum(levels) > most:  # with the halves of each
         raise CertificateError(
             f"The ranges of {', '.join(theorem.ranges.names)} are too wide for a certificate: it takes "
@@ -136,27 +178,28 @@ def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[Dy
     return whole(levels)
 
 
-def _wanted(largest_met: Array, limits: Array) -> Array:
+def _wanted(largest_met: Array, limits: Array, options: CertificateOptions) -> Array:
     """Tell how low bounds should be, by the greatest sway seen."""
-    wanted = np.maximum(CLOSE * largest_met, largest_met + CLOSE_TO_LIMIT * limits)
+    wanted = np.maximum(options.close * largest_met, largest_met + options.close_to_limit * limits)
     return np.where(largest_met < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
 
 
-def _halvings(spans: Sequence[float]) -> list[int]:
+def _halvings(spans: Sequence[float], options: CertificateOptions) -> list[int]:
     """Tell how often each range is halved at first, over which phases turn so far.
 
     Of many boxes most are wider, as loads swing little in most of them; the others are halved later.
     """
     narrow, wide = (
-        [max(0, ceil(log2(max(span / turn, 1e-9)))) for span in spans] for turn in (TURN, WIDE_TURN)
+        [max(0, ceil(log2(max(span / turn, 1e-9)))) for span in spans]
+        for turn in (options.radians_per_box, options.radians_per_wide_box)
     )
     return narrow if 2 ** sum(narrow) <= FEW else wide
 
 
-def _terms(turn: float, width: float) -> int:
+def _terms(turn: float, width: float, truncation: float) -> int:
     """Tell how many terms a series needs over a box: as cos(turn y / 2) does, and 1 / (1 + width y)."""
     size, terms = 1.0, 0
-    while terms < FEWEST_TERMS or size > LEAST_TERM or (0.5 * width) ** terms > LEAST_POWER:
+    while terms < FEWEST_TERMS or size > truncation or (0.5 * width) ** terms > LEAST_POWER:
         terms += 1
         size *= 0.25 * turn / terms
     return terms
@@ -221,7 +264,9 @@ def _tails(motion: Array, terms: Sequence[int]) -> Array:
     return np.array([sizes.take([-2, -1], axis=k).sum() for k in range(1, sizes.ndim)])
 
 
-def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[float]]:
+def _prepared(
+    spec: Spec, setpoints: SampledProfile, options: CertificateOptions = USUAL
+) -> tuple[Theorem, list[float]]:
     """State the theorem, and tell how much the modes' phases vary over each range, in rad."""
     plant, ranges, watch = spec.machine(), ranges_of(spec), observation_time(spec)
     track = followed(spec, setpoints)
@@ -242,13 +287,16 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
         phases = box.phases(line)
         spans.append(float(np.abs(np.diff(phases, axis=0)).sum(axis=0).max()))
         fastest = max(fastest, float(phases.max()))
-    longest = PHASE * box.duration / fastest
+    longest = options.radians_per_piece * box.duration / fastest
     near = NEAR * min(limit.allowed for limit in limits_of(spec))
     axes = fitted(track, max(0.6 * float(setpoints.resolution.max()), near), longest, watch)
     middles, half = 0.5 * (ranges.upper + ranges.lower), 0.5 * (ranges.upper - ranges.lower)
     widths = np.minimum(half / np.maximum(np.abs(middles), half), WIDEST).tolist()
-    parts = [2**level for level in _halvings(spans)]
-    terms = tuple(_terms(span / n, width / n) for span, width, n in zip(spans, widths, parts, strict=True))
+    parts = [2**level for level in _halvings(spans, options)]
+    terms = tuple(
+        _terms(span / n, width / n, options.truncation)
+        for span, width, n in zip(spans, widths, parts, strict=True)
+    )
     return Theorem(
         spec=spec, axes=axes, ranges=ranges, limits=limits_of(spec), setpoints=setpoints, terms=terms
     ), spans

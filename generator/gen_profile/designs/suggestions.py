@@ -29,21 +29,9 @@ from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.work import OutOfWork, afford, budget, left, spend
 
-FIRST = 1.03  # times the least value, for which there is but one motion
-# from there on by 1.07, 1.15, 1.3 …; a value that works may be 5 % greater than one that does not
 COARSE = Search(precision=math.log(1.05), close=0.0, stride=math.log(1.07))
-FINE = attrs.evolve(COARSE, close=math.inf)
-MOST = 4.2  # times the least value, up to which one is tried
-FAR = 64.0  # likewise a duration where the relaxation knows of no limit, so of no least one
-# times the least value that works, up to which one is looked for that passes the check; likewise a duration
-FARTHER, LATER = 1.7, 16.0
-CLOSE_BY = 1.2  # times the least value that passes on few intervals, up to which one is looked for on many
 AMPLE = math.log(1.3)  # step beyond a value that takes too much work: a smooth motion may do
-FRACTION = 0.5  # of the work that is left, which one suggestion may take, and one duration tried
-LONGEST = 0.8  # likewise a longer move, which nearly always works
-WIDEST = 4.0  # times as wide as they are, all limits together are worth naming
 NEAR = 1.05  # times the duration, from which on it is worth telling how long a move would take
-AT_ONCE = 1.0  # s of work, in which a motion without limits is found, or is not worth the while
 IN_VAIN = Phrase(
     "Longer moves, wider limits and less robustness were tried as far as the work allows, and none was found "
     "to do. Not tried: fewer limits, or fewer parameters in robustness.uncertain. See whether all numbers of "
@@ -52,6 +40,49 @@ IN_VAIN = Phrase(
 
 Found = TypeVar("Found")
 Change = Callable[[float], Mapping[str, Any]]  # from a factor to values by their places in the spec
+
+
+@attrs.frozen(kw_only=True)
+class SuggestionOptions:
+    """How far and how long changes that help are looked for; see docs/solvers.md for the evidence.
+
+    Attributes
+    ----------
+    search : Search
+        For the least value that works, on few intervals: that may be 5 % greater than one that does not, and
+        values are tried by 1.07, 1.15, 1.3 … of the first one.
+    first : float
+        Times the least value, for which there is but one motion: what is tried first.
+    most, most_later : float
+        Times the least value, up to which one is tried; and a duration where the relaxation knows of no
+        limit, so of no least one.
+    farther, farther_later : float
+        Times the least value that works, up to which one is looked for that passes the check; and a duration.
+    close_by : float
+        Times the least value that passes on few intervals, up to which one is looked for on many.
+    widest : float
+        Times as wide as they are, all limits together are worth naming.
+    fraction, fraction_later : float
+        Of the work that is left, which one suggestion may take, and one duration tried; and a longer move in
+        all, which nearly always works.
+    at_once : float
+        s of work, in which a motion without limits is found, or is not worth the while.
+    """
+
+    search: Search = COARSE
+    first: float = 1.03
+    most: float = 4.2
+    most_later: float = 64.0
+    farther: float = 1.7
+    farther_later: float = 16.0
+    close_by: float = 1.2
+    widest: float = 4.0
+    fraction: float = 0.5
+    fraction_later: float = 0.8
+    at_once: float = 1.0
+
+
+USUAL = SuggestionOptions()
 
 
 @attrs.frozen(kw_only=True)
@@ -81,7 +112,9 @@ def explained(spec: Spec, solution: Solution) -> Solution:
     return attrs.evolve(solution, advice=advice, suggestions=remedies.suggestions)
 
 
-def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
+def remedy(
+    spec: Spec, spread: float = 1.0, *, in_time: bool = False, options: SuggestionOptions = USUAL
+) -> Remedy:
     """Find what to change so that there is a motion, each change by itself; those first that pass the check.
 
     Parameters
@@ -92,20 +125,21 @@ def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
         How many times as much as the nominal machine the worst one sways; 1 where unknown.
     in_time : bool
         Look for what would do in the duration asked for only.
+    options : SuggestionOptions
     """
     if spec.solver.solver == "indirect" and spec.robustness.method != "range":
         method = {"solver.method": "auto"}
         with suppress(OutOfWork):
-            if one := _tried(spec, method):
+            if one := _tried(spec, method, options):
                 return Remedy(suggestions=(one,))
-            known = remedy(spec.changed(method), spread, in_time=in_time)
+            known = remedy(spec.changed(method), spread, in_time=in_time, options=options)
             return attrs.evolve(known, suggestions=beside(method, known.suggestions))
         return Remedy()
     relaxation = _relaxation(spec, spread)
     problem = relaxation.problem
     needed, longer, others = None, None, list[Suggestion | None]()
     stated = problem.limits.stated()
-    wider = partial(_wider_limits, spec, relaxation)
+    wider = partial(_wider_limits, spec, relaxation, options)
     alone = [partial(wider, {place: value}) for place, value in stated.items()]
     time_limits = {place: stated[place] for place in time_dependent_limits(problem)}
     families = [
@@ -113,16 +147,17 @@ def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
         for limits in ([time_limits] if time_limits == stated else [time_limits, stated])
         if len(limits) > 1
     ]
-    together = [partial(wider, limits, WIDEST) for limits in families]
+    together = [partial(wider, limits, options.widest) for limits in families]
     with suppress(OutOfWork):  # of the budget for the whole answer: name what was found so far
         if not in_time:
-            needed = _in_time(partial(least_duration, relaxation))
+            needed = _in_time(partial(least_duration, relaxation), options.fraction)
             if needed:
-                longer = _in_time(partial(_longer, spec, relaxation, needed), LONGEST)
-        others += map(_in_time, alone)
-        for last_resort in (*together, partial(_less_robust, spec)):
+                find = partial(_longer, spec, relaxation, options, needed)
+                longer = _in_time(find, options.fraction_later)
+        others += (_in_time(find, options.fraction) for find in alone)
+        for last_resort in (*together, partial(_less_robust, spec, options)):
             if not any(others):
-                others.append(_in_time(last_resort))
+                others.append(_in_time(last_resort, options.fraction))
     advice = ""
     if needed and needed > NEAR * problem.duration and not longer:
         template = "By an estimate that was not tried, it takes some {duration:g} s with these limits."
@@ -139,11 +174,13 @@ def beside(values: Mapping[str, Any], suggestions: Iterable[Suggestion]) -> tupl
 def sufficient_duration(spec: Spec) -> Suggestion | None:
     """Find the least duration in s, no less than a spec's, that works, in most of the work that is left."""
     relaxation = _relaxation(spec, 1.0)
-    needed = _in_time(partial(least_duration, relaxation), LONGEST)
-    return _in_time(partial(_longer, spec, relaxation, needed), LONGEST) if needed else None
+    needed = _in_time(partial(least_duration, relaxation), USUAL.fraction_later)
+    if not needed:
+        return None
+    return _in_time(partial(_longer, spec, relaxation, USUAL, needed), USUAL.fraction_later)
 
 
-def tried(spec: Spec, *, coarse: bool = False) -> Solution:
+def tried(spec: Spec, *, coarse: bool = False, options: SuggestionOptions = USUAL) -> Solution:
     """Solve a spec as the next run would, or on few intervals, to see whether there is a motion."""
     problem = problem_of(spec)
     try:
@@ -151,7 +188,7 @@ def tried(spec: Spec, *, coarse: bool = False) -> Solution:
     except SpecError:
         return choice.given_up(problem)
     if spec.solver.solver != "direct" and problem.worst_case is None:
-        smooth = afford(partial(choice.attempt, problem, "indirect"), AT_ONCE)
+        smooth = afford(partial(choice.attempt, problem, "indirect"), options.at_once)
         if smooth is not None and (smooth.status is Status.INFEASIBLE or _kept(spec, smooth)):
             return smooth
     if coarse:  # whether there is a motion does not depend on what it costs
@@ -185,7 +222,7 @@ def least_change(
     change: Change,
     known_spread: float = 1.0,
     fraction: float = 1.0,
-    reach: tuple[float, float] = (MOST, FARTHER),
+    options: SuggestionOptions = USUAL,
 ) -> Suggestion | None:
     """Find the least factor of a change that works, as near as the work that is left allows.
 
@@ -198,16 +235,14 @@ def least_change(
         How many times as much as the nominal machine the worst one is supposed to sway.
     fraction : float
         Of the work that is left, which one factor may take.
-    reach : (float, float)
-        Up to which factor one is tried; and up to how many times the least factor that works one is looked
-        for that passes the check.
+    options : SuggestionOptions
     """
-    most, farther = reach
+    coarsely, finely = options.search, attrs.evolve(options.search, close=math.inf)
 
     @cache
     def solved(factor: float, *, coarse: bool) -> Draft:
         changed = spec.changed(change(factor))
-        solution = afford(partial(tried, changed, coarse=coarse), fraction * left())
+        solution = afford(partial(tried, changed, coarse=coarse, options=options), fraction * left())
         return drafted(changed, solution or choice.given_up(problem_of(changed)))
 
     def excess(factor: float, *, coarse: bool) -> float:
@@ -227,17 +262,19 @@ def least_change(
         return -math.inf if works and solved(factor, coarse=coarse).excess_sway <= 0.0 else math.inf
 
     nearest = passing = chosen = None
-    with suppress(OutOfWork), budget(FRACTION * left()):
-        nearest = least(partial(excess, coarse=True), FIRST, COARSE, most)
+    with suppress(OutOfWork), budget(options.fraction * left()):
+        nearest = least(partial(excess, coarse=True), options.first, coarsely, options.most)
         passing = nearest  # over a range few intervals tell nothing of the sway that is left
         if nearest and spec.robustness.method != "range":
-            passing = least(partial(unsafe, coarse=True), nearest, COARSE, farther * nearest)
+            passing = least(partial(unsafe, coarse=True), nearest, coarsely, options.farther * nearest)
     spend(0.0)
-    with suppress(OutOfWork), budget(FRACTION * left()):
-        chosen = passing and least(partial(unsafe, coarse=False), passing, FINE, CLOSE_BY * passing)
+    with suppress(OutOfWork), budget(options.fraction * left()):
+        if passing:
+            most_fine = options.close_by * passing
+            chosen = least(partial(unsafe, coarse=False), passing, finely, most_fine)
     spend(0.0)
     start = chosen or passing or nearest
-    factor = start and least(partial(excess, coarse=False), start, FINE, max(most, start))
+    factor = start and least(partial(excess, coarse=False), start, finely, max(options.most, start))
     return suggested(change(factor), solved(factor, coarse=False)) if factor else None
 
 
@@ -249,19 +286,23 @@ def _stands(draft: Draft) -> bool:
         return False
 
 
-def _longer(spec: Spec, relaxation: Relaxation, needed: float) -> Suggestion | None:
+def _longer(
+    spec: Spec, relaxation: Relaxation, options: SuggestionOptions, needed: float
+) -> Suggestion | None:
     """Find the least duration that works, in s, rounded up to three digits."""
 
     def change(factor: float) -> Mapping[str, Any]:
         return {"move.duration": float(rounded_up(factor * needed))}
 
-    most = MOST if time_dependent_limits(relaxation.problem) else FAR
-    return least_change(spec, change, relaxation.problem.sway_spread, FRACTION, (most, LATER))
+    most = options.most if time_dependent_limits(relaxation.problem) else options.most_later
+    options = attrs.evolve(options, most=most, farther=options.farther_later)
+    return least_change(spec, change, relaxation.problem.sway_spread, options.fraction, options)
 
 
 def _wider_limits(
     spec: Spec,
     relaxation: Relaxation,
+    options: SuggestionOptions,
     limits: Mapping[str, Any],
     most: float = math.inf,
 ) -> Suggestion | None:
@@ -274,29 +315,29 @@ def _wider_limits(
     def change(factor: float) -> Mapping[str, Any]:
         return {place: _times(value, factor * needed) for place, value in limits.items()}
 
-    return least_change(spec, change, relaxation.problem.sway_spread)
+    return least_change(spec, change, relaxation.problem.sway_spread, options=options)
 
 
-def _less_robust(spec: Spec) -> Suggestion | None:
+def _less_robust(spec: Spec, options: SuggestionOptions) -> Suggestion | None:
     """Ask for less robustness, but for no less than passes the check."""
     robustness = spec.robustness
     if robustness.method != "sensitivity":
         return None
     changes: list[dict[str, Any]] = [{"robustness.order": 1}] if robustness.order > 1 else []
     weakest = {"robustness.method": "none", **({"robustness.order": 1} if changes else {})}
-    tries = (_tried(spec, change) for change in (*changes, weakest))
+    tries = (_tried(spec, change, options) for change in (*changes, weakest))
     return next((one for one in tries if one and one.passes), None)
 
 
-def _tried(spec: Spec, values: Mapping[str, Any]) -> Suggestion | None:
+def _tried(spec: Spec, values: Mapping[str, Any], options: SuggestionOptions = USUAL) -> Suggestion | None:
     """Suggest values if they give a motion."""
     changed = spec.changed(values)
-    solution = tried(changed)
+    solution = tried(changed, options=options)
     draft = drafted(changed, solution)
     return suggested(values, draft) if choice.keeps_limits(solution) and _stands(draft) else None
 
 
-def _in_time(find: Callable[[], Found], fraction: float = FRACTION) -> Found | None:
+def _in_time(find: Callable[[], Found], fraction: float) -> Found | None:
     return afford(find, fraction * left())
 
 
