@@ -20,10 +20,11 @@ from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.planner.axis_wrapper import planner_wrappers
 from gen_profile_exporters.planner.c_source import c_files
 from gen_profile_exporters.planner.linux.host import linux_files
+from gen_profile_exporters.planner.openplc import OPENPLC, openplc_files
 from gen_profile_exporters.registry import container_of, containers, find_container, format_named
 
 PORTABLE = "plc"
-PROGRAMS = {"c": c_files, "linux": linux_files}
+PROGRAMS = {"c": c_files, "linux": linux_files, "openplc": openplc_files}
 _PLANNER, _WRAPPER = (
     re.compile(rf"^\s*FUNCTION_BLOCK\s+\w+_planner{end}\s*$", re.MULTILINE | re.IGNORECASE)
     for end in ("", "_(Axis|Velocity)")
@@ -45,7 +46,7 @@ def require_forms(formats: Iterable[str]) -> None:
 
 def is_program(filename: str) -> bool:
     """Whether a file of a block is a program, out of which its text cannot be read."""
-    return Path(filename).suffix in (".c", ".h", ".py")
+    return filename.endswith((".c", ".h", ".py", OPENPLC))
 
 
 def refuse_program(path: Path) -> None:
