@@ -14,7 +14,9 @@ import gen_profile
 
 NAVIGATION = {
     "Tutorials": "tutorial-crane tutorial-research tutorial-drive",
-    "How to": "standalone machines plc sweeps planner deploy can fmu studio report python troubleshooting",
+    "How to": (
+        "standalone machines plc sweeps planner soft-plc deploy can fmu studio report python troubleshooting"
+    ),
     "Examples": "/examples/README",
     "Reference": "command-line spec formats api glossary",
     "Explanation": "check certificate shapers solvers planner-algorithm paper architecture",

@@ -1,7 +1,6 @@
 """For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache; options."""
 
 import os
-import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -62,12 +61,3 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         environment.setenv("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))  # which takes HOME else
         environment.delenv("GEN_PROFILE_CC", raising=False)
         yield folder
-
-
-@pytest.fixture(scope="module")
-def quick_compiler(cache: Path) -> Iterator[None]:
-    """Compile planner blocks in a fifth of the time, where running ten times as slowly takes moments."""
-    with pytest.MonkeyPatch.context() as environment:
-        if shutil.which("gcc"):
-            environment.setenv("GEN_PROFILE_CC", "gcc -O0")
-        yield

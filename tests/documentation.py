@@ -67,6 +67,7 @@ def run(block: Block, scope: dict[str, Any]) -> None:
             # what is printed, drawn or for another system; `run_here` holds documents to their page
             assert block.language in {"text", "json", "mermaid", "powershell"} or block.title in {
                 "on several computers",
+                "on the controller",
                 "without Python",
             }
 

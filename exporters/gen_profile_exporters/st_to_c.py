@@ -42,6 +42,7 @@ FAULTS = (
     "takes the square root of a negative number",
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
+PART = 40  # lines beyond which a branch is a function: one of thousands compiles four times as slowly
 _NUMBERS = ("LREAL", "DINT")
 _PLAIN: dict[tuple[str, ...], str] = {  # C of an operator or a function, and the types that it takes
     **{(o, t, t): f"{{}} {o} {{}}" for o in ("+", "-", "*", "/", "<", "<=", ">", ">=") for t in _NUMBERS},
@@ -113,7 +114,7 @@ def translate(text: str) -> Translation:
     ExportError
         It is no function block of this subset of the language.
     """
-    name, variables, body = translate_statements(text, {}, checked=True)
+    name, variables, body, parts = translate_statements(text, {}, checked=True)
     inputs, outputs = (
         tuple(one for v in variables if v.section == section for one in elements(v))
         for section in ("VAR_INPUT", "VAR_OUTPUT")
@@ -124,19 +125,24 @@ def translate(text: str) -> Translation:
         "c/block.c",
         name=name,
         most_turns=MOST_TURNS,
-        constants="\n".join(c_constants(variables, body)),
+        constants="\n".join(c_constants(variables, sum(parts, body))),
         initials=indented(initials),
+        parts="\n".join(_function(f"{name}_part_{k}", name, part) for k, part in enumerate(parts)),
         body=indented(body),
     )
     return Translation(name, inputs, outputs, filled("c/block.h", name=name, members=members), source)
 
 
 class Statements(NamedTuple):
-    """A function block's name, its declarations, and its statements as lines of C."""
+    """A function block's name, its declarations, and its statements as lines of C.
+
+    Parts are what the lines call by ``PART(NAME_part_0)`` and so on, a part those before it.
+    """
 
     name: str
     variables: list[StVariable]
     body: list[str]
+    parts: list[list[str]]
 
 
 def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool = False) -> Statements:
@@ -148,7 +154,7 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     owners : mapping of str to str
         What stands before the names of a section's variables, such as ``in->``; ``fb->`` if not given.
     checked : bool
-        Whether the lines use the macros by which an altered text is ended.
+        Whether the lines use the macros by which an altered text is ended, and are divided into parts.
 
     Raises
     ------
@@ -159,7 +165,8 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
         tree = _parser().parse(text)
         variables = declared(tree)
         _require_writable(tree, variables)
-        translated: Any = _Translator(variables, owners, checked).transform(tree)
+        translator = _Translator(str(tree.children[0]), variables, owners, checked)
+        translated: Any = translator.transform(tree)
     except UnexpectedInput as error:
         place = f"line {error.line}, column {error.column}"
         raise ExportError(f"{NO_BLOCK}: {place} is not understood.") from error
@@ -168,7 +175,7 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     except RecursionError as error:
         raise ExportError("The text is nested too deeply to be executed here.") from error
     name, *_, body = translated.children
-    return Statements(str(name), list(variables.values()), body)
+    return Statements(str(name), list(variables.values()), body, translator.parts)
 
 
 @cache
@@ -199,11 +206,14 @@ def _written(tree: Any) -> Iterator[Token]:
 class _Translator(Transformer[Token, object]):
     """Expressions become `_Code`, statements lines of C."""
 
-    def __init__(self, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool) -> None:
+    def __init__(
+        self, name: str, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool
+    ) -> None:
         super().__init__()
-        self._variables, self._checked = variables, checked
+        self._name, self._variables, self._checked = name, variables, checked
         self._owners = {"VAR CONSTANT": "", **owners}
         self._templates = _PLAIN | _CHECKED if checked else _PLAIN
+        self.parts: list[list[str]] = []
 
     def real(self, parts):  # type: ignore[no-untyped-def]
         return _Code(c_literal(parts[0]), "LREAL", parts[0].line)
@@ -289,9 +299,9 @@ class _Translator(Transformer[Token, object]):
         word = "if"
         for condition, body in branches:
             self._require(condition, "BOOL", "a condition")
-            lines += [f"{word} ({condition.text}) {{", *_indented(body)]
+            lines += [f"{word} ({condition.text}) {{", *self._within(body)]
             word = "} else if"
-        return [*lines, *(["} else {", *_indented(otherwise)] if otherwise else []), "}"]
+        return [*lines, *(["} else {", *self._within(otherwise)] if otherwise else []), "}"]
 
     def switch(self, parts):  # type: ignore[no-untyped-def]
         selector, *labels, otherwise = parts
@@ -303,8 +313,8 @@ class _Translator(Transformer[Token, object]):
                     raise refused(number, f"CASE has {case} twice")
                 known.add(case)
                 lines.append(f"case {case}:")
-            lines += _indented([*body, "break;"])
-        return [*lines, "default:", *_indented([*(otherwise or []), "break;"]), "}"]
+            lines += [*self._within(body), "    break;"]
+        return [*lines, "default:", *self._within(otherwise or []), "    break;", "}"]
 
     def count(self, parts):  # type: ignore[no-untyped-def]
         name, first, last, body = parts
@@ -319,7 +329,7 @@ class _Translator(Transformer[Token, object]):
             "{",
             f"    const int32_t {end} = {last.text};",
             *_indented(
-                [f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *_indented(body), "}"]
+                [f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *self._within(body), "}"]
             ),
             "}",
         ]
@@ -329,7 +339,14 @@ class _Translator(Transformer[Token, object]):
         self._require(condition, "BOOL", "a condition")
         counted = f"OPERATIONS({condition.work}), " if condition.work and self._checked else ""
         test = f"({counted}{condition.text}){self._turn}" if self._checked else condition.text
-        return [f"while ({test}) {{", *_indented(body), "}"]
+        return [f"while ({test}) {{", *self._within(body), "}"]
+
+    def _within(self, body: list[str]) -> list[str]:
+        """Indent a branch or a loop's body, or call it as a part."""
+        if self._checked and len(body) > PART:
+            self.parts.append(body)
+            body = [f"PART({self._name}_part_{len(self.parts) - 1});"]
+        return _indented(body)
 
     @property
     def _turn(self) -> str:
@@ -338,3 +355,7 @@ class _Translator(Transformer[Token, object]):
 
 def _indented(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
+
+
+def _function(name: str, block: str, body: list[str]) -> str:
+    return f"static APART void {name}({block} *fb) {{\n    BEGIN();\n{indented(body)}\n    END();\n}}\n"

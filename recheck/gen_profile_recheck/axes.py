@@ -7,79 +7,53 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import reduce
 from itertools import pairwise
 
 from flint import arb, arb_poly
 
-FINER = 4  # parts of a cycle, between whose ends bounds are by the greatest acceleration
+X = arb_poly([0, 1])
+Run = tuple[arb, arb_poly]  # a part of a piece: its share of it, and a polynomial on −1 … 1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
+class Size:
+    """Bounds of a function on a piece of time: of its absolute value, and of its root mean square."""
+
+    most: arb
+    mean: arb
+
+
+@dataclass(frozen=True)
 class AxisPiece:
-    """One axis on a piece of time: its smooth position as a polynomial on −1 … 1, and bounds of the rest.
+    """One axis on a piece: its smooth position as a polynomial on −1 … 1, and the sizes of ε, ε' and ψ.
 
-    `gap` bounds |ε| in m (or rad), `rate` its rate, `mean` |ε̄|, `swing` |ψ|, and `first` |ε| at first;
-    `mean_gap` and `mean_swing` the means of |ε| and |ψ| over the piece. Its parts take these `shares` of
-    its time; on them `gaps` and `rates` bound |ε| and its rate.
+    `average` bounds ε̄, and `first` ε where the piece begins, in m (or rad).
     """
 
     smooth: arb_poly
-    gap: arb
-    rate: arb
-    mean: arb
-    swing: arb
+    gap: Size
+    rate: Size
+    swing: Size
+    average: arb
     first: arb
-    mean_gap: arb
-    mean_swing: arb
-    shares: Sequence[arb]
-    gaps: Sequence[arb]
-    rates: Sequence[arb]
-
-
-@cache
-def mean_products(pieces: tuple[AxisPiece, ...]) -> list[list[arb]]:
-    """Bound the means over a piece of all products of two of every axis' |ε|, and their rates after them."""
-    sizes = [*(one.gaps for one in pieces), *(one.rates for one in pieces)]
-    return [[_mean(pieces[0].shares, one, two) for two in sizes] for one in sizes]
-
-
-def _mean(*factors: Sequence[arb]) -> arb:
-    total = arb(0)
-    for share, one, two in zip(*factors, strict=True):
-        total += share * one * two
-    return total.abs_upper()
-
-
-def magnitude(values: Sequence[arb]) -> arb:
-    """Bound the absolute values of all."""
-    largest = arb(0)
-    for one in values:
-        largest = largest.max(one.abs_upper())
-    return largest
 
 
 def quintic(
-    half: arb, positions: Sequence[float], speeds: Sequence[float], accelerations: Sequence[float]
+    half: arb, positions: Sequence[float], speeds: Sequence[float], bends: Sequence[float]
 ) -> arb_poly:
     """Give the polynomial on −1 … 1 with position, velocity and acceleration at both ends."""
+
+    def at_end(x: arb_poly, value: arb, slope: arb, bend: arb) -> arb_poly:
+        """Have these where x is 1, and three times 0 where it is −1."""
+        near, second = 1 - x, value * 3 / 2 - slope
+        third = bend / 2 + second * 3 / 2 - value * 3 / 4
+        return (1 - arb(0.5) * near) ** 3 * (value + second * near + third * near * near)
+
     (p, q), (u, v), (b, c) = (
-        positions,
-        [half * one for one in speeds],
-        [half * half * one for one in accelerations],
+        [half**n * one for one in pair] for n, pair in enumerate([positions, speeds, bends])
     )
-    x, even, odd = (
-        arb_poly([0, 1]),
-        (arb(p) + q) / 2,
-        (arb(q) - p) / 2,
-    )  # of value, then slope and bend, that are odd where it is even
-    slope, other = (v - u) / 2, (v + u) / 2
-    bend, twist = (b + c) / 2, (c - b) / 2
-    square = x * x - 1
-    lead = (other - odd) / 2  # of x (x² − 1), whose slope at 1 is 2 and bend 6
-    fifth = (twist - 6 * lead) / 8  # of x (x² − 1)², whose bend at 1 is 8
-    fourth = (bend - slope) / 8  # of (x² − 1)², whose bend at 1 is 8, beside slope/2 (x² − 1)
-    return even + odd * x + slope / 2 * square + lead * x * square + (fourth + fifth * x) * square * square
+    return at_end(X, q, v, c) + at_end(-X, p, -u, b)
 
 
 def axis_pieces(
@@ -98,49 +72,37 @@ def axis_pieces(
         else:
             since = [arb(time) - times[-1] for time in (begin, end)]
             corners = [(one + times[-1], positions[-1] + one * velocity) for one in since]
-        yield _piece(polynomial, list(_finer(corners)))
+        yield _piece(polynomial, corners)
 
 
-def _finer(corners: Sequence[tuple[arb, arb]]) -> Iterator[tuple[arb, arb]]:
+def _piece(smooth: arb_poly, corners: Sequence[tuple[arb, arb]]) -> AxisPiece:
+    (begin, first), (end, _) = corners[0], corners[-1]
+    half, gaps, swings = (end - begin) / 2, list[Run](), list[Run]()
     for (time, position), (later, farther) in pairwise(corners):
-        for part in range(FINER):
-            yield time + (later - time) * part / FINER, position + (farther - position) * part / FINER
-    yield corners[-1]
+        share = (later - time) / (end - begin)
+        line = (position + farther) / 2 + (farther - position) / 2 * X
+        gaps.append((share, line - smooth((time - begin) / half - 1 + share * (1 + X))))
+    average, swing = sum((share * _mean(gap) for share, gap in gaps), start=arb(0)), arb(0)
+    for share, gap in gaps:
+        primitive = (gap - average).integral() * share * half
+        swings.append((share, primitive + (swing - primitive(arb(-1)))))
+        swing = swings[-1][1](arb(1))
+    rates = [(share, gap.derivative() * (1 / (share * half))) for share, gap in gaps]
+    off = abs(first - smooth(arb(-1)))
+    return AxisPiece(smooth, _size(gaps), _size(rates), _size(swings), abs(average), off)
 
 
-def _piece(smooth: arb_poly, points: Sequence[tuple[arb, arb]]) -> AxisPiece:
-    begin, end = points[0][0], points[-1][0]
-    half, primitive, slope = (end - begin) / 2, smooth.integral(), smooth.derivative()
-    bend = sum((abs(one) for one in slope.derivative().coeffs()), start=arb(0)) / half**2
-    local = [(time - begin) / half - 1 for time, _ in points]
-    off = [position - smooth(x) for (_, position), x in zip(points, local, strict=True)]
-    rates, area, areas, longest, steps = [], arb(0), [arb(0)], arb(0), []
-    for ((time, position), (later, farther)), (x, y) in zip(pairwise(points), pairwise(local), strict=True):
-        step = later - time
-        rates.append((farther - position) / step - slope((x + y) / 2) / half)
-        area += step * (position + farther) / 2 - half * (primitive(y) - primitive(x))
-        areas.append(area)
-        longest = longest.max(step.abs_upper())
-        steps.append(step)
-    mean = area / (end - begin)
-    swings = [abs(one - mean * (time - begin)) for one, (time, _) in zip(areas, points, strict=True)]
-    rates = [abs(one) + bend * longest / 2 for one in rates]
-    gaps = [magnitude(pair) + bend * longest**2 / 8 for pair in pairwise(off)]
-    swung = [
-        magnitude(pair) + rate * longest**2 / 8 for pair, rate in zip(pairwise(swings), rates, strict=True)
-    ]
-    shares = [step / (end - begin) for step in steps]
-    whole = [arb(1)] * len(shares)
-    return AxisPiece(
-        smooth=smooth,
-        gap=magnitude(gaps),
-        rate=magnitude(rates),
-        mean=magnitude([mean]),
-        swing=magnitude(swung),
-        first=magnitude(off[:1]),
-        mean_gap=_mean(shares, gaps, whole),
-        mean_swing=_mean(shares, swung, whole),
-        shares=shares,
-        gaps=gaps,
-        rates=rates,
-    )
+def _mean(polynomial: arb_poly) -> arb:
+    return sum((one / (n + 1) for n, one in enumerate(polynomial.coeffs()) if n % 2 == 0), start=arb(0))
+
+
+def _size(runs: Sequence[Run]) -> Size:
+    square = sum((share * _mean(one * one) for share, one in runs), start=arb(0))
+    return Size(reduce(arb.max, (_most(one) for _, one in runs)).abs_upper(), square.abs_upper().sqrt())
+
+
+def _most(polynomial: arb_poly) -> arb:
+    """Bound a polynomial on −1 … 1, taking x² as (1 + T₂)/2."""
+    half = polynomial[2] / 2
+    rest = [polynomial[1], *polynomial.coeffs()[3:]]
+    return sum(map(abs, rest), start=abs(polynomial[0] + half) + abs(half)).abs_upper()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import signal
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import zlib
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from itertools import combinations, pairwise, product
-from math import prod
+from math import pi, prod
 from multiprocessing import get_all_start_methods, get_context
 from typing import Any
 
@@ -16,14 +16,13 @@ from flint import acb_mat, arb, ctx
 
 from gen_profile_recheck.axes import axis_pieces, quintic
 from gen_profile_recheck.boxes import MachineBox, MotionPiece
-from gen_profile_recheck.enclosure import MANY_MORE, BoxProof, NotProvedError, SwayClaim
-from gen_profile_recheck.jets import along, moved
-from gen_profile_recheck.machines import MACHINES, Machine
+from gen_profile_recheck.enclosure import NotProvedError, SwayClaim, require
+from gen_profile_recheck.jets import derivatives
+from gen_profile_recheck.machines import MACHINES
 from gen_profile_recheck.reading import (
     FORMAT,
     KEYS,
     ProofMaterial,
-    TimedSetpoints,
     ranges_of,
     read_json,
     read_setpoints,
@@ -37,6 +36,7 @@ KINDS = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}
 ALLOWED = 1.01  # of limits.sway
 SHORTEST_WATCH = 4.0  # s; or two of the slowest periods
 
+DAMAGED = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, zlib.error)
 Progress = Callable[[int, int], None]  # gets how many boxes are done, of how many
 
 TRUST = """Trusted: that python-flint (Arb) encloses what it computes, Python runs this program as it is
@@ -44,22 +44,6 @@ written, and SHA-256 has no collisions; that the controller issues the artefact'
 times (a function block those of its table: its statements are not looked at), and the drives join them
 by straight lines; and that the machine has the equations in machines.py, with constant parameters.
 Nothing of the program that made the artefact is used."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """What a certificate is about, and the certificate's document."""
-
-    machine: Machine
-    spec: Mapping[str, Any]
-    setpoints: TimedSetpoints
-    ranges: Mapping[str, tuple[float, float]]
-    document: Mapping[str, Any]
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Nominal values of the machine's parameters."""
-        return {name: value for name, value in self.spec["plant"].items() if isinstance(value, (int, float))}
 
 
 def check(
@@ -87,216 +71,185 @@ def check(
     if hashlib.sha256(artefact).hexdigest() != document["artefact_sha256"]:
         raise NotProvedError("the certificate is about another artefact")
     try:
-        case = _case(artefact, spec_of(read_json(spec), document["spec_sha256"]), document)
-        _require_setpoints(case)
-        _require_times(case)
-        _prove(case, progress, processes)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        raise NotProvedError(
-            f"a file is damaged, or not covered ({type(error).__name__}: {error})"
-        ) from error
-    return _words(case)
+        case = Case(artefact, spec_of(read_json(spec), document["spec_sha256"]), document)
+        case.require_setpoints()
+        case.require_times()
+        case.require_cover()
+        case.prove(progress, processes)
+        return case.words()
+    except DAMAGED as error:
+        name = type(error).__name__
+        raise NotProvedError(f"a file is damaged, or not covered ({name}: {error})") from error
 
 
-def _case(artefact: bytes, spec: Mapping[str, Any], document: Mapping[str, Any]) -> Case:
-    machine = MACHINES.get(spec["plant"].get("type"))
-    if machine is None:
-        raise NotProvedError("not covered: machines other than those in machines.py")
-    if spec["actuator"]["type"] != "ideal":
-        raise NotProvedError("not covered: drives that lag behind their setpoints")
-    if "foreign" in spec["check"] or "fmu" in spec["check"]:
-        raise NotProvedError("not covered: a foreign model of the machine (check.fmu)")
-    ranges = ranges_of(spec)
-    if {name: tuple(ends) for name, ends in document["ranges"].items()} != ranges:
-        raise NotProvedError("the certificate is about other ranges")
-    return Case(
-        machine=machine,
-        spec=spec,
-        setpoints=read_setpoints(artefact, spec, machine.axes),
-        ranges={name: ranges[name] for name in document["ranges"]},
-        document=document,
-    )
+class Case:
+    """A certificate's document and what it is about.
+
+    Raises
+    ------
+    NotProvedError, or DAMAGED
+        By all methods.
+    """
+
+    def __init__(self, artefact: bytes, spec: Mapping[str, Any], document: Mapping[str, Any]) -> None:
+        machine = MACHINES.get(spec["plant"].get("type"))
+        if machine is None:
+            raise NotProvedError("not covered: machines other than those in machines.py")
+        if spec["actuator"]["type"] != "ideal":
+            raise NotProvedError("not covered: drives that lag behind their setpoints")
+        if "foreign" in spec["check"] or "fmu" in spec["check"]:
+            raise NotProvedError("not covered: a foreign model of the machine (check.fmu)")
+        self.machine, self.spec, self.document, ranges = machine, spec, document, ranges_of(spec)
+        if {name: tuple(ends) for name, ends in document["ranges"].items()} != ranges:
+            raise NotProvedError("the certificate is about other ranges")
+        self.ranges = {name: ranges[name] for name in document["ranges"]}
+        self.parameters = {name: one for name, one in spec["plant"].items() if isinstance(one, (int, float))}
+        self.setpoints = read_setpoints(artefact, spec, machine.axes)
+        self.proof = ProofMaterial(document, 2 * len(machine.coordinates), len(machine.axes))
+
+    def words(self) -> str:
+        """Say what is proved."""
+        document, way = self.document, self.document["on_the_way"]
+        named = ", ".join(f"{name} from {low:.6g} to {high:.6g}" for name, (low, high) in self.ranges.items())
+        bounds = ", ".join(f"{load} {1e3 * bound:.6g} mm" for load, bound in document["bounds_m"].items())
+        times = f"from {document['from_s']:.6g} s to {document['until_s']:.6g} s"
+        on_the_way = "" if way is None else f"; at any time {way['load']} {1e3 * way['bound_m']:.6g} mm"
+        machines = f"Proved of all machines with {named or 'nominal parameters'}"
+        return f"{machines}: {times} at most {bounds}{on_the_way}."
+
+    def require_setpoints(self) -> None:
+        """Require what is said of velocity, acceleration and jerk, where the spec limits them only."""
+        limits, said = self.spec["limits"], self.document["setpoints"]
+        asked: dict[str, dict[str, Any]] = {}
+        for number, name in enumerate(self.machine.axes):
+            own = {**limits, **limits.get("axis", {}).get(name, {})}
+            for order, (kind, unit) in enumerate(KINDS.items(), start=1):
+                if (limit := own.get(kind)) is None:
+                    continue
+                rounding = 2 ** (order - 1) * self.setpoints.resolution[number] / self.setpoints.cycle**order
+                claim, length = said[name][kind], "rad" if name in ("slew", "hub") else "m"
+                asked.setdefault(name, {})[kind] = {
+                    "bound": claim["bound"],
+                    "limit": limit,
+                    "rounding": claim["rounding"],
+                    "unit": f"{length}/{unit}",
+                }
+                if not self._difference(number, order) <= claim["bound"] * (1 + SAME):
+                    raise NotProvedError(f"the setpoints ask {name} for more {kind} than is said")
+                if kind in OVERSHOOT and claim["bound"] > (1 + OVERSHOOT[kind]) * limit + rounding:
+                    raise NotProvedError(f"the setpoints break the limit of {kind} of {name}")
+                if abs(claim["rounding"] - rounding) > SAME * rounding:
+                    raise NotProvedError(f"the rounding of {kind} of {name} is another")
+        if said != asked:
+            raise NotProvedError("something else is said of setpoints than the spec limits")
+
+    def _difference(self, axis: int, order: int) -> float:
+        """Bound an axis' difference quotients, with those before the first and after the last setpoint."""
+        cycle, velocity = self.setpoints.cycle, arb(self.spec["move"]["final_velocity"][axis])
+        quotients = [arb(one) for one in self.setpoints.positions[axis]]
+        after = [quotients[-1] + n * cycle * velocity for n in range(1, order)]
+        quotients = quotients[:1] * (order - 1) + quotients + after
+        for _ in range(order):
+            quotients = [(after - before) / cycle for before, after in pairwise(quotients)]
+        return max(float(abs(one).upper()) for one in quotients)
+
+    def require_times(self) -> None:
+        """Require that sways are bounded for as long as the check watches them."""
+        begin, until, knots = self.document["from_s"], self.document["until_s"], self.proof.knots
+        times = self.setpoints.times
+        moving = {knot for knot in knots if knot <= times[-1]}
+        if begin != times[-1] or knots[0] != times[0] or times[-1] not in moving or not moving <= set(times):
+            raise NotProvedError("the certificate's motion of the axes does not belong to the setpoints")
+        corners = [dict(zip(self.ranges, ends, strict=True)) for ends in product(*self.ranges.values())]
+        corners = corners if len(self.ranges) <= 3 else [corners[0], corners[-1]]
+        changes = [{}, *corners, *({name: end} for name, ends in self.ranges.items() for end in ends)]
+        slowest = min(self._frequency(self.parameters | change) for change in changes)
+        watched = max(SHORTEST_WATCH, 4 * pi / slowest)
+        if not (watched * (1 - SAME) <= until - begin and until <= knots[-1]):
+            raise NotProvedError("the sway is not bounded for as long as the check watches it")
+
+    def _frequency(self, parameters: Mapping[str, float]) -> float:
+        """Find the slowest frequency at the target in rad/s, which bounds nothing but how long to watch."""
+        still, axes = (
+            [arb(0)] * len(self.machine.coordinates),
+            [arb(one) for one in self.spec["move"]["target"]],
+        )
+        k, rest = (
+            self.machine.constants({name: arb(value) for name, value in parameters.items()}),
+            [arb(0)] * len(axes),
+        )
+        pulls = derivatives(lambda q: self.machine.drift(q, still, axes, rest, k), still)
+        values = acb_mat([[-arb(one) for one in row] for row in pulls]).eig(algorithm="approx")
+        return float(min(float(one.real.mid()) for one in values) ** 0.5)
+
+    def require_cover(self) -> None:
+        """Require that boxes are disjoint, and together everything."""
+        parts, count = self.proof.parts, len(self.ranges)
+        inside = len(self.proof.terms) == count and all(
+            len(box) == count and all(0 <= index < 2**level for level, index in box) for box in parts
+        )
+        volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in parts), Fraction(0))
+        apart = (not all(map(_meet, *pair)) for pair in combinations(parts, 2))
+        if not (inside and volume == 1 and all(apart)):
+            raise NotProvedError("the boxes are not all machines of the ranges, each of them once")
+
+    def claims(self) -> list[SwayClaim]:
+        """List the bounds that are claimed, which must be all that the spec asks, and keep its limits."""
+        limits, bounds, way = (self.document[name] for name in ("limits_m", "bounds_m", "on_the_way"))
+        loads, sway = self.machine.loads, self.spec["limits"].get("sway")
+        if limits != self.spec["check"]["residual_sway"] or not set(loads) == limits.keys() == bounds.keys():
+            raise NotProvedError("the certificate is about other limits than the spec's, or other loads")
+        arrived = self.proof.knots.index(self.setpoints.times[-1])
+        claims = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
+        kept = [bounds[load] <= limits[load] for load in loads]
+        name, both = self.machine.end_load
+        if way != (
+            None if sway is None else {"load": name, "bound_m": way["bound_m"], "limit_m": ALLOWED * sway}
+        ):
+            raise NotProvedError("the certificate says something else of the sway on the way than the spec")
+        if way is not None:
+            kept.append(way["bound_m"] <= way["limit_m"])
+            claims.append(SwayClaim(both, 0, way["bound_m"]))
+        if not all(kept):
+            raise NotProvedError("a bound is above its limit")
+        return claims
+
+    def prove(self, progress: Progress, processes: int) -> None:
+        """Prove all boxes, each of which needs nothing of the others."""
+        proof, setpoints, pieces = self.proof, self.setpoints, list(pairwise(self.proof.knots))
+        halves, axes = [(arb(end) - begin) / 2 for begin, end in pieces], []
+        for positions, ends, velocity in zip(
+            setpoints.positions, proof.ends, self.spec["move"]["final_velocity"], strict=True
+        ):
+            smooth = [quintic(half, *one) for half, one in zip(halves, ends, strict=True)]
+            axes.append(list(axis_pieces(proof.knots, smooth, setpoints.times, positions, velocity)))
+        names = [name + of for of in ("", ".rate") for name in self.machine.coordinates]
+        start = [self.spec["move"].get("initial", {}).get(name, 0.0) for name in names]
+        claims, numbers = self.claims(), range(len(proof.parts))
+
+        def prove_box(number: int) -> None:
+            box = MachineBox(self.machine, self.parameters, self.ranges, proof.parts[number], proof.terms)
+            motion = zip(halves, zip(*axes, strict=True), proof.motion(number), strict=True)
+            require([MotionPiece(box, *one) for one in motion], list(proof.scales(number)), start, claims)
+
+        if processes == 1 or len(numbers) == 1 or "fork" not in get_all_start_methods():
+            for done, _ in enumerate(map(prove_box, numbers), start=1):
+                progress(done, len(numbers))
+            return
+        _shared[:] = [prove_box]
+        ignoring = signal.signal, (signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
+        with get_context("fork").Pool(min(processes, len(numbers)), *ignoring) as pool:
+            for done, _ in enumerate(pool.imap_unordered(_prove_shared, numbers), start=1):
+                progress(done, len(numbers))
 
 
-def _words(case: Case) -> str:
-    document, way = case.document, case.document["on_the_way"]
-    bounds = ", ".join(f"{load} {1e3 * bound:.6g} mm" for load, bound in document["bounds_m"].items())
-    on_the_way = "" if way is None else f"; at any time {way['load']} {1e3 * way['bound_m']:.6g} mm"
-    named = ", ".join(f"{name} from {low:.6g} to {high:.6g}" for name, (low, high) in case.ranges.items())
-    times = f"from {document['from_s']:.6g} s to {document['until_s']:.6g} s"
-    return (
-        f"Proved of all machines with {named or 'nominal parameters'}: {times} at most {bounds}{on_the_way}."
-    )
+_shared: list[Callable[[int], None]] = []  # what forked processes find here
 
 
-def _require_setpoints(case: Case) -> None:
-    """Require what is said of velocity, acceleration and jerk, where the spec limits them only."""
-    limits, said, cycle = case.spec["limits"], case.document["setpoints"], case.setpoints.cycle
-    asked = {}
-    for number, name in enumerate(case.machine.axes):
-        own = {**limits, **limits.get("axis", {}).get(name, {})}
-        orders = [(n, kind) for n, kind in enumerate(KINDS, start=1) if own.get(kind) is not None]
-        for order, kind in orders:
-            rounding = 2 ** (order - 1) * case.setpoints.resolution[number] / cycle**order
-            largest, claim = _difference(case, number, order), said[name][kind]
-            if not largest <= claim["bound"] * (1 + SAME):
-                raise NotProvedError(f"the setpoints ask {name} for more {kind} than is said")
-            if kind in OVERSHOOT and claim["bound"] > (1 + OVERSHOOT[kind]) * own[kind] + rounding:
-                raise NotProvedError(f"the setpoints break the limit of {kind} of {name}")
-            if claim["limit"] != own[kind] or abs(claim["rounding"] - rounding) > SAME * rounding:
-                raise NotProvedError(f"limit or rounding of {kind} of {name} are others")
-            unit = f"{'rad' if name in ('slew', 'hub') else 'm'}/{KINDS[kind]}"
-            if claim.keys() != {"bound", "limit", "rounding", "unit"} or claim["unit"] != unit:
-                raise NotProvedError(f"something else is said of {kind} of {name}")
-        if orders:
-            asked[name] = {kind for _, kind in orders}
-    if {name: set(kinds) for name, kinds in said.items()} != asked:
-        raise NotProvedError("something is said of setpoints that the spec does not limit")
-
-
-def _difference(case: Case, axis: int, order: int) -> float:
-    """Bound an axis' difference quotients, with those before the first and after the last setpoint."""
-    cycle, velocity = case.setpoints.cycle, arb(case.spec["move"]["final_velocity"][axis])
-    quotients = [arb(one) for one in case.setpoints.positions[axis]]
-    after = [quotients[-1] + n * cycle * velocity for n in range(1, order)]
-    quotients = quotients[:1] * (order - 1) + quotients + after
-    for _ in range(order):
-        quotients = [(after - before) / cycle for before, after in pairwise(quotients)]
-    return max(float(abs(one).upper()) for one in quotients)
-
-
-def _require_times(case: Case) -> None:
-    begin, until, last = case.document["from_s"], case.document["until_s"], case.document["axes"]["knots"][-1]
-    if begin != case.setpoints.times[-1]:
-        raise NotProvedError("the sway is not bounded from the last setpoint on")
-    corners = [dict(zip(case.ranges, ends, strict=True)) for ends in product(*case.ranges.values())]
-    corners = corners if len(case.ranges) <= 3 else [corners[0], corners[-1]]
-    changes = [{}, *corners, *({name: end} for name, ends in case.ranges.items() for end in ends)]
-    slowest = min(_frequency(case, case.parameters | change) for change in changes)
-    watched = max(SHORTEST_WATCH, 4 * float(arb.pi()) / slowest)
-    if not (watched * (1 - SAME) <= until - begin and until <= last):
-        raise NotProvedError("the sway is not bounded for as long as the check watches it")
-
-
-def _frequency(case: Case, parameters: Mapping[str, float]) -> float:
-    """Find the slowest frequency at the target in rad/s; it tells how long to watch, and bounds nothing."""
-    machine, n = case.machine, len(case.machine.coordinates)
-    k = machine.constants({name: arb(value) for name, value in parameters.items()})
-    still, axes = [arb(0)] * n, [arb(one) for one in case.spec["move"]["target"]]
-    columns = []
-    for chosen in range(n):
-        unit = [1 if row == chosen else 0 for row in range(n)]
-        bent = machine.drift(moved(still, unit, 1), still, axes, [arb(0)] * len(axes), k)
-        columns.append([-arb(along(one, 1)) for one in bent])
-    values = acb_mat([list(row) for row in zip(*columns, strict=True)]).eig(algorithm="approx")
-    return float(min(float(one.real.mid()) for one in values) ** 0.5)
-
-
-def _require_cover(proof: ProofMaterial, ranges: int) -> None:
-    """Require that boxes are disjoint, and together everything."""
-    if any(len(box) != ranges for box in proof.parts) or len(proof.terms) != ranges:
-        raise NotProvedError("boxes of other parameters than the ranges'")
-    inside = all(0 <= index < 2**level for box in proof.parts for level, index in box)
-    volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in proof.parts), Fraction(0))
-    overlap = any(
-        all(_meet(*pair) for pair in zip(one, other, strict=True))
-        for one, other in combinations(proof.parts, 2)
-    )
-    if not inside or volume != 1 or overlap:
-        raise NotProvedError("the boxes are not all machines of the ranges, each of them once")
+def _prove_shared(number: int) -> None:
+    _shared[0](number)
 
 
 def _meet(one: tuple[int, int], other: tuple[int, int]) -> bool:
     (level, index), (deeper, inside) = sorted((one, other))
     return inside >> (deeper - level) == index
-
-
-def _watches(case: Case, knots: Sequence[float]) -> list[SwayClaim]:
-    """List the bounds that are claimed, which must be all that the spec asks, and keep its limits."""
-    limits, bounds, way = (case.document[name] for name in ("limits_m", "bounds_m", "on_the_way"))
-    loads, sway = case.machine.loads, case.spec["limits"].get("sway")
-    if limits != case.spec["check"]["residual_sway"] or not set(loads) == limits.keys() == bounds.keys():
-        raise NotProvedError("the certificate is about other limits than the spec's, or other loads")
-    arrived = max(n for n, knot in enumerate(knots) if knot <= case.setpoints.times[-1])
-    claims = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
-    kept = [bounds[load] <= limits[load] for load in loads]
-    if (sway is None) != (way is None):
-        raise NotProvedError("the certificate is silent of the sway on the way, or the spec is")
-    if way is not None:
-        name, both = case.machine.end_load
-        if (
-            way.keys() != {"load", "bound_m", "limit_m"}
-            or way["load"] != name
-            or way["limit_m"] != ALLOWED * sway
-        ):
-            raise NotProvedError("the certificate is about another limit on the way")
-        kept.append(way["bound_m"] <= way["limit_m"])
-        claims.append(SwayClaim(both, 0, way["bound_m"]))
-    if not all(kept):
-        raise NotProvedError("a bound is above its limit")
-    return claims
-
-
-def _prove(case: Case, progress: Progress, processes: int) -> None:
-    proof = ProofMaterial(case.document, 2 * len(case.machine.coordinates), len(case.machine.axes))
-    _require_cover(proof, len(case.ranges))
-    knots, times, boxes = proof.knots, case.setpoints.times, len(proof.parts)
-    moving = {knot for knot in knots if knot <= times[-1]}
-    if knots[0] != times[0] or times[-1] not in moving or not moving <= set(times):
-        raise NotProvedError("the certificate's motion of the axes does not belong to the setpoints")
-    work = BoxByBox(case, proof)
-    if processes == 1 or boxes == 1 or "fork" not in get_all_start_methods():
-        for number in range(boxes):
-            work.prove(number)
-            progress(number + 1, boxes)
-        return
-    with get_context("fork").Pool(min(processes, boxes), _begin, (work,)) as pool:
-        for done, _ in enumerate(pool.imap_unordered(_prove_box, range(boxes)), start=1):
-            progress(done, boxes)
-
-
-class BoxByBox:
-    """The proof of every box, which needs nothing of the others."""
-
-    def __init__(self, case: Case, proof: ProofMaterial) -> None:
-        setpoints, knots = case.setpoints, proof.knots
-        self.case, self.proof, self.watches = case, proof, _watches(case, knots)
-        self.halves = [(arb(end) - begin) / 2 for begin, end in pairwise(knots)]
-        axes = []
-        for axis, positions in enumerate(setpoints.positions):
-            smooth = [quintic(half, *ends) for half, ends in zip(self.halves, proof.ends[axis], strict=True)]
-            velocity = case.spec["move"]["final_velocity"][axis]
-            axes.append(list(axis_pieces(knots, smooth, setpoints.times, positions, velocity)))
-        self.axes = list(zip(*axes, strict=True))
-        initial, coordinates = case.spec["move"].get("initial", {}), case.machine.coordinates
-        names = (*coordinates, *(f"{name}.rate" for name in coordinates))
-        self.start = [initial.get(name, 0.0) for name in names]
-
-    def prove(self, number: int) -> None:
-        """Prove a box.
-
-        Raises
-        ------
-        NotProvedError
-        """
-        case, proof = self.case, self.proof
-        box = MachineBox(case.machine, case.parameters, case.ranges, proof.parts[number], proof.terms)
-        motion = zip(self.halves, self.axes, proof.motion(number), strict=True)
-        pieces = [MotionPiece(box, half, along_axes, series) for half, along_axes, series in motion]
-        material = box, pieces, proof.scales(number), self.start
-        try:
-            BoxProof(*material).require(self.watches)
-        except NotProvedError:
-            BoxProof(*material, beyond=MANY_MORE).require(self.watches)
-
-
-_own: list[BoxByBox] = []  # of this process, one of several that share the work
-
-
-def _begin(work: BoxByBox) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
-    _own.append(work)
-
-
-def _prove_box(number: int) -> None:
-    _own[-1].prove(number)

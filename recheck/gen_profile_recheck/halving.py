@@ -6,7 +6,7 @@ from itertools import product
 
 from flint import arb, arb_mat, arb_poly
 
-from gen_profile_recheck.boxes import Expansion, _t, powers
+from gen_profile_recheck.boxes import Expansion, chebyshev_value, from_powers, kronecker
 
 MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
 
@@ -39,22 +39,16 @@ def _steepest(one: Expansion) -> int:
 def _half(one: Expansion, axis: int, side: int) -> Expansion:
     if axis == 0:
         return Expansion(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
-    matrix = arb_mat(1, 1, [1])
-    for number, count in enumerate(one.counts[1:], start=1):
-        unit = arb_mat(count, count, [int(i == j) for i in range(count) for j in range(count)])
-        matrix = _kronecker(matrix, _halving(count, side) if number == axis else unit)
+    matrix = kronecker(
+        _halving(count, side if number == axis else 0) for number, count in enumerate(one.counts[1:], start=1)
+    )
     return Expansion(one.coefficients * matrix.transpose(), one.counts, one.rest)
 
 
-def _kronecker(a: arb_mat, b: arb_mat) -> arb_mat:
-    first, second = a.tolist(), b.tolist()
-    return arb_mat([[x * y for x in row for y in other] for row in first for other in second])
-
-
 def _halving(count: int, side: int) -> arb_mat:
-    """Matrix from Chebyshev coefficients on −1 … 1 to those on a half of it."""
-    inner, columns = arb_poly([arb(side) / 2, arb(1) / 2]), []
+    """Matrix from Chebyshev coefficients on −1 … 1 to those on a half of it, or with 0 on all of it."""
+    inner, columns = arb_poly([arb(side) / 2, arb(1) / (2 if side else 1)]), []
     for k in range(count):
-        poly = _t(k, arb_poly([0, 1]))(inner) if k else arb_poly([1])
+        poly = arb_poly([1]) * chebyshev_value(k, inner)
         columns.append([poly[row] for row in range(count)])
-    return powers(count) * arb_mat(columns).transpose()
+    return from_powers(count) * arb_mat(columns).transpose()

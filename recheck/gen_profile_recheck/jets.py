@@ -2,18 +2,18 @@
 
 A jet is a sum of parts, each times a product of some of the units ε₀, ε₁, …, whose squares are 0; bit k of a
 part's key stands for ε_k. What multiplies ε₀ in f(x + ε₀ a) is the derivative of f along a, what multiplies
-ε₀ ε₁ in f(x + ε₀ a + ε₁ b) the second one along a and b, and so on. Parts are real or complex balls, or power
-series of balls in time.
+ε₀ ε₁ in f(x + ε₀ a + ε₁ b) the second one along a and b, and so on. Parts are balls, or power series of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import cycle
 from typing import Any
 
-Scalar = Any  # of python-flint: arb, acb, arb_series; or a number of Python's
+from flint import arb
 
-
+Scalar = Any  # of python-flint: arb, arb_series; or a number of Python's
 SINGLE = 1 << 9  # the first of units of which no two are multiplied: all slopes at once
 
 
@@ -72,40 +72,39 @@ def _parts(x: Scalar) -> dict[int, Scalar]:
     return x.parts if isinstance(x, Jet) else {0: x}
 
 
-def _split(x: Jet) -> tuple[Scalar, Jet]:
-    """Take the part without units, and the rest, of which a power is nothing."""
-    return x.parts[0], Jet({key: value for key, value in x.parts.items() if key})
+def _powers(x: Jet) -> list[Jet]:
+    """List the powers of the part with units, from the first one to the last that is something."""
+    rest = power = Jet({key: value for key, value in x.parts.items() if key})
+    powers = []
+    while power.parts:
+        powers.append(power)
+        power = power * rest
+    return powers
 
 
 def inverse(x: Scalar) -> Scalar:
     """Give 1/x: of m + n, Σ (−n)^k / m^(k+1)."""
     if not isinstance(x, Jet):
         return 1 / x
-    main, rest = _split(x)
-    once = 1 / main
-    term = total = Jet({0: once})
-    while (term := -(term * rest * once)).parts:
-        total = total + term
+    once = factor = 1 / x.parts[0]
+    total = Jet({0: once})
+    for power in _powers(x):
+        factor = -(factor * once)
+        total = total + power * factor
     return total
 
 
 def sine_cosine(x: Scalar) -> tuple[Scalar, Scalar]:
-    """Give sine and cosine, by their addition theorems and the power series of the rest."""
+    """Give sine and cosine, by their series of Taylor."""
     if not isinstance(x, Jet):
         return x.sin(), x.cos()
-    main, rest = _split(x)
-    sine, cosine = main.sin(), main.cos()
-    sums, term, order = [Jet({0: 1}), Jet({})], Jet({0: 1}), 0  # of cos and sin of the rest
-    while (term := term * rest).parts:
-        order += 1
-        term = term * (1 / sine_type(order, main))
-        sums[order % 2] = sums[order % 2] + (term if order % 4 < 2 else -term)
-    return sums[0] * sine + sums[1] * cosine, sums[0] * cosine - sums[1] * sine
-
-
-def sine_type(order: int, like: Scalar) -> Scalar:
-    """Take a whole number as one of a kind, so that 1 over it is rounded as a ball."""
-    return like * 0 + order
+    sine, cosine = x.parts[0].sin(), x.parts[0].cos()
+    found, factor = (Jet({0: sine}), Jet({0: cosine})), arb(1)
+    slopes = cycle([(cosine, -sine), (-sine, -cosine), (-cosine, sine), (sine, cosine)])
+    for order, (power, pair) in enumerate(zip(_powers(x), slopes, strict=False), start=1):
+        factor /= order
+        found = found[0] + power * (pair[0] * factor), found[1] + power * (pair[1] * factor)
+    return found
 
 
 def moved(values: Sequence[Scalar], directions: Sequence[Scalar], unit: int) -> list[Scalar]:
@@ -122,3 +121,16 @@ def along(x: Scalar, unit: int) -> Scalar:
     """Take what a unit multiplies."""
     parts = {key ^ unit: value for key, value in _parts(x).items() if key & unit}
     return 0 if not parts else parts[0] if parts.keys() == {0} else Jet(parts)
+
+
+def derivatives(
+    function: Callable[..., Sequence[Scalar]], *arguments: Sequence[Scalar]
+) -> list[list[Scalar]]:
+    """List the derivatives of all values of a function by all its arguments, a row for each value."""
+    columns, count = list[list[Scalar]](), 0
+    for one in arguments:
+        columns.append(
+            [moved([entry], [1], SINGLE << number)[0] for number, entry in enumerate(one, start=count)]
+        )
+        count += len(one)
+    return [[along(one, SINGLE << number) for number in range(count)] for one in function(*columns)]

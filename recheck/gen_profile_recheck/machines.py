@@ -17,7 +17,7 @@ import flint
 from gen_profile_recheck.jets import Scalar, along, moved, sine_cosine
 
 Values = Sequence[Scalar]
-INNER = 1 << 8  # a unit for what changes along the motion itself
+INNER, OUTER = 1 << 7, 1 << 8  # units for what changes along the motion itself, and along others
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,31 @@ class Machine:
     sway: Callable[[Values, Values, SimpleNamespace], list[Scalar]]
     constants: Callable[[Mapping[str, Scalar]], SimpleNamespace] = lambda p: SimpleNamespace(**p)
 
-    def rate(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
-        """Give ẋ of x = (q, w), where w = dq − D v does not leap when v does."""
+    def speed(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+        """Give dq of x = (q, w), where w = dq − D v does not leap when v does."""
         q, w = x[: len(x) // 2], x[len(x) // 2 :]
-        dq = [one + _product(row, v) for one, row in zip(w, self.input_matrix(q, a, k), strict=True)]
+        return [one + _product(row, v) for one, row in zip(w, self.input_matrix(q, a, k), strict=True)]
+
+    def rate(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+        """Give ẋ."""
+        q, dq = x[: len(x) // 2], self.speed(x, a, v, k)
         carried = self.input_matrix(moved(q, dq, INNER), moved(a, v, INNER), k)
         drift = self.drift(q, dq, a, v, k)
         changes = [[along(one, INNER) for one in row] for row in carried]
         return dq + [one - _product(row, v) for one, row in zip(drift, changes, strict=True)]
+
+    def bend(self, q: Values, dq: Values, axes: Sequence[Values], k: SimpleNamespace) -> list[Scalar]:
+        """Give q̈, of axes with position, velocity and acceleration."""
+        a, v, dv = axes
+        rows = zip(self.drift(q, dq, a, v, k), self.input_matrix(q, a, k), strict=True)
+        return [one + _product(row, dv) for one, row in rows]
+
+    def turned(self, q: Values, change: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+        """Give the change of (q, dq) for one of x, and with −v the other way round."""
+        n = len(q)
+        rows = self.input_matrix(moved(q, change[:n], OUTER), a, k)
+        carried = (along(_product(row, v), OUTER) for row in rows)
+        return [*change[:n], *(one + other for one, other in zip(change[n:], carried, strict=True))]
 
 
 def _product(row: Values, v: Values) -> Scalar:

@@ -8,15 +8,17 @@ import hashlib
 import json
 import math
 import re
+import struct
 import zlib
-from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import reduce
+from itertools import pairwise
 from math import isfinite, prod
 from typing import Any
 
-from flint import arb, arb_mat
+from flint import arb_mat
 
 from gen_profile_recheck.enclosure import NotProvedError
 
@@ -72,14 +74,6 @@ def spec_of(document: Mapping[str, Any], digest: str) -> Mapping[str, Any]:
     raise NotProvedError("the certificate is about another spec")
 
 
-def scales_of(spec: Mapping[str, Any], axes: Sequence[str]) -> list[float]:
-    """Tell how many of its units each axis counts per m (or rad), negative where it counts the other way."""
-    return [
-        one["sign"] * (one["counts_per_metre"] if one["unit"] == "counts" else PER_SI[one["unit"]])
-        for one in (spec["axis"][name] for name in axes)
-    ]
-
-
 def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
     """Read a table of positions at even times (RFC 4180), or that of a playback block (IEC 61131-3).
 
@@ -101,90 +95,72 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
 
 
 def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
-    export, factors = spec["export"], scales_of(spec, axes)
-    if export["csv_dialect"] != "rfc4180" or "position" not in export["csv_columns"]:
+    if spec["export"]["csv_dialect"] != "rfc4180" or "position" not in spec["export"]["csv_columns"]:
         raise ValueError("tables of other dialects, or without positions")
     header, *rows = csv.reader(text.splitlines())
-    several = len(axes) > 1
-    names = [f"{f'{name}_' if several else ''}position_{spec['axis'][name]['unit']}" for name in axes]
+    prefixes = [f"{name}_" if len(axes) > 1 else "" for name in axes]
+    names = [
+        f"{prefix}position_{spec['axis'][name]['unit']}" for prefix, name in zip(prefixes, axes, strict=True)
+    ]
     times = [Decimal(row[header.index("time_s")]) for row in rows]
     cycle = float(times[1] - times[0])
     over, under = Decimal(repr(cycle)).as_integer_ratio()
     if any(time * under != number * over for number, time in enumerate(times)):
         raise ValueError("times that are not even")
-    columns = [[float(row[header.index(name)]) for row in rows] for name in names]
-    counted = [spec["axis"][name]["unit"] == "counts" for name in axes]
-    return _setpoints(cycle, columns, factors, counted)
+    return _setpoints(cycle, [[float(row[header.index(name)]) for row in rows] for name in names], spec, axes)
 
 
 def _setpoints(
-    cycle: float, columns: Sequence[Sequence[float]], factors: Sequence[float], counted: Sequence[bool]
+    cycle: float,
+    columns: Sequence[Sequence[float]],
+    spec: Mapping[str, Any],
+    axes: Sequence[str],
+    layout: str = "",
 ) -> TimedSetpoints:
-    over, under = Decimal(repr(cycle)).as_integer_ratio()
+    """Take positions in an axis' units, or in its counts, for those in m (or rad)."""
+    (over, under), positions, resolution = Decimal(repr(cycle)).as_integer_ratio(), [], []
+    for column, axis in zip(columns, (spec["axis"][name] for name in axes), strict=True):
+        counted = layout == "counts" or axis["unit"] == "counts"
+        per_si = axis["sign"] * (axis["counts_per_metre"] if counted else PER_SI[axis["unit"]])
+        positions.append([one / per_si for one in column])
+        resolution.append(1 / abs(per_si) if counted and layout != "segments" else 0.0)
     return TimedSetpoints(
-        times=[number * over / under for number in range(len(columns[0]))],
-        cycle=cycle,
-        positions=[[one / factor for one in row] for row, factor in zip(columns, factors, strict=True)],
-        resolution=[flag / abs(factor) for flag, factor in zip(counted, factors, strict=True)],
+        [number * over / under for number in range(len(columns[0]))], cycle, positions, resolution
     )
 
 
 def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
     """Play a block at full rate: positions of every cycle, or powers of the time since a segment began."""
-    bare, several = re.sub(r"\(\*.*?\*\)", "", text, flags=re.S), len(axes)
-    variables: dict[str, list[float]] = {}
+    bare, m, layout = re.sub(r"\(\*.*?\*\)", "", text, flags=re.S), len(axes), spec["export"]["plc_layout"]
 
     def constant(name: str) -> list[float]:
-        if name in variables:
-            return variables[name]
         array_of = r"(?:ARRAY\s*\[[0-9.]+\]\s*OF\s*)?"
         (values,) = re.findall(rf"\b{name}\s*:\s*{array_of}[A-Z]+\s*:=\s*\[?([^\];]*)", bare)
         return [float(one) for one in values.split(",")]
 
-    layout, factors = spec["export"]["plc_layout"], scales_of(spec, axes)
-    if "aTable" in bare:
-        variables = _buffer(constant("aTable"), several, layout)
-    counted = [layout == "counts" or spec["axis"][name]["unit"] == "counts" for name in axes]
-    if layout == "counts":
-        factors = [spec["axis"][name]["sign"] * spec["axis"][name]["counts_per_metre"] for name in axes]
-    (cycle,), (last,) = constant("cCycleTime"), constant("cLast")
-    if layout == "segments":
-        first, powers = constant("cFirst"), [constant(f"cPower{power}") for power in range(6)]
-        rows, segment = [], 0
-        for number in range(int(last)):
-            segment += segment + 1 < len(first) and number >= first[segment + 1]
-            time = (number - first[segment]) * cycle
-            rows.append(
-                [_horner([one[segment * several + axis] for one in powers], time) for axis in range(several)]
-            )
-        rows.append(constant("cTarget"))
-        counted = [False] * several
+    names = ["cPosition"] if layout != "segments" else [f"cPower{power}" for power in range(6)]
+    if "aTable" in bare:  # a buffer: its size, what holds for all, what holds for each axis, and its columns
+        table = constant("aTable")
+        size, first, last, target = int(table[0]), 8 + 8 * m, table[3], table[12 : 8 + 8 * m : 8]
+        *columns, begins = (table[first + n * size :][:size] for n in range(len(names) + 1))
+        begins = begins[::m]
     else:
-        flat = constant("cPosition")
-        rows = [flat[number : number + several] for number in range(0, len(flat), several)]
-        if len(rows) != int(last) + 1:
-            raise ValueError("a table of another length")
-    return _setpoints(cycle, list(zip(*rows, strict=True)), factors, counted)
-
-
-def _buffer(values: Sequence[float], axes: int, layout: str) -> dict[str, list[float]]:
-    """Name what stands in the first buffer of a block whose numbers are variables."""
-    names = [f"cPower{power}" for power in range(6)] if layout == "segments" else ["cPosition"]
-    rows, own = int(values[0]), 8 + 8 * axes
-    found = {
-        name: list(values[own + number * rows : own + (number + 1) * rows])
-        for number, name in enumerate([*names, "cFirst"])
-    }
-    found["cFirst"] = found["cFirst"][::axes]
-    return found | {"cLast": [values[3]], "cTarget": list(values[12:own:8])}
+        columns, (last,) = [constant(name) for name in names], constant("cLast")
+        begins, target = (constant("cFirst"), constant("cTarget")) if layout == "segments" else ([], [])
+    (cycle,), flat, segment = constant("cCycleTime"), list[float](), 0
+    for number in range(int(last) if layout == "segments" else 0):
+        segment += segment + 1 < len(begins) and number >= begins[segment + 1]
+        time = (number - begins[segment]) * cycle
+        flat += [_horner([one[segment * m + axis] for one in columns], time) for axis in range(m)]
+    flat = [*flat, *target] if layout == "segments" else columns[0]
+    if len(flat) != m * (int(last) + 1):
+        raise ValueError("a table of another length")
+    return _setpoints(cycle, [flat[axis::m] for axis in range(m)], spec, axes, layout)
 
 
 def _horner(powers: Sequence[float], time: float) -> float:
     """Evaluate as the block does, rounding included."""
-    total = powers[-1]
-    for one in powers[-2::-1]:
-        total = one + time * total
-    return total
+    return reduce(lambda total, one: one + time * total, reversed(powers))
 
 
 def ranges_of(spec: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
@@ -204,92 +180,54 @@ class ProofMaterial:
 
     Raises
     ------
-    NotProvedError
+    ValueError, or alike
         It is damaged, or its arrays do not fit together.
     """
 
     def __init__(self, document: Mapping[str, Any], coordinates: int, axes: int) -> None:
-        try:
-            self.knots, position, velocity, acceleration = (
-                document["axes"][name] for name in ("knots", "position", "velocity", "acceleration")
-            )
-            pieces = len(self.knots) - 1
-            _require(sorted(set(self.knots)) == self.knots and pieces > 0, "knots")
-            _require(all(len(row) == axes for row in [*position, *velocity]), "axes")
-            _require(len(position) == len(velocity) == pieces + 1 and len(acceleration) == pieces, "axes")
-            self.ends = [
-                [
-                    (
-                        (position[n][axis], position[n + 1][axis]),
-                        (velocity[n][axis], velocity[n + 1][axis]),
-                        (acceleration[n][0][axis], acceleration[n][1][axis]),
-                    )
-                    for n in range(pieces)
-                ]
-                for axis in range(axes)
-            ]
-            self.parts = [[(int(level), int(index)) for level, index in box] for box in document["parts"]]
-            self.terms = tuple(document["terms"])
-            _require(all(0 < count <= 32 for count in self.terms), "terms")
-            _require(len(document["motions"]) == len(self.parts) > 0, "motions")
-            self.motions, self.pieces, self.coordinates = document["motions"], pieces, coordinates
-            self._shape, self._scales = _unpacked(document["scales"], "d")
-            boxes, self.scale_pieces, *rest = self._shape
-            terms = prod(min(3, count) for count in self.terms)
-            _require(boxes == len(self.parts) and self.scale_pieces in (1, pieces), "scales")
-            _require(rest[:2] == [coordinates] * 2 and rest[2] in (1, terms), "scales")
-            _require(all(isfinite(one) for one in self._scales), "scales")
-        except (KeyError, TypeError, ValueError, IndexError, zlib.error) as error:
-            raise NotProvedError(f"the certificate is damaged ({error})") from error
-
-    def scales(self, box: int) -> list[Any]:
-        """List S of a box for every piece, or for all of them: rows of entries, which are coefficients."""
-        boxes, pieces, n, _, terms = self._shape
-        return [
-            [
-                [
-                    [
-                        self._scales[(((i * n + j) * terms + t) * boxes + box) * pieces + piece]
-                        for t in range(terms)
-                    ]
-                    for j in range(n)
-                ]
-                for i in range(n)
-            ]
-            for piece in range(pieces)
+        motion = document["axes"]
+        self.knots, self.terms = motion["knots"], tuple(document["terms"])
+        position, velocity = (list(zip(*motion[name], strict=True)) for name in ("position", "velocity"))
+        begin, end = (list(zip(*column, strict=True)) for column in zip(*motion["acceleration"], strict=True))
+        self.ends = [  # of each axis and piece: both of each derivative
+            list(zip(pairwise(p), pairwise(v), zip(b, c, strict=True), strict=True))
+            for p, v, b, c in zip(position, velocity, begin, end, strict=True)
         ]
+        self.parts = [[(int(level), int(index)) for level, index in box] for box in document["parts"]]
+        self.motions, self.pieces, self.coordinates = document["motions"], len(self.knots) - 1, coordinates
+        (boxes, pieces, *rest), self._scales = _unpacked(document["scales"], "d")
+        self._scale_shape = boxes, pieces, rest[2]
+        _require(sorted(set(self.knots)) == self.knots and self.pieces > 0, "knots")
+        _require(len(self.ends) == axes and all(len(one) == self.pieces for one in self.ends), "axes")
+        _require(all(0 < count <= 32 for count in self.terms), "terms")
+        _require(len(self.motions) == len(self.parts) == boxes, "motions")
+        _require(pieces in (1, self.pieces) and rest[:2] == [coordinates] * 2, "scales")
+        _require(rest[2:] in ([1], [prod(min(3, count) for count in self.terms)]), "scales")
+        _require(all(map(isfinite, self._scales)), "scales")
 
-    def motion(self, box: int) -> list[list[arb_mat]]:
-        """List the series of every piece and coordinate, (time terms × parameter terms).
+    def scales(self, box: int) -> Iterator[list[list[Sequence[float]]]]:
+        """Give S of a box for every piece, or once for all: rows of entries, which are coefficients."""
+        (boxes, pieces, terms), n = self._scale_shape, self.coordinates
+        for place in range(box * pieces, (box + 1) * pieces):
+            own = self._scales[place :: boxes * pieces]
+            entries = [own[first : first + terms] for first in range(0, len(own), terms)]
+            yield [entries[first : first + n] for first in range(0, len(entries), n)]
 
-        Raises
-        ------
-        NotProvedError
-        """
-        try:
-            packed = self.motions[box]
-            (pieces, n, times, terms), whole = _unpacked(packed, "q")
-            quanta = [float(one) for one in packed["quanta"]]
-            _require((pieces, n, terms) == (self.pieces, self.coordinates, prod(self.terms)), "motions")
-            _require(len(quanta) == n and all(map(isfinite, quanta)) and 0 < times <= 16, "motions")
-        except (KeyError, TypeError, ValueError, zlib.error) as error:
-            raise NotProvedError(f"the certificate is damaged ({error})") from error
-        return [
-            [
-                arb_mat(
-                    times,
-                    terms,
-                    [
-                        arb(one) * quanta[c]
-                        for one in whole[c * times * terms * pieces :][
-                            piece : times * terms * pieces : pieces
-                        ]
-                    ],
-                )
-                for c in range(n)
+    def motion(self, box: int) -> Iterator[list[arb_mat]]:
+        """Give the series of every coordinate, (time terms × parameter terms), piece by piece."""
+        packed = self.motions[box]
+        (pieces, n, times, terms), whole = _unpacked(packed, "q")
+        quanta = [float(one) for one in packed["quanta"]]
+        _require((pieces, n, terms) == (self.pieces, self.coordinates, prod(self.terms)), "motions")
+        _require(len(quanta) == n and all(map(isfinite, quanta)) and times <= 16, "motions")
+        each = times * terms
+        for piece in range(pieces):
+            own = whole[piece::pieces]
+            columns = (own[first : first + each] for first in range(0, n * each, each))
+            yield [
+                arb_mat(times, terms, list(column)) * unit
+                for column, unit in zip(columns, quanta, strict=True)
             ]
-            for piece in range(pieces)
-        ]
 
 
 def _require(fits: bool, what: str) -> None:
@@ -297,14 +235,11 @@ def _require(fits: bool, what: str) -> None:
         raise ValueError(f"{what} that do not fit")
 
 
-def _unpacked(packed: Mapping[str, Any], kind: str) -> tuple[list[int], array[Any]]:
+def _unpacked(packed: Mapping[str, Any], kind: str) -> tuple[list[int], Sequence[Any]]:
     """Decompress little-endian numbers."""
     shape = [int(size) for size in packed["shape"]]
     size = prod(shape) * 8
     _require(0 < size <= MOST_BYTES and min(shape) > 0, "arrays")
     content = zlib.decompressobj().decompress(base64.b64decode(packed["zlib"], validate=True), size)
     _require(len(content) == size, "arrays")
-    values = array(kind, content)
-    if memoryview(array("H", [1])).tobytes() != b"\x01\x00":
-        values.byteswap()
-    return shape, values
+    return shape, struct.unpack(f"<{prod(shape)}{kind}", content)

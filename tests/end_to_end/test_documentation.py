@@ -1,10 +1,12 @@
 """Every command and code block of every page, in its order, in a folder that the page itself fills."""
 
+import re
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_here
+from command_line import STANDALONE, run_here
 from documentation import PAGES, ROOT, blocks, run
 from end_to_end.studios import studio
 
@@ -53,6 +55,15 @@ def test_a_table_of_another_program_is_judged(tmp_path, monkeypatch):
         peaks.append([row["residual_peaks_m"]["payload"] for row in outcome.document["check"]["scenarios"]])
     assert peaks[0][:3] == pytest.approx([0.00975, 0.02101, 0.00099], rel=0.01)
     assert peaks[1] == pytest.approx(peaks[0], rel=1e-9)
+
+
+if STANDALONE:
+
+    def test_the_folder_is_as_small_as_its_page_says():
+        size = sum(512 * path.lstat().st_blocks for path in [Path(STANDALONE), *Path(STANDALONE).rglob("*")])
+        page = (ROOT / "docs" / "standalone.md").read_text("utf-8")
+        stated = int(re.search(r"takes (\d+) MB unpacked", page)[1])
+        assert size < 1e6 * stated < 350e6
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -207,6 +207,17 @@ def test_limits_are_drawn_where_curves_come_near():
     assert velocity.get_ylim()[1] > 0.5
 
 
+def test_few_curves_are_drawn_each_in_a_colour_of_its_own_unless_all_are_asked_for(plain):
+    def curves(**how):
+        axis = draw_side_by_side([comparison_figure(plain, **how)], "title").axes[0]
+        return {line.get_label(): line.get_color() for line in axis.get_lines()}
+
+    few = curves()
+    assert {"nzv", "zvd"} | {advice.method for advice in plain.recommended.values()} <= set(few)
+    assert len(few) == len(set(few.values())) <= 6
+    assert set(curves(every=True)) == {row.method for row in plain.rows}
+
+
 def test_numerical_error_is_no_figure_of_a_bar(plain):
     bars = comparison_figure(plain).panels[-1]
     assert len(bars.texts) > 5 and not any("e-" in text for text in bars.texts)

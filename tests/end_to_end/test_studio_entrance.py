@@ -5,6 +5,7 @@ import json
 import re
 import socket
 from contextlib import ExitStack
+from importlib import resources
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -13,7 +14,7 @@ from end_to_end.studios import closed, conversation, status, studio
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
 
-from gen_profile.studio.entrance import PATIENCE
+from gen_profile.studio.entrance import GO_ON, PATIENCE
 from gen_profile.studio.state import StudioState
 
 BROWSER = """#!/bin/sh
@@ -49,6 +50,12 @@ def opened_file(seen):
     while not seen.exists():
         lines.update(command_lines())
     return Path(unquote(urlsplit(seen.read_text().split()[-1]).path)), "\n".join([*lines, seen.read_text()])
+
+
+def test_no_page_lets_a_browser_ask_for_an_icon():
+    assets = resources.files("gen_profile.studio") / "assets"
+    for page in (GO_ON, *((assets / name).read_text("utf-8") for name in ("code.html", "studio.html"))):
+        assert '<link rel="icon" href="data:,">' in page
 
 
 @pytest.mark.slow

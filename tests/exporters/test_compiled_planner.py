@@ -3,6 +3,7 @@
 Collected only where the environment variables IEC2C and MATIEC_LIB name matiec's compiler and library.
 """
 
+import re
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from test_planner_forms import SPEC, planner_commands
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.forms import block_files
 
 
 def played(text, inputs, outputs, rows, folder):
@@ -35,3 +37,64 @@ def test_matiec_s_planner_issues_the_same_bits(tmp_path):
     oracle = BlockInstance(text)
     rows = np.concatenate(list(planner_commands(oracle.inputs)))
     assert played(text, oracle.inputs, oracle.outputs, rows, tmp_path) == oracle.call(rows).tolist()
+
+
+# As a runtime does: what has an address is set and read, and the configuration is run once in every cycle.
+RUNTIME = r"""
+#include <stdio.h>
+#include "iec_std_lib.h"
+#define __LOCATED_VAR(type, name, ...) type at##name; type *name = &at##name;
+#include "LOCATED_VARIABLES.h"
+#undef __LOCATED_VAR
+TIME __CURRENT_TIME;
+BOOL __DEBUG = 0;
+extern unsigned long long common_ticktime__;
+void config_init__(void);
+void config_run__(unsigned long tick);
+int main(void) {
+    unsigned long tick = 0;
+    int on;
+    double value;
+    config_init__();
+    printf("%llu\n", common_ticktime__);
+    while (scanf("%d", &on) == 1) {
+        GIVEN
+        config_run__(tick++);
+        ISSUED
+        printf("\n");
+    }
+    return 0;
+}
+"""
+
+
+def test_the_openplc_project_runs_as_its_task_and_issues_the_same_bits(tmp_path):
+    block = planner_block(SPEC)
+    (file,) = block_files(block, SPEC, ["openplc"])
+    text = file.content.decode("ascii")
+    assert block.text in text
+    places = {
+        name: f"*__{area}{place.replace('.', '_')}"
+        for name, area, place in re.findall(r"(\w+) AT %(\w\w)([\d.]+) :", text)
+    }
+    oracle = BlockInstance(block.text)
+    assert places.keys() == {*oracle.inputs, *oracle.outputs} - {"fCycleTime"}
+    assert len({*places.values()}) == len(places)
+    library = compile_text(text, tmp_path)
+    given = "".join(
+        f'scanf("%lf", &value); {f"{places[name]} = value" if name in places else ""};\n'
+        for name in oracle.inputs
+    )
+    issued = "".join(f'printf("%a ", (double) {places[name]});\n' for name in oracle.outputs)
+    source = RUNTIME.replace("        GIVEN\n", given).replace("        ISSUED\n", issued)
+    (tmp_path / "main.c").write_text(source, encoding="ascii")
+    sources = ["main.c", "Config0.c", "Res0.c"]
+    flags = ["-O1", "-ffp-contract=off", "-w", "-I", str(library / "C"), "-I.", "-o", "plc", *sources, "-lm"]
+    subprocess.run([sys.executable, "-m", "ziglang", "cc", *flags], cwd=tmp_path, check=True)
+    rows = np.concatenate(list(planner_commands(oracle.inputs)))
+    rows = np.concatenate([rows, np.repeat(rows[-1:], 10_000 - len(rows), axis=0)])
+    lines = "\n".join(" ".join(map(repr, (1, *row))) for row in rows.tolist())
+    done = subprocess.run([tmp_path / "plc"], input=lines, check=True, capture_output=True, text=True)
+    tick, *lines = done.stdout.splitlines()
+    assert int(tick) == 4_000_000  # ns
+    assert [[*map(float.fromhex, line.split())] for line in lines] == oracle.call(rows).tolist()

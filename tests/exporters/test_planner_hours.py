@@ -96,18 +96,20 @@ def rests(out):
 def require_true(out, at, rope, load, decay=0.0):
     """Require that no more is left than is stated, and no more than allowed while the block promises."""
     found = worst(out["fVelocity"][:at], rope, load, decay)
-    assert found <= out["fSwayLeft"][at] + 1e-4
+    assert found <= out["fSwayLeft"][at]
     assert found <= LIMIT or not out["bPromise"][at]
     assert out["nPromise"][at] == (5.0 if out["fSwayLeft"][at] > LIMIT else 0.0)
 
 
-@pytest.mark.parametrize(("rope", "load", "promised"), [(6.0, 1500.0, 600.0), (3.0, 100.0, 240.0)])
+@pytest.mark.parametrize(("rope", "load", "promised"), [(6.0, 1500.0, 540.0), (3.0, 100.0, 240.0)])
 def test_nothing_is_forgotten_without_damping(text, rope, load, promised):
     """Eight machines vouched for those between them for minutes: 90 mm were left of 40 after half an hour."""
     out = Crane(text, rope, load).works(np.random.default_rng(1), 2000.0, 3.0).outputs
     ends = rests(out)
     for at in ends[:: len(ends) // 10]:
         require_true(out, at, rope, load)
+    for at in ends[ends < 80.0 / CYCLE]:  # what is between the machines watched is known: 1.075 times before
+        assert out["fSwayLeft"][at] <= 1.06 * worst(out["fVelocity"][:at], rope, load)
     assert out["bPromise"][200 : round(promised / CYCLE)].all()
 
 

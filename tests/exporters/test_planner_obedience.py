@@ -12,7 +12,7 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import preset_spec
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_compiler")]
+pytestmark = pytest.mark.slow
 
 SPEC = preset_spec("bay-crane")
 ZONED = preset_spec("bay-crane", ["planner.zones=true"])

@@ -12,7 +12,7 @@ def test_what_is_left_swinging_is_an_integral_of_the_velocity():
     acceleration = random.normal(size=(2, 401)) * (np.arange(401) % 50 != 0)
     fine = np.arange(0, 400 * 200 + 1) / 200
     modes = GivenModes(poles=poles, gains=np.array([[1.0], [2.0]]), damped=True)
-    as_given, watched, at_most = modes.left(acceleration, ends, cycle)
+    as_given, at_most = modes.left(acceleration, ends, cycle)
     for end, found in zip(ends, as_given, strict=True):
         time, expected = fine[: end * 200 + 1], 0.0
         for gain, knots in zip((1.0, 2.0), acceleration, strict=True):
@@ -21,7 +21,6 @@ def test_what_is_left_swinging_is_an_integral_of_the_velocity():
             swing = np.trapezoid(rate * np.exp(poles * cycle * (end - time)), time * cycle) / poles
             expected += gain * abs(swing.item())
         assert found == pytest.approx(expected, rel=1e-5)
-    assert watched == pytest.approx(as_given)
     assert at_most == pytest.approx(as_given)
 
 
@@ -30,5 +29,5 @@ def test_machines_between_those_that_the_block_watches_are_tried_where_a_history
     short, long = (GivenModes.of(spec, {"L1": 9.0, "m2": 2000.0}, seconds) for seconds in (60.0, 1600.0))
     assert short.poles.shape[1] == len(ERRORS)
     turns = np.diff(np.unique(long.poles[0].imag)) * 1600.0
-    assert turns.max() < 0.71
+    assert turns.max() < 0.46
     assert short.turns == pytest.approx(np.ptp(long.poles.imag, axis=1).max() / 2.0)

@@ -7,8 +7,6 @@ from gen_profile.planner.design import planner_block
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
 
-pytestmark = pytest.mark.usefixtures("quick_compiler")
-
 FORMER = {  # machine: how many are drawn, seed, number
     "zones": [
         (400, 1, 51),  # a stick followed 9 s too late: the first pulse after its plan was lost

@@ -35,8 +35,6 @@ from gen_profile.proof.verdict import kind_of
 from gen_profile.proof.watching import BlockWatch
 from gen_profile.spec.reading import parse_spec, preset_spec
 
-pytestmark = pytest.mark.usefixtures("quick_compiler")
-
 CYCLE, CYCLES = 0.01, 6000
 TARGET, TOLD, STICK, STOPPED = 5.0, 100, 2500, 4000  # m; cycles in which commands come
 LIMITS = Ends(velocity=1.0, acceleration=0.5, jerk=5.0, targets=(-100.0, 100.0), quick=(1.0, 10.0))

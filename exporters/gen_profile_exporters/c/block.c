@@ -9,10 +9,17 @@ long ${name}_operations;
 #else
 #define OPERATIONS(number) ((void)0)
 #endif
+#ifdef __GNUC__
+#define APART __attribute__((noinline))
+#else
+#define APART
+#endif
 #ifdef CHECKED
 /* Without branches, of which thousands take seconds to compile. */
-#define BEGIN() int32_t turns_ = 0, fault_ = fb->fault_
-#define END() (fb->fault_ = fault_)
+#define BEGIN() int32_t turns_ = fb->turns_, fault_ = fb->fault_
+#define FIRST() (turns_ = 0)
+#define PART(name) (END(), name(fb), turns_ = fb->turns_, fault_ = fb->fault_)
+#define END() (fb->turns_ = turns_, fb->fault_ = fault_)
 #define AT(index, length) within(&fault_, index, length)
 #define TURN() turn(&fault_, &turns_)
 #define SUM(one, other) whole(&fault_, (int64_t)(one) + (other))
@@ -56,6 +63,8 @@ static inline double root(int32_t *fault, double value)
 }
 #else
 #define BEGIN() ((void)0)
+#define FIRST() ((void)0)
+#define PART(name) name(fb)
 #define END() ((void)0)
 #define AT(index, length) (index)
 #define TURN() true
@@ -77,8 +86,10 @@ static void ${name}_init($name *fb) {
 $initials
 }
 
+$parts
 static void ${name}_step($name *fb) {
     BEGIN();
+    FIRST();
 $body
     END();
 }

@@ -7,7 +7,7 @@
 typedef struct {
 $members
 #ifdef CHECKED
-    int32_t fault_;
+    int32_t fault_, turns_;
 #endif
 } $name;
 

@@ -326,7 +326,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cAxes": len(c.axes),
         "cModes": modes,
         "cRows": rows,
-        "cFresh": FRESH,
+        **({"cFresh": FRESH} if c.rates else {}),
         "cCycleWork": _cycle_work(c),
         "cMostLonger": MOST_LONGER,
         "cConditions": _conditions(c),
@@ -450,9 +450,8 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cCalm": c.tolerated_sway,
         "cAtOnce": AT_ONCE,
         "cAfterCut": AFTER_CUT,
-        "cDoubt": c.stated_error,
         **(
-            {}
+            {"cDoubt": c.stated_error}
             if c.rates
             else {
                 "cSwayShare": c.sway_share / c.sway_limit / len(c.axes),

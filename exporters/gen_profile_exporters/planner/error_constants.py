@@ -11,9 +11,9 @@ TIGHTER = 20.0  # weight of second order, where as much of it is left as plans m
 ADMITTED = 0.8  # of what an epoch may leave: no plan or pulse that leaves more, if that is more than now
 LEAST_ROOM, STOP_ROOM = 0.15, 0.4  # of the allowed sway, that an epoch may leave at least; where it stops
 KEPT_BACK = 0.15  # of what it may leave, towards its end
-BETWEEN = 1.05  # of the sway on the machines watched: those between them
-CLOSE = 1.25  # rad, up to which that holds: between two of them, after an epoch; 1 / cos(CLOSE / 4)
-SPREAD = 3.2 * CLOSE  # rad, from none to the whole error: epochs end; up to a quarter later on the way
+BETWEEN = 1.02  # of the sway on the machines watched and halfway: those between
+FINE_BETWEEN, CLOSE = 1.05, 1.1  # likewise on finer ones; and rad, up to which that holds, between two
+SPREAD = 4.0  # rad, from none to the whole error: epochs end; up to a quarter later on the way
 MOST_FINE, LEAST_FINE = 128, 16  # finer machines of each mode
 FINE_WORK = 0.1  # of a cycle's operations, that they take at most
 FINE_STEP = 17  # operations of one
@@ -44,6 +44,7 @@ def real(fine: int, least_decay: float) -> dict[str, float]:
     """Give the others."""
     return {
         "cBetween": BETWEEN,
+        "cFineBetween": FINE_BETWEEN,
         "cSpread": SPREAD,
         "cFineSpread": 0.5 * CLOSE * (fine - 1),
         "cFineStep": 2.0 / (fine - 1),

@@ -24,15 +24,19 @@ from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import machine, number
 from gen_profile.evaluation.scenarios import extremes
 from gen_profile.motion.profile import Array
+from gen_profile.shapers.impulses import SHAPERS
 
 SAMPLES = 500  # of each curve
 PAPERS = ("nzv", "zvd")  # the shapers that the paper compares with
+VARIANTS = ("optimal-range", "optimal-order1", "optimal-order2")
 OUTLYING = 10.0  # times the middle peak, beyond which a curve may leave its axes, as it flattens the others
 ROOM = 1.05  # of what is drawn
 
 
-def comparison_figure(comparison: Comparison) -> Figure:
+def comparison_figure(comparison: Comparison, every: bool = False) -> Figure:
     """Draw the motion of the first axis under every method, its spectrum, the end load, and worst residuals.
+
+    Curves of the most telling methods are shown at first, of all methods where `every` says so.
 
     Raises
     ------
@@ -41,7 +45,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     """
     if not comparison.rows:
         raise OutputError("plot: no method has a motion for this move; compare without a picture to see why.")
-    styles = compared_styles(comparison)
+    styles = compared_styles(comparison, every)
     motions = {row.method: row.evaluation.motion for row in comparison.rows}
     return Figure(
         caption=(
@@ -57,14 +61,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
     )
 
 
-def compared_styles(comparison: Comparison) -> dict[str, Style]:
-    """Draw the spec's own and the recommended methods thick, and show the most telling ones."""
+def compared_styles(comparison: Comparison, every: bool = False) -> dict[str, Style]:
+    """Draw the spec's own and the recommended methods thick, and show the most telling ones, or all."""
     methods = [row.method for row in comparison.rows]
     advised = {own_method(comparison.spec), *(advice.method for advice in comparison.recommended.values())}
-    optimal = {name for name in methods if name == "optimal" or name.startswith("optimal-beta")}
     styles = method_styles(methods, thick=advised)
-    shown = {*advised, *PAPERS, *optimal}
-    return {method: attrs.evolve(style, shown=method in shown) for method, style in styles.items()}
+    hidden = {*SHAPERS, *VARIANTS} - {*advised, *PAPERS}
+    if every or hidden.issuperset(methods):
+        hidden = set()
+    return {method: attrs.evolve(style, shown=method not in hidden) for method, style in styles.items()}
 
 
 def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
@@ -75,13 +80,14 @@ def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pan
             derivative_line(row.method, row.evaluation.motion, order, 0, styles[row.method], SAMPLES)
             for row in comparison.rows
         ]
-        shown = _without_outliers(lines)
+        visible = [line for line in lines if line.style.shown]
+        shown = _without_outliers(visible)
         yield Panel(
             title=f"{quantity} of {first.name}",
             x_label=TIME,
             y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
             lines=lines,
-            levels=tuple(near_limits(comparison.spec, 0, order, shown or extent(lines))),
+            levels=tuple(near_limits(comparison.spec, 0, order, shown or extent(visible))),
             span=shown,
         )
 
@@ -98,8 +104,9 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
             Line(name=method, x=response.times, y=1e3 * end_load_sway(spec, response), style=styles[method])
             for method, response in swings.items()
         ]
-        span = _without_outliers(lines)
-        low, high = span or extent(lines)
+        visible = [line for line in lines if line.style.shown]
+        span = _without_outliers(visible)
+        low, high = span or extent(visible)
         end = max(float(line.x[-1]) for line in lines)
         levels = [(1e3 * spec.check.residual_sway[plant.loads[-1]], (last, end))]
         if spec.limits.sway is not None:

@@ -14,11 +14,12 @@ OPTIMAL = (
     *(f"optimal-beta{weight}" for weight in (0, 20, 50)),
     *(f"optimal{kind}" for kind in ("", "-range", "-order1", "-order2")),
 )
-# methods that share their dashes differ in colour, by their place, the first of which has this one
+# methods that share their dashes differ in colour, by their place, the first of which has this one; so do the
+# usual optimal motions and the shapers that are recommended most
 GROUPS: tuple[tuple[Dash, int, tuple[str, ...]], ...] = (
     ("solid", 0, OPTIMAL),
-    ("dash", 5, tuple(name for name in SHAPERS if "ei" not in name)),
-    ("dot", 3, tuple(name for name in SHAPERS if "ei" in name)),
+    ("dash", 3, tuple(sorted((name for name in SHAPERS if "ei" not in name), key="zvdd".__eq__))),
+    ("dot", 4, tuple(name for name in SHAPERS if "ei" in name)),
 )
 
 

@@ -136,7 +136,8 @@ def _columns(figure: Figure) -> int:
 
 
 def _curves(axis: Any, panel: Panel) -> None:
-    for line in panel.lines:
+    shown = [line for line in panel.lines if line.style.shown]
+    for line in shown:
         axis.plot(line.x, line.y, label=line.name, **_ink(line.style))
     for band in panel.bands:
         if band.high > band.low:
@@ -146,12 +147,10 @@ def _curves(axis: Any, panel: Panel) -> None:
     for level in panel.levels:
         _level(axis, level)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
-    axis.set_xlim(
-        min(float(line.x.min()) for line in panel.lines), max(float(line.x.max()) for line in panel.lines)
-    )
+    axis.set_xlim(min(float(line.x.min()) for line in shown), max(float(line.x.max()) for line in shown))
     axis.grid(alpha=0.3)
     if panel.decades is not None:
-        greatest = max(float(line.y.max()) for line in panel.lines)
+        greatest = max(float(line.y.max()) for line in shown)
         axis.set(yscale="log", ylim=(greatest * 10.0**-panel.decades, 1.5 * greatest))
     elif panel.span is not None:
         axis.set_ylim(panel.span)

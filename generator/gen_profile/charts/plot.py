@@ -44,7 +44,7 @@ Drawn = (
 )
 
 
-def plot(result: Drawn, path: Path | str | None = None) -> Picture | None:
+def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) -> Picture | None:
     """Draw a result: a machine, a motion, its sway, a check, a comparison, a fitted swing, a proof.
 
     Parameters
@@ -52,6 +52,8 @@ def plot(result: Drawn, path: Path | str | None = None) -> Picture | None:
     result : Spec, Plan, Design, Profile, Check, Judgement, Comparison, Robustness, Identification, Deployment
     path : Path or str, optional
         Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
+    every : bool, optional
+        Draw the curves of all methods of a comparison, not only of the most telling ones.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def plot(result: Drawn, path: Path | str | None = None) -> Picture | None:
     if path is None:
         with TemporaryDirectory() as folder:
             drawn = Path(folder) / "picture.svg"
-            plot(result, drawn)
+            plot(result, drawn, every=every)
             return Picture(drawn.read_text("utf-8"))
     path = Path(path)
     require_drawable(path)
@@ -79,12 +81,12 @@ def plot(result: Drawn, path: Path | str | None = None) -> Picture | None:
         case Design(plan=part) | Judgement(check=part):
             plot(part, path)
         case _:
-            figures, name, title = _figures(result)
+            figures, name, title = _figures(result, every)
             save(figures, path, name, title)
     return None
 
 
-def _figures(result: object) -> tuple[list[Figure], str, str]:
+def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
     """Choose the figures of a result, with a name and a title."""
     match result:
         case Plan(spec=spec, evaluation=evaluation):
@@ -96,7 +98,7 @@ def _figures(result: object) -> tuple[list[Figure], str, str]:
         case Check():
             return [check_figure(result)], "check", "The check"
         case Comparison(spec=spec):
-            return [comparison_figure(result)], spec.name, f"{spec.name}: {spec.plant.type}"
+            return [comparison_figure(result, every)], spec.name, f"{spec.name}: {spec.plant.type}"
         case Robustness(spec=spec):
             load = spec.machine().end_load_name
             title = f"{spec.name}: residual sway of the {load} on machines that are not as specified"

@@ -139,6 +139,7 @@ def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
 @spec_options
 @plot_option
+@click.option("--all", "every", is_flag=True, help="Draw all methods, not only the most telling ones.")
 @click.option(
     "--base",
     type=click.Choice(["quintic", "septic", "jerk-limited"]),
@@ -148,6 +149,7 @@ def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
 def compare(
     chosen: SpecChoice,
     picture: Path | None,
+    every: bool,
     base: str | None,
     as_json: bool,
 ) -> None:
@@ -158,7 +160,7 @@ def compare(
 
     with progress() as tell:
         comparison = run(spec, tell)
-        draw(comparison, picture, tell)
+        draw(comparison, picture, tell, every=every)
     print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
 
 

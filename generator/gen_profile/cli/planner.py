@@ -48,7 +48,8 @@ class PlannerGroup(DefaultGroup):
 def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import containers
 
-    return [CompletionItem(name) for name in (*containers(), "c") if name.startswith(incomplete)]
+    known = (*containers(), "c", "linux", "openplc")
+    return [CompletionItem(name) for name in known if name.startswith(incomplete)]
 
 
 @cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner --preset bay-crane --out deploy")
@@ -68,7 +69,7 @@ def planner() -> None:
     multiple=True,
     default=("plc",),
     shell_complete=_complete_forms,
-    help="Form of the block: plc, another format that carries blocks, or c. Repeatable; plc by default.",
+    help="Form of the block: plc, another that holds one, c, linux or openplc. Repeatable; plc by default.",
 )
 @folder_option
 @click.option(

@@ -53,13 +53,13 @@ class _Step:
         return f"{', '.join(parts)} …"
 
 
-def draw(result: Drawn, picture: Path | None, tell: Progress) -> None:
-    """Draw a result in a file, where one is named."""
+def draw(result: Drawn, picture: Path | None, tell: Progress, **options: bool) -> None:
+    """Draw a result in a file, where one is named; options are those of `plot`."""
     if picture is not None:
         from gen_profile.charts.plot import plot
 
         tell("drawing")
-        plot(result, picture)
+        plot(result, picture, **options)
 
 
 @contextmanager

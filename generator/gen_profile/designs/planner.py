@@ -15,7 +15,7 @@ from gen_profile.designs.design import deliver_judged, file_entry
 from gen_profile.designs.planner_suggestions import planner_suggestions
 from gen_profile.errors import Suggestion
 from gen_profile.planner.design import PlannerBlock, planner_block
-from gen_profile.planner.forms import block_files, block_in, is_c
+from gen_profile.planner.forms import block_files, block_in, is_program
 from gen_profile.planner.full_speed import slow_axes
 from gen_profile.planner.margins import Margins, sensor_margins
 from gen_profile.progress import Progress, no_progress
@@ -158,6 +158,6 @@ def deploy_planner(
 
 
 def _executed(block: PlannerBlock, written: Mapping[str, bytes]) -> str:
-    """Read the text that is proved out of the first file that holds it; C is its translation."""
-    texts = (block_in(Path(name), content) for name, content in written.items() if not is_c(name))
+    """Read the text that is proved out of the first file that holds it; programs hold its translation."""
+    texts = (block_in(Path(name), content) for name, content in written.items() if not is_program(name))
     return next(texts, block.text)

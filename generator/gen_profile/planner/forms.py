@@ -19,10 +19,12 @@ from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.planner.axis_wrapper import planner_wrappers
 from gen_profile_exporters.planner.c_source import c_files
+from gen_profile_exporters.planner.linux.host import linux_files
+from gen_profile_exporters.planner.openplc import OPENPLC, openplc_files
 from gen_profile_exporters.registry import container_of, containers, find_container, format_named
 
 PORTABLE = "plc"
-C = "c"
+PROGRAMS = {"c": c_files, "linux": linux_files, "openplc": openplc_files}
 _PLANNER, _WRAPPER = (
     re.compile(rf"^\s*FUNCTION_BLOCK\s+\w+_planner{end}\s*$", re.MULTILINE | re.IGNORECASE)
     for end in ("", "_(Axis|Velocity)")
@@ -30,32 +32,34 @@ _PLANNER, _WRAPPER = (
 
 
 def require_forms(formats: Iterable[str]) -> None:
-    """Refuse formats that carry no function block and are not C.
+    """Refuse formats that carry no function block and are no programs.
 
     Raises
     ------
     SpecError
     """
-    known = (*containers(), C)
+    known = (*containers(), *PROGRAMS)
     for name in formats:
         if format_named(name) not in known:
             raise SpecError(f"export: a planner block has no form {name!r}{suggestion(name, known)}")
 
 
-def is_c(filename: str) -> bool:
-    """Whether a file of a block is C, out of which its text cannot be read."""
-    return Path(filename).suffix in (".c", ".h")
+def is_program(filename: str) -> bool:
+    """Whether a file of a block is a program, out of which its text cannot be read."""
+    return filename.endswith((".c", ".h", ".py", OPENPLC))
 
 
-def refuse_c(path: Path) -> None:
-    """Refuse a file that is C.
+def refuse_program(path: Path) -> None:
+    """Refuse a file that is C, or a program around it.
 
     Raises
     ------
     ExportError
     """
-    if is_c(path.name):
-        raise ExportError(f"{path}: C is not read back; name its block, in Structured Text or a form of it.")
+    if is_program(path.name):
+        raise ExportError(
+            f"{path}: a program is not read back; name its block, in Structured Text or a form of it."
+        )
 
 
 def refuse_wrapper(path: Path, text: str) -> None:
@@ -78,7 +82,7 @@ def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tupl
     spec : Spec
         Its spec.
     formats : iterable of str
-        Names of formats that carry function blocks, or `C`.
+        Names of formats that carry function blocks, or of `PROGRAMS`.
 
     Raises
     ------
@@ -88,13 +92,14 @@ def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tupl
         A format cannot take this block.
     """
     names = dict.fromkeys(map(format_named, formats))
-    return tuple(file for name in names for file in _files(block, spec, name))
+    files = (file for name in names for file in _files(block, spec, name))
+    return tuple({file.filename: file for file in files}.values())
 
 
 def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
     """Write the block, then its wrappers, each into files of its own."""
-    if format_ == C:
-        return c_files(block.text, spec.name)
+    if format_ in PROGRAMS:
+        return PROGRAMS[format_](block.text, spec.name)
     container, target = find_container(format_), target_of(spec)
     units = {axis.suffix: target.axes[number].factor for number, axis in planned_axes(spec).items()}
     source = parse_function_block(block.text)
@@ -127,13 +132,13 @@ def read_block(path: Path) -> str:
     OutputError
         The file cannot be read.
     ExportError
-        It holds no planner block, or one in C.
+        It holds no planner block, or is a program.
     """
     try:
         content = read_bounded(path)
     except OSError as error:
         raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
-    refuse_c(path)
+    refuse_program(path)
     text = block_in(path, content)
     if not is_planner(text):
         refuse_wrapper(path, text)

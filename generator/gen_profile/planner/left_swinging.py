@@ -16,7 +16,7 @@ from gen_profile.planner.machine import left_by_errors, linearized
 from gen_profile.spec.model import Spec
 
 ERRORS = (0.0, -1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated ones
-TURN = 0.7  # rad, at most, between what machines next to each other do after a history
+TURN = 0.45  # rad, at most, between what machines next to each other do after a history: a block tries fewer
 PIECE = 4096  # cycles that are integrated at once
 _AT_ONCE = 64  # cycles of a wave
 
@@ -61,7 +61,7 @@ class GivenModes:
         """By how much the stated error turns a mode at most, in rad/s."""
         return float((self.poles.imag.max(axis=1) - self.poles[:, 0].imag).max())
 
-    def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, ...]:
+    def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, Array]:
         """Find what sways on where axes stand.
 
         Parameters
@@ -75,9 +75,8 @@ class GivenModes:
 
         Returns
         -------
-        as_given, watched, at_most : (ends,) arrays
-            Sum over axes and modes in m: of the machine as given, and of each mode at its worst error, of
-            `ERRORS` and of all.
+        as_given, at_most : (ends,) arrays
+            Sum over axes and modes in m: of the machine as given, and of each mode at its worst error.
         """
         poles = self.poles.ravel()
         marks = sorted({*ends, *range(0, ends[-1], PIECE)})
@@ -93,8 +92,7 @@ class GivenModes:
         )  # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
         by_mode = np.abs(np.array(kept) * cycle * (np.sinh(half) / half) ** 2 / poles)
         swings = self.gains[..., None] * by_mode.reshape(len(ends), *self.gains.shape, -1)
-        worst = (swings[..., 0], swings[..., : len(ERRORS)].max(axis=-1), swings.max(axis=-1))
-        return tuple(each.sum(axis=(1, 2)) for each in worst)
+        return swings[..., 0].sum(axis=(1, 2)), swings.max(axis=-1).sum(axis=(1, 2))
 
 
 def _wave(turns: NDArray[np.complex128], length: int) -> NDArray[np.complex128]:

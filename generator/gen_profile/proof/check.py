@@ -13,7 +13,7 @@ from gen_profile.artefacts.manifest import PLANNER, Manifest
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import planner_block
-from gen_profile.planner.forms import block_in, is_planner, refuse_c, refuse_wrapper
+from gen_profile.planner.forms import block_in, is_planner, refuse_program, refuse_wrapper
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
@@ -70,9 +70,9 @@ def is_planner_block(path: Path) -> bool:
     OutputError
         It cannot be read.
     ExportError
-        It is C, which may be one and is not read back, or the wrapper of one.
+        It is a program, which is not read back, or the wrapper of one.
     """
-    refuse_c(path)
+    refuse_program(path)
     content = read_artefact(path)
     try:
         container_of(path)

@@ -45,12 +45,8 @@ USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
-BETWEEN = 1.05  # fSwayLeft by what errors leave on the machines that are tried
-AS_STATED = 0.05  # share of what errors leave, by which fSwayLeft may be wrong
-OVERSTATED = 0.12  # likewise, by which it may be too large
+OVERSTATED = 1.12  # fSwayLeft by what errors leave, at most
 BESIDE, MOST_BESIDE = 1e-4, 500.0  # of the allowed sway, likewise; and how often that may be after long
-FAR_TURNED = 0.5  # of SPREAD: where errors have turned a mode so far, machines between those that a
-UNWATCHED = 0.02  # block watches may be left with more than BETWEEN says, by this share at most
 EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
@@ -376,7 +372,7 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
     if followed.modes is None or not ends:
         return
-    as_given, watched, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
+    as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
     limit, stated = followed.sway_limit, followed.issued.get("fSwayLeft")
     if not followed.modes.damped:
         worst = int(np.argmax(as_given))
@@ -386,17 +382,15 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             np.array(ends) * followed.cycle / (EXACTLY * followed.period)
         )  # by frequencies that are rounded
         beside = BESIDE * limit * np.clip(long**2, 1.0, MOST_BESIDE)
-        apart = stated[ends] - BETWEEN * watched
         first = np.array(ends) * followed.cycle * followed.modes.turns < SPREAD  # later sizes add up
-        wrong = np.maximum((apart - OVERSTATED * watched) * first, -apart - AS_STATED * watched) - beside
-        worst = int(np.argmax(wrong))
-        yield Allowance("sway left", ends[worst], float(wrong[worst]), 0.0)
+        above = (stated[ends] - OVERSTATED * at_most) * first - beside
+        worst = int(np.argmax(above))
+        yield Allowance("sway left", ends[worst], float(above[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        far = np.array(ends) * followed.cycle * followed.modes.turns > FAR_TURNED * SPREAD
-        above = at_most - (1.0 + UNWATCHED * far) * stated[ends] - BESIDE * limit
-        worst = int(np.argmax(above))
-        yield Allowance("understated", ends[worst], float(above[worst]), 0.0)
+        below = at_most - stated[ends]
+        worst = int(np.argmax(below))
+        yield Allowance("understated", ends[worst], float(below[worst]), EXACT)
 
 
 def _remains_at_last(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

@@ -41,7 +41,10 @@ MOST_STRANGERS = 64  # connections that have not shown the cookie
 PATIENCE = 10.0  # s for a request to be sent
 NOTHING = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'"  # of a page's policy
 # for what a file asks for: redirected, it would still be the file that asks, and no cookie would be sent
-GO_ON = '<!doctype html><title>gen-profile studio</title><meta http-equiv="refresh" content="0;url=/">'
+GO_ON = (
+    '<!doctype html><title>gen-profile studio</title><link rel="icon" href="data:,">'
+    '<meta http-equiv="refresh" content="0;url=/">'
+)
 
 
 def _code() -> str:

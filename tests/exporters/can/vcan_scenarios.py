@@ -3,7 +3,7 @@
 Run as a program, in a kernel with vcan: FOLDER holds the exported logs, and gets one folder per scenario with
 what candump saw (``bus.log``), what the programs said (``stream.json``, ``drive.json``) and how they ended
 (``codes.json``). The processes are forked from this one, which has loaded the program once: user-mode-linux
-takes five seconds for that.
+takes five seconds for that. None is killed: to a drive, a frozen streamer is a dead one.
 """
 
 import fcntl
@@ -26,21 +26,9 @@ from pathlib import Path
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-import gen_profile.streaming.load
-import gen_profile.streaming.stream
-import gen_profile_exporters.can.simulation.drive_bank
-import gen_profile_exporters.can.streaming.streamer
 from gen_profile.cli import main as gen_profile_command
-from gen_profile.spec.reading import preset_spec
 
-LOADED = (
-    gen_profile.streaming.load,
-    gen_profile.streaming.stream,
-    gen_profile_exporters.can.simulation.drive_bank,
-    gen_profile_exporters.can.streaming.streamer,
-    preset_spec("paper"),  # loads the machine, and what reads specs
-)
-BUS = ("--interface", "socketcan", "--channel", "vcan0")
+DRIVE = ("drive-sim", "--preset", "paper")
 PATIENCE = 60.0  # s, for what takes a second or two; a machine may be busy
 SIOCSIFFLAGS = 0x8914  # linux/sockios.h
 ATTEMPTS = 8  # for a fair trial
@@ -67,9 +55,9 @@ def run(place, log, queue, disturb):
     subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
     with (place / "bus.log").open("w") as bus:
         witness = subprocess.Popen(["candump", "-L", "vcan0"], stdout=bus)
-        drive = _begun(["drive-sim", "--preset", "paper"], place / "drive.json", place / "drive.err")
+        drive = _begun(DRIVE, place / "drive.json", place / "drive.err")
         _wait_for("waiting for a stream", place / "drive.err", drive)
-        streamer = _begun(["stream", str(log)], place / "stream.json", place / "stream.err")
+        streamer = _begun(("stream", str(log)), place / "stream.json", place / "stream.err")
         if disturb is not None:
             _wait_for("stream …", place / "stream.err", streamer)
             time.sleep(UNDER_WAY)
@@ -106,11 +94,22 @@ def _command(arguments, out, err):
     for path, number in ((out, 1), (err, 2)):
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
     sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w", buffering=1)
-    sys.argv = ["gen-profile", *arguments, "--json", *BUS]
+    _gen_profile(arguments, "vcan0")
+
+
+def _gen_profile(arguments, channel):
+    sys.argv = ["gen-profile", *arguments, "--json", "--interface", "socketcan", "--channel", channel]
     try:
         gen_profile_command()
     finally:
         sys.stdout.flush()
+
+
+def _load(*commands):
+    """Have in memory whatever commands need, by giving them for a bus that is not there."""
+    for arguments in commands:
+        with suppress(SystemExit):
+            _gen_profile(arguments, "no-bus")
 
 
 def _wait_for(words, file, process):
@@ -120,7 +119,7 @@ def _wait_for(words, file, process):
         with suppress(FileNotFoundError):
             if words in file.read_text():
                 return
-        time.sleep(0.02)
+        time.sleep(0.05)
 
 
 def _ended(process, patience=PATIENCE):
@@ -144,8 +143,8 @@ def _say(cob_id, data):
     return act
 
 
-def _signal_streamer(number):
-    return lambda streamer, _: os.kill(streamer.pid, number)
+def _interrupt(streamer, _):
+    os.kill(streamer.pid, signal.SIGINT)
 
 
 def _freeze(streamer, _):
@@ -170,9 +169,8 @@ AT_ONCE, AT_LAUNCH_TIME = "pfifo_fast", "fq"  # what a queue does
 SCENARIOS = {
     "whole": (AT_ONCE, None),
     "launched": (AT_LAUNCH_TIME, None),
-    "killed": (AT_ONCE, _signal_streamer(signal.SIGKILL)),
     "frozen": (AT_ONCE, _freeze),
-    "interrupted": (AT_ONCE, _signal_streamer(signal.SIGINT)),
+    "interrupted": (AT_ONCE, _interrupt),
     "second-controller": (AT_ONCE, _say(0x301, bytes(4))),
     "bus-down": (AT_ONCE, _bus_down),
 }
@@ -180,7 +178,9 @@ SCENARIOS = {
 
 def main(folder):
     subprocess.run(["ip", "link", "add", "vcan0", "type", "vcan"], check=True)
-    gc.freeze()  # a collection in a forked process would copy every page, which takes a second here
+    _load(DRIVE, ("stream", str(folder / "paper.log")))
+    gc.freeze()
+    gc.disable()  # a collection in a forked process would copy every page, which takes a second here
     for name, (queue, disturb) in SCENARIOS.items():
         for attempt in range(ATTEMPTS):
             place = folder / f"{name}-{attempt}"

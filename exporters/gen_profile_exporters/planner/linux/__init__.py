@@ -1,0 +1,1 @@
+"""The planner block as the program of a Linux machine."""

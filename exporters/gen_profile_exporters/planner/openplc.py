@@ -1,0 +1,85 @@
+"""A planner block with a program and a task, as OpenPLC Runtime and others that use matiec run it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from gen_profile_exporters.block_source import BlockVariable, parse_function_block
+from gen_profile_exporters.exporter import File
+from gen_profile_exporters.playback.structured_text import plain
+
+OPENPLC = "_openplc.st"
+PROJECT = """\
+(*
+    {file}: for OpenPLC Runtime, from gen-profile: function block, program and task of {milliseconds} ms.
+
+    Inputs and outputs have the addresses below. Arrays (zones, events) have none.
+*)
+{block}
+PROGRAM {name}_program
+VAR
+    fbPlanner : {name};
+END_VAR
+VAR
+{located}
+END_VAR
+fbPlanner(
+    {arguments});
+{results}
+END_PROGRAM
+
+CONFIGURATION Config0
+    RESOURCE Res0 ON PLC
+        TASK task0(INTERVAL := T#{milliseconds}ms, PRIORITY := 0);
+        PROGRAM instance0 WITH task0 : {name}_program;
+    END_RESOURCE
+END_CONFIGURATION
+"""
+CYCLE = "fCycleTime"  # is the task's
+FIRST = {"VAR_INPUT": 0, "VAR_OUTPUT": 64}  # numbers of the addresses
+AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML"}  # coils, memory of 32 and of 64 bits
+
+
+def openplc_files(text: str, file: str) -> tuple[File]:
+    """Write a planner block with a program whose variables have addresses, and a task.
+
+    Parameters
+    ----------
+    text : str
+        The block.
+    file : str
+        With which the file's name begins.
+
+    Raises
+    ------
+    ExportError
+        The text is no function block.
+    """
+    source = parse_function_block(text)
+    (cycle,) = (float(v.initial) for v in source.variables if v.name == CYCLE)
+    inputs, outputs = (
+        [v for v in source.variables if v.section == section and not v.array and v.name != CYCLE]
+        for section in FIRST
+    )
+    project = PROJECT.format(
+        file=plain(file),
+        name=source.name,
+        milliseconds=f"{1e3 * cycle:g}",
+        block=text,
+        located="\n".join([*_located(inputs), *_located(outputs)]),
+        arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
+        results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
+    )
+    return (File(filename=f"{file}{OPENPLC}", content=project.encode("ascii")),)
+
+
+def _located(variables: Iterable[BlockVariable]) -> Iterator[str]:
+    """Declare variables at the next addresses of their areas."""
+    numbers: dict[str, int] = {}
+    for v in variables:
+        number = numbers.setdefault(v.type, FIRST[v.section])
+        numbers[v.type] += 1
+        place = f"{number // 8}.{number % 8}" if v.type == "BOOL" else str(number)
+        initial = f" := {v.initial}" if v.initial else ""
+        comment = f" (* {v.comment} *)" if v.comment else ""
+        yield f"    {v.name} AT %{AREAS[v.type]}{place} : {v.type}{initial};{comment}"
