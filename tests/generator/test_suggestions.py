@@ -120,7 +120,7 @@ def test_limits_that_no_single_one_is_to_blame_for_are_widened_together():
 def test_what_was_found_before_the_work_is_used_up_is_told(monkeypatch):
     spec, tries = preset_spec("paper", ["limits.sway=0.01"]), []
 
-    def least_change(asked, change, *_):
+    def least_change(asked, change, *_, **__):
         if tries:
             raise OutOfWork
         tries.append(suggestions._tried(asked, change(1.5)))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
+from pathlib import Path
 
 import attrs
 
@@ -35,19 +36,7 @@ TABLES = ("cPosition", "cVelocity", "cAcceleration", *(f"cPower{power}" for powe
 SEGMENTS = "cFirst"
 ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
 
-SELECTION = """\
-(* Another motion is taken over while none is played; its checksum then begins anew. *)
-IF (nState <> cWaiting) AND (nState <> cMoving) AND (nProfile <> nSelected)
-        AND (nProfile >= 0) AND (nProfile < cProfiles) THEN
-    nSelected := nProfile;
-    nCheckRow := 0;
-    nCheckColumn := 0;
-    fSum := 0.0;
-    bChecked := FALSE;
-    bLeft := FALSE;
-END_IF;
-
-"""
+SELECTION = Path(__file__).with_name("text").joinpath("selection.st").read_text("ascii") + "\n"
 REFUSAL = "    IF nProfile <> nSelected THEN nErrorId := 6; END_IF;\n"
 _LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others mean nothing without a motion
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -114,6 +114,11 @@ def read_table(text: str, target: Target) -> PlaybackTable:
     table = _table(tokens, layout, target)
     _verify(tokens, table)
     return table
+
+
+def replays(unwrap: Callable[[bytes, Target], BlockSource]) -> Callable[[bytes, Target], SampledProfile]:
+    """Make the `replay` of a format from how it reads its first block; raises as both do."""
+    return lambda content, target: read_block(unwrap(content, target).text(), target)
 
 
 def block_name(name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import attrs
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_exporters.playback.table import PlaybackTable, tabulate
 
 Indices = NDArray[np.int64]
@@ -31,6 +34,11 @@ class QuinticPoints:
     position: Array
     velocity: Array
     acceleration: Array
+
+    def literals(self, axis: int) -> Iterator[tuple[str, ...]]:
+        """Write time, position, velocity and acceleration of an axis, point by point."""
+        columns = (self.time, *(q[:, axis] for q in (self.position, self.velocity, self.acceleration)))
+        return zip(*(map(literal, column.tolist()) for column in columns), strict=True)
 
 
 def quintic_points(profile: Profile, target: Target) -> QuinticPoints:

@@ -72,9 +72,6 @@ def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
         f"Cam.xEnd := {literal(points.time[-1])};\nCam.pce := ADR(aPoints);\n",
     )
     element = plcopen_xml.CODESYS.pou(source)
-    columns = (points.time, *(q[:, axis] for q in (points.position, points.velocity, points.acceleration)))
-    rows = zip(*(map(literal, column.tolist()) for column in columns), strict=True)
-    plcopen_xml.CODESYS.initialise_structures(
-        element, "aPoints", [dict(zip(MEMBERS, row, strict=True)) for row in rows]
-    )
+    rows = [dict(zip(MEMBERS, row, strict=True)) for row in points.literals(axis)]
+    plcopen_xml.CODESYS.initialise_structures(element, "aPoints", rows)
     return element

@@ -12,10 +12,10 @@ import attrs
 from lxml import etree
 
 from gen_profile.errors import ExportError
-from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile.motion.profile import Profile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.structured_text import block_text, read_block
+from gen_profile_exporters.playback.structured_text import block_text, replays
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
 
 XHTML = "http://www.w3.org/1999/xhtml"
@@ -148,17 +148,6 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     return wrap(parse_function_block(block_text(profile, target)), target)
 
 
-def replay(content: bytes, target: Target) -> SampledProfile:
-    """Work out what the project's first function block issues.
-
-    Raises
-    ------
-    ExportError
-        The document is no such project, or its block was altered.
-    """
-    return read_block(unwrap(content, target).text(), target)
-
-
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write a project with any block in it."""
     project = TC6.project(target.name, [TC6.pou(source)])
@@ -177,6 +166,9 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     if root.tag not in [f"{{{dialect.namespace}}}project" for dialect in (TC6, CODESYS)]:
         raise ExportError("The document is no PLCopen project of TC6 version 2; export it again.")
     return _source(child(root, "{*}types/{*}pous/{*}pou"))
+
+
+replay = replays(unwrap)
 
 
 def _default(namespace: str) -> dict[str, str]:

@@ -15,14 +15,14 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.motion.profile import Profile, SampledProfile, sample
+from gen_profile.motion.profile import Profile, sample
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, ordered, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import SIEMENS
 from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
 from gen_profile_exporters.playback.block import layout_of, variable_names
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, is_buffered
-from gen_profile_exporters.playback.structured_text import block_text, literal, read_block
+from gen_profile_exporters.playback.structured_text import block_text, literal, replays
 from gen_profile_exporters.setpoints import axis_table
 from gen_profile_exporters.vendors.cam_points import spline_cycles, spline_error
 
@@ -52,17 +52,6 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     blocks = wrap(source, target)
     cams = _cams(source.name, profile, target)
     return (*blocks, File(filename=f"{target.name}_cam.scl", content=cams.encode("ascii")))
-
-
-def replay(content: bytes, target: Target) -> SampledProfile:
-    """Work out what the first block issues.
-
-    Raises
-    ------
-    ExportError
-        The text is no such block, or it was altered.
-    """
-    return read_block(unwrap(content, target).text(), target)
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
@@ -113,6 +102,9 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     names = variable_names(layout_of(text), len(target.axes))
     plays = {name.lower() for name in names} <= {variable.name.lower() for variable in others + tables}
     return ordered(back, names) if plays else back
+
+
+replay = replays(unwrap)
 
 
 def mailbox_name(block: str) -> str:

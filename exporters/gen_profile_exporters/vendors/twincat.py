@@ -12,12 +12,12 @@ from uuid import NAMESPACE_URL, uuid5
 from lxml import etree
 
 from gen_profile.errors import ExportError
-from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile.motion.profile import Profile
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import TWINCAT
 from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
-from gen_profile_exporters.playback.structured_text import block_name, block_text, literal, read_block
+from gen_profile_exporters.playback.structured_text import block_name, block_text, replays
 from gen_profile_exporters.vendors.cam_points import QuinticPoints, quintic_points
 from gen_profile_exporters.vendors.xml_documents import child, parse_xml, write_xml
 
@@ -34,17 +34,6 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     points = quintic_points(profile, target)
     name = f"GVL_{block_name(target.name).removeprefix('FB_')}"
     return (*wrap(source, target), _variable_list(name, points))
-
-
-def replay(content: bytes, target: Target) -> SampledProfile:
-    """Work out what the block issues.
-
-    Raises
-    ------
-    ExportError
-        The document is no such block, or it was altered.
-    """
-    return read_block(unwrap(content, target).text(), target)
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
@@ -68,6 +57,9 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     return parse_function_block(f"{declaration or ''}\n{body or ''}END_FUNCTION_BLOCK\n")
 
 
+replay = replays(unwrap)
+
+
 def _pou(source: BlockSource) -> File:
     root, pou = _object("POU", source.name)
     pou.set("SpecialFunc", "None")
@@ -87,20 +79,13 @@ def _variable_list(name: str, points: QuinticPoints) -> File:
 
 
 def _points(name: str, points: QuinticPoints, axis: int) -> str:
-    columns = (points.time, *(q[:, axis] for q in (points.position, points.velocity, points.acceleration)))
     last = len(points.time)
-    rows = []
-    for index, values in enumerate(
-        zip(*(map(literal, column.tolist()) for column in columns), strict=True), 1
-    ):
-        time, position, velocity, acceleration = values
-        rows.append(
-            f"        (PointIndex := {index}, FunctionType := MOTIONFUNCTYPE_POLYNOM5_MM, "
-            f"PointType := MOTIONPOINTTYPE_MOTION, RelIndexNextPoint := {int(index < last)}, "
-            f"MasterPos := {time}, SlavePos := {position}, "
-            f"SlaveVelo := {velocity}, SlaveAcc := {acceleration})"
-        )
-    body = ",\n".join(rows)
+    body = ",\n".join(
+        f"        (PointIndex := {index}, FunctionType := MOTIONFUNCTYPE_POLYNOM5_MM, "
+        f"PointType := MOTIONPOINTTYPE_MOTION, RelIndexNextPoint := {int(index < last)}, "
+        f"MasterPos := {time}, SlavePos := {position}, SlaveVelo := {velocity}, SlaveAcc := {acceleration})"
+        for index, (time, position, velocity, acceleration) in enumerate(points.literals(axis), 1)
+    )
     return f"    {name} : ARRAY [1..{last}] OF MC_MotionFunctionPoint := [\n{body}\n    ];"
 
 

@@ -9,16 +9,13 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
-from gen_profile.artefacts.reading import read_artefact
+from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.writing import staged
-from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, no_progress
-from gen_profile.spec.reading import spec_from_dict
 from gen_profile.sweep.case import PASSED
-from gen_profile.sweep.reading import case_files, case_folder, swept_table
+from gen_profile.sweep.reading import case_files, case_folder, case_spec, swept_table
 from gen_profile.sweep.store import grid_of
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import Target, target_of
@@ -155,11 +152,7 @@ def _gathered(
 def _target(folder: Path, row: Mapping[str, Any], name: str) -> Target:
     """Give what the profiles were made for, and the library's own name."""
     with case_folder(folder, row) as case:
-        manifest = parse_manifest(
-            read_artefact(case / FILENAME, DOCUMENT), str(folder / row["folder"] / FILENAME)
-        )
-        spec = spec_from_dict(manifest.spec, case)
-    return attrs.evolve(target_of(spec), name=name)
+        return attrs.evolve(target_of(case_spec(folder, row, case)), name=name)
 
 
 def _block_of(row: dict[str, Any]) -> dict[str, Any]:

@@ -11,18 +11,14 @@ import attrs
 import numpy as np
 from pyarrow import compute
 
-from gen_profile.artefacts.manifest import FILENAME, parse_manifest
-from gen_profile.artefacts.reading import read_artefact
-from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.suggestion import number_meant, suggestion
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.grid import Grid, GridAxis, overrides
-from gen_profile.sweep.reading import case_folder, swept_table, take_out
+from gen_profile.sweep.reading import case_folder, case_spec, swept_table, take_out
 from gen_profile.sweep.rows import cell
 from gen_profile.sweep.store import grid_of
 from gen_profile.sweep.table import Table
@@ -255,7 +251,5 @@ def _judge(folder: Path, row: Mapping[str, Any], wanted: Mapping[str, Any], prog
 
 def _spec_there(folder: Path, row: Mapping[str, Any], case: Path, wanted: Mapping[str, Any]) -> Spec:
     """Put the machine asked for into the spec of a case, whose files lie in a folder."""
-    manifest = read_artefact(case / FILENAME, DOCUMENT)
-    document = parse_manifest(manifest, str(folder / row["folder"] / FILENAME)).spec
     machine = {key: value for key, value in wanted.items() if key.startswith(MACHINE)}
-    return spec_from_dict(overridden(dict(document), overrides(machine)), case)
+    return case_spec(folder, row, case, overrides(machine))

@@ -11,10 +11,13 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import compute
 
-from gen_profile.artefacts.manifest import FILENAME, sha256
+from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import staged
-from gen_profile.bounded_file import read_bounded
+from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.strict_json import parse_json
 from gen_profile.sweep.archive import is_archive, read_archive
 from gen_profile.sweep.grid import Grid
@@ -92,6 +95,17 @@ def case_folder(path: Path, row: Mapping[str, Any]) -> Iterator[Path]:
         for file, content in files.items():
             (Path(name) / file).write_bytes(content)
         yield Path(name)
+
+
+def case_spec(path: Path, row: Mapping[str, Any], case: Path, changes: Sequence[str] = ()) -> Spec:
+    """Read the spec of a case, whose files lie in a folder, with changes such as ``plant.L1=0.5``.
+
+    Raises
+    ------
+    OutputError, SpecError
+    """
+    manifest = parse_manifest(read_artefact(case / FILENAME, DOCUMENT), str(path / row["folder"] / FILENAME))
+    return spec_from_dict(overridden(dict(manifest.spec), changes), case)
 
 
 def take_out(path: Path, row: Mapping[str, Any], folder: Path) -> None:
