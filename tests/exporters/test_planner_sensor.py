@@ -65,7 +65,7 @@ def test_a_swing_that_nobody_computed_is_damped_in_time(spec, compiled, rope, ph
     assert issued["bPromise"][-1] and not issued["bBusy"][-1]
     assert (issued["nPromise"][start : start + 100] == 6.0).all()
     rests = np.flatnonzero(issued["bBusy"])[-1]
-    assert (rests - start) * CYCLE <= 2.4 * SHORTEST[rope]  # it waits neither for the offset nor for the way home
+    assert (rests - start) * CYCLE <= 2.4 * SHORTEST[rope]  # not for the offset, nor the way home
     apart = np.abs(issued["fSwayEstimated"] - issued["sway"])
     assert apart[-1000:].max() < 0.015
     used = issued["bSensorUsed"] > 0.0
