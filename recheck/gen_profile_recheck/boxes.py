@@ -69,10 +69,10 @@ def first(value: Any) -> arb:
 
 def chebyshev_value(degree: int, x: Any) -> Any:
     """Evaluate T_k."""
-    before, now = x, 1
-    for _ in range(degree):
+    before, now = 1, x
+    for _ in range(degree - 1):
         before, now = now, 2 * x * now - before
-    return now
+    return now if degree else 1
 
 
 @cache

@@ -61,17 +61,18 @@ class ScaleMatrix:
 
 
 def inverted(matrix: Matrix) -> Matrix:
-    """Invert a matrix: first nearly by that of its middle, then what is left by elimination."""
+    """Invert a matrix: nearly by that of its middle, and what it is times that one by elimination."""
     middle = arb_mat([[first(one).mid() for one in row] for row in matrix]).inv().tolist()
     nearly = [[0 if one.is_zero() else one.mid() for one in row] for row in middle]
-    rows = [[*one, *other] for one, other in zip(multiplied(nearly, matrix), nearly, strict=True)]
+    unit = [[int(i == j) for j in range(len(matrix))] for i in range(len(matrix))]
+    rows = [[*one, *other] for one, other in zip(multiplied(matrix, nearly), unit, strict=True)]
     for column, row in enumerate(rows):
         row[:] = [0 if _nothing(one) else one / row[column] for one in row]
         for other in rows:
             if other is not row and not _nothing(factor := other[column]):
                 pairs = zip(other, row, strict=True)
                 other[:] = [one if _nothing(two) else one - factor * two for one, two in pairs]
-    return [row[len(rows) :] for row in rows]
+    return multiplied(nearly, [row[len(rows) :] for row in rows])
 
 
 def multiplied(a: Matrix, b: Matrix) -> list[Values]:

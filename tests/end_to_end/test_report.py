@@ -16,6 +16,7 @@ from gen_profile.charts.comparison import comparison_figure
 from gen_profile.comparison.compare import compare
 from gen_profile.designs.design import design
 from gen_profile.errors import OutputError
+from gen_profile.report.content import Section
 from gen_profile.report.page import NEEDED, require_pages
 from gen_profile.report.print import printed
 from gen_profile.report.sections import sections
@@ -361,3 +362,8 @@ def test_a_delivered_file_is_reported_on_by_its_manifest(tmp_path, monkeypatch):
     assert altered.code == 2 and "paper.csv was altered after its export" in altered.errors[-1]
     assert "--set: is for a spec" in run_here("report", "deploy/paper.st", "--set", "name=x").errors[-1]
     assert not Path("other.html").exists()
+
+
+def test_one_paragraph_is_not_taken_for_many_letters():
+    with pytest.raises(TypeError, match="words"):
+        Section(title="Damping", words="A letter each.", blocks=[])

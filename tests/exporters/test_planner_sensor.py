@@ -64,8 +64,12 @@ def test_a_swing_that_nobody_computed_is_damped_in_time(spec, compiled, rope, ph
     assert not issued["fVelocity"][-500:].any()  # at rest, the noise going on
     assert issued["bPromise"][-1] and not issued["bBusy"][-1]
     assert (issued["nPromise"][start : start + 100] == 6.0).all()
-    apart = np.abs(issued["fSwayEstimated"] - issued["sway"])[-1000:]
-    assert apart.max() < 0.015
+    rests = np.flatnonzero(issued["bBusy"])[-1]
+    assert (rests - start) * CYCLE <= 2.4 * SHORTEST[rope]  # not for the offset, nor the way home
+    apart = np.abs(issued["fSwayEstimated"] - issued["sway"])
+    assert apart[-1000:].max() < 0.015
+    used = issued["bSensorUsed"] > 0.0
+    assert (apart - issued["fSwayUncertainty"])[used].max() <= 0.2 * ALLOWED
 
 
 def test_a_rope_that_is_wrong_an_offset_and_a_late_sensor_leave_little(spec, compiled):
@@ -239,7 +243,9 @@ TANK = [
 
 
 def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
-    compiled = compile_counting(planner_block(preset_spec("flexible-joint", JOINT)).text)
+    text = planner_block(preset_spec("flexible-joint", JOINT)).text
+    assert "cWork : DINT := 18364;" in text  # it swings in a third of a second, and waits for plans
+    compiled = compile_counting(text)
     random, sound = np.random.default_rng(0), {"noise": 0.0002, "offset": -0.001, "delay": 0.002}
     arm = MeasuredJoint(CountedBlock(compiled), inertia=0.003368, swing=(0.03, -0.864))
     arm.run(0.023, **sound, random=random, rOverride=0.67)
@@ -260,9 +266,8 @@ def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes():
     tank.run(1.0, noise=0.0002, delay=0.005, random=random, fTarget=1.0, bExecute=1.0)
     tank.run(8.0, noise=0.0002, delay=0.005, random=random)
     assert tank.rows["bDone"][-1]
-    tank.gust = 0.1
-    tank.run(0.5, noise=0.0002, delay=0.005, random=random)
-    tank.gust = 0.0
+    for tank.gust in (0.1, -0.1, 0.0):
+        tank.run(0.4, noise=0.0002, delay=0.005, random=random)
     issued = tank.run(6.0, noise=0.0002, delay=0.005, random=random)
     assert issued["bDamping"][-3000:].any() and issued["bDone"][-1] and issued["bPromise"][-1]
     assert not issued["nSensorFault"].any()

@@ -140,7 +140,7 @@ def test_a_block_with_a_sensor_passes_its_proof(spec, text):
     assert any("sensor" in one.to_dict() for one in proof.judged)
     one = worst_damped(proof)
     damping, remains = damping_figures(spec, proof, trace(spec, text, Histories.of(spec), one.history))
-    gusts, shown, sway = (panel.lines for panel in damping.panels)
+    gusts, shown, sway, _ = (panel.lines for panel in damping.panels)
     strongest = max(abs(gust.acceleration) for gust in one.history.sensed.gusts)
     assert np.abs(gusts[0].y).max() == pytest.approx(strongest, rel=0.02)
     assert np.abs(sway[0].y - sway[1].y)[-300:].max() < 15.0  # mm, true and estimated

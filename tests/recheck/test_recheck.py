@@ -10,7 +10,7 @@ from functools import cache
 import forgeries
 import numpy as np
 import pytest
-from command_line import run_here
+from certificates import certified, contents
 from flint import arb, arb_mat
 
 import gen_profile as gp
@@ -83,23 +83,6 @@ CERTIFIED = [
     pytest.param(("paper", "robustness.uncertain={L1=0.05}"), marks=slow),
     pytest.param(("paper-beta0", "robustness.uncertain={L2=0.05}", "export.cycle_time=0.004"), marks=slow),
 ]
-
-
-def certified(folder, preset, *overrides, form="csv"):
-    """Design a motion and prove it; the artefact and its certificate."""
-    words = [word for override in overrides for word in ("--set", override)]
-    made = run_here("--preset", preset, *words, "--export", form, "--certify", "--out", folder)
-    assert made.code == 0, made.err
-    artefact = next(folder / one.name for one in folder.iterdir() if one.suffix in (".csv", ".st"))
-    return artefact, artefact.with_name(f"{artefact.name}.certificate.json")
-
-
-def contents(artefact, certificate):
-    return (
-        artefact.read_bytes(),
-        artefact.with_name("manifest.json").read_bytes(),
-        certificate.read_bytes(),
-    )
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -13,7 +13,8 @@ PROJECT = """\
 (*
     {file}: for OpenPLC Runtime, from gen-profile: function block, program and task of {milliseconds} ms.
 
-    Inputs and outputs have the addresses below. Arrays (zones, events) have none.
+    Inputs and outputs have the addresses below; arrays (zones, events) have none. What is read together with
+    nCycle is of that cycle.
 *)
 {block}
 PROGRAM {name}_program
@@ -26,6 +27,7 @@ END_VAR
 fbPlanner(
     {arguments});
 {results}
+nCycle := nCycle + 1;
 END_PROGRAM
 
 CONFIGURATION Config0
@@ -37,7 +39,8 @@ END_CONFIGURATION
 """
 CYCLE = "fCycleTime"  # is the task's
 FIRST = {"VAR_INPUT": 0, "VAR_OUTPUT": 64}  # numbers of the addresses
-AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML"}  # coils, memory of 32 and of 64 bits
+AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML", "LINT": "ML"}  # coils, memory of 32 and of 64 bits
+NUMBER = BlockVariable(section="VAR_OUTPUT", name="nCycle", type="LINT", comment="so many")
 
 
 def openplc_files(text: str, file: str) -> tuple[File]:
@@ -66,7 +69,7 @@ def openplc_files(text: str, file: str) -> tuple[File]:
         name=source.name,
         milliseconds=f"{1e3 * cycle:g}",
         block=text,
-        located="\n".join([*_located(inputs), *_located(outputs)]),
+        located="\n".join([*_located(inputs), *_located([NUMBER, *outputs])]),
         arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
         results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
     )
@@ -77,9 +80,10 @@ def _located(variables: Iterable[BlockVariable]) -> Iterator[str]:
     """Declare variables at the next addresses of their areas."""
     numbers: dict[str, int] = {}
     for v in variables:
-        number = numbers.setdefault(v.type, FIRST[v.section])
-        numbers[v.type] += 1
+        area = AREAS[v.type]
+        number = numbers.setdefault(area, FIRST[v.section])
+        numbers[area] += 1
         place = f"{number // 8}.{number % 8}" if v.type == "BOOL" else str(number)
         initial = f" := {v.initial}" if v.initial else ""
         comment = f" (* {v.comment} *)" if v.comment else ""
-        yield f"    {v.name} AT %{AREAS[v.type]}{place} : {v.type}{initial};{comment}"
+        yield f"    {v.name} AT %{area}{place} : {v.type}{initial};{comment}"

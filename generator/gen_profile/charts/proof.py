@@ -139,7 +139,7 @@ def _sound(proof: Proof) -> list[JudgedHistory]:
 
 
 def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
-    """Draw gusts, what the sensor showed, true and estimated sway; then what remained of all histories."""
+    """Draw gusts, what the sensor showed, sway and position; then what remained of all histories."""
     sensor, sensed = spec.planner.sensor, trace.history.sensed
     assert sensor is not None and sensed is not None
     few, end_load = slice(None, None, -(-len(trace.times) // SAMPLES)), spec.machine().end_load_name
@@ -152,6 +152,8 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
     truth = Line(name="true", x=times, y=1e3 * trace.sway["this history"][few], style=Style(colour=INK))
     shown = Line(name="shown", x=times, y=trace.measured[few], style=SETPOINT)
     gusts = Line(name="gusts", x=times, y=pushed, style=SETPOINT)
+    (axis,) = trace.history.axes.values()
+    moved = Line(name="setpoint", x=times, y=trace.issued["fPosition"][few], style=SETPOINT)
     panels = [
         Panel(title="Gusts", x_label=TIME, y_label="push (m/s²)", lines=[gusts], bands=bands),
         Panel(
@@ -171,6 +173,7 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
             levels=[Level(value=sign * limit) for sign in (1.0, -1.0)],
             bands=bands,
         ),
+        Panel(title="Position", x_label=TIME, y_label=f"position ({axis.unit})", lines=[moved], bands=bands),
     ]
     caption = "Shaded: not promised. Dashed in red: what may remain."
     return [Figure(caption=caption, panels=panels, columns=1), _remains_figure(spec, proof)]

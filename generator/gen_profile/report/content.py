@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 import attrs
+from attrs.validators import instance_of
 
 from gen_profile.charts.figure import Figure
 from gen_profile.report.animation import Animation
@@ -121,7 +122,7 @@ class Section:
 
     title: str
     blocks: Sequence[Block]
-    words: Sequence[str] = ()
+    words: Sequence[str] = attrs.field(default=(), validator=instance_of((tuple, list)))  # not one alone
 
     @property
     def anchor(self) -> str:

@@ -144,9 +144,16 @@ def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -
             Listing(title="Its commands", text=_commands(worst.history)),
         ],
     )
-    if gusty is not None:
-        words = "Of the histories with a sound sensor and gusts the one after which most remains."
-        yield Section(title="Damping by the sensor", words=words, blocks=damping_figures(spec, proof, gusty))
+    if gusty is not None and (damped := worst_damped(proof)) is not None:
+        given = damped.history.reported(spec.machine().units)
+        yield Section(
+            title="Damping by the sensor",
+            words=[
+                f"History {damped.number}, of those with a sound sensor and gusts the one after which most "
+                + (f"remains; the block is given {given}." if given else "remains.")
+            ],
+            blocks=damping_figures(spec, proof, gusty),
+        )
     if len(proof.judged) > 1:
         yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(spec, proof)])
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
