@@ -24,12 +24,12 @@ class DirectLink:
 
     def write(self, request):
         self.operations += 1
-        self.block.request(request)
+        self.block.set("aRequest", request)
 
     def read(self):
         self.operations += 1
         self.block.run(1)
-        return self.block.reply()
+        return self.block.outputs["aReply"].copy()
 
     def reopen(self):
         self.operations += 1

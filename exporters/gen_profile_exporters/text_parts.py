@@ -25,7 +25,7 @@ def text_parts(path: str) -> dict[str, Any]:
 
 
 def filled(path: str, **values: object) -> str:
-    """Read a C file of this package, and put in what stands there as ``$name``."""
+    """Read a program of this package, and put in what stands there as ``$name``."""
     return Template((FOLDER / path).read_text("ascii")).substitute(values)
 
 

@@ -7,36 +7,9 @@ from collections.abc import Iterable, Iterator
 from gen_profile_exporters.block_source import BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File
 from gen_profile_exporters.playback.structured_text import plain
+from gen_profile_exporters.text_parts import text_parts
 
 OPENPLC = "_openplc.st"
-PROJECT = """\
-(*
-    {file}: for OpenPLC Runtime, from gen-profile: function block, program and task of {milliseconds} ms.
-
-    Inputs and outputs have the addresses below; arrays (zones, events) have none. What is read together with
-    nCycle is of that cycle.
-*)
-{block}
-PROGRAM {name}_program
-VAR
-    fbPlanner : {name};
-END_VAR
-VAR
-{located}
-END_VAR
-fbPlanner(
-    {arguments});
-{results}
-nCycle := nCycle + 1;
-END_PROGRAM
-
-CONFIGURATION Config0
-    RESOURCE Res0 ON PLC
-        TASK task0(INTERVAL := T#{milliseconds}ms, PRIORITY := 0);
-        PROGRAM instance0 WITH task0 : {name}_program;
-    END_RESOURCE
-END_CONFIGURATION
-"""
 CYCLE = "fCycleTime"  # is the task's
 FIRST = {"VAR_INPUT": 0, "VAR_OUTPUT": 64}  # numbers of the addresses
 AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML", "LINT": "ML"}  # coils, memory of 32 and of 64 bits
@@ -64,7 +37,7 @@ def openplc_files(text: str, file: str) -> tuple[File]:
         [v for v in source.variables if v.section == section and not v.array and v.name != CYCLE]
         for section in FIRST
     )
-    project = PROJECT.format(
+    project = text_parts("planner/openplc.st")["project"].format(
         file=plain(file),
         name=source.name,
         milliseconds=f"{1e3 * cycle:g}",
@@ -73,7 +46,7 @@ def openplc_files(text: str, file: str) -> tuple[File]:
         arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
         results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
     )
-    return (File(filename=f"{file}{OPENPLC}", content=project.encode("ascii")),)
+    return (File(filename=f"{file}{OPENPLC}", content=f"{project}\n".encode("ascii")),)
 
 
 def _located(variables: Iterable[BlockVariable]) -> Iterator[str]:

@@ -11,7 +11,6 @@ import numpy as np
 from gen_profile.deployment.table import BlockTable
 from gen_profile.motion.profile import Array
 from gen_profile.planner.execution import BlockInstance
-from gen_profile_exporters.playback.buffers import REPLY, REQUEST
 
 LOOPBACK = "127.0.0.1"  # of the servers that it runs behind
 LONGEST = 0.02  # s between two looks at what their clients wrote
@@ -68,14 +67,6 @@ class SimulatedBlock:
             if due > called:
                 turn(due - called)
                 called = due
-
-    def request(self, values: Array) -> None:
-        """Write a request."""
-        self.set(REQUEST, values)
-
-    def reply(self) -> Array:
-        """Read the reply."""
-        return self.outputs[REPLY].copy()
 
 
 def _places(elements: Iterable[str]) -> dict[str, list[int]]:

@@ -111,7 +111,7 @@ def _batch(
     greatest = peaks(feed, max_step)
     straight = rows[0].group == "samples" and spec.check.path.between == "linear"
     if straight or follows_exactly(rows[0]):
-        other = peaks(_every_other(feed), max_step)
+        other = peaks(feed.thinned(2), max_step)
     else:
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
     between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest.max())
@@ -131,12 +131,6 @@ def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) 
     spacing = phase / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
     until = standstill(spec, setpoints) + observation_time(spec)
     return begin + grid_times(grid_length(until - begin, spacing), spacing)
-
-
-def _every_other(feed: Feed) -> Feed:
-    """Leave out every second point, but not the last."""
-    kept = np.unique([*range(0, len(feed.times), 2), len(feed.times) - 1])
-    return Feed(times=feed.times[kept], position=feed.position[kept])
 
 
 def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:

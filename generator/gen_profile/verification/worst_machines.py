@@ -175,9 +175,7 @@ def _coarse(way: _Way, setpoints: SampledProfile, step: float) -> Feed:
     feed, path = transmitted(way.spec, setpoints, [row]), way.spec.check.path
     if way.group != SEARCH and (path.quantum > 0.0 or path.between != "linear"):
         return feed
-    every = max(int(step / setpoints.cycle_time), 1)
-    kept = np.unique([*range(0, len(feed.times), every), len(feed.times) - 1])
-    return Feed(times=feed.times[kept], position=feed.position[kept])
+    return feed.thinned(max(int(step / setpoints.cycle_time), 1))
 
 
 def _new(places: Array, known: Sequence[Array]) -> Iterator[Array]:

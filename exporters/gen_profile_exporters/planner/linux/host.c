@@ -1,12 +1,12 @@
 /*
- * @file_linux.c: the planner of @file.c in a real-time loop, by which a Linux machine is a controller, from
+ * ${file}_linux.c: the planner of $file.c in a real-time loop, by which a Linux machine is a controller, from
  * gen-profile. Not a safety function: keep emergency stop and STO in hardware.
  *
- *     cc -std=c11 -O2 -o @name "@file_linux.c" -lm
- *     sudo ./@name [SECONDS]        until Ctrl-C or SIGTERM
+ *     cc -std=c11 -O2 -o $name "${file}_linux.c" -lm
+ *     sudo ./$name [SECONDS]        until Ctrl-C or SIGTERM
  *
- * It is called every @cycle s. Other programs reach it in shared memory, /dev/shm/@name, which is laid out as `struct
- * image` below: one writes the inputs, a fieldbus's takes the setpoints, and "@file_opcua.py" serves both by OPC UA.
+ * It is called every $cycle s. Other programs reach it in shared memory, /dev/shm/$name, which is laid out as `struct
+ * image` below: one writes the inputs, a fieldbus's takes the setpoints, and "${file}_opcua.py" serves both by OPC UA.
  * All that belongs to one cycle stands in one row.
  *
  * Who commands must change bAlive, in any way, every SECONDS (1; 0 for never): while it does not, bStop is set. The
@@ -14,7 +14,7 @@
  * punctual its cycles were.
  */
 #define _GNU_SOURCE
-#include "@file.c"
+#include "$file.c"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -32,9 +32,9 @@
 #error "numbers of 64 bits are not read and written whole here: take a 64-bit system"
 #endif
 
-enum { INPUTS = @inputs, COLUMNS = @columns, ROWS = 16384, NAME = 48, PRIORITY = 80 };
-enum { ALIVE = 0, STOP = @stop, QUICK_STOP = @quick_stop, LATE = COLUMNS - 3, STEP, OVERRUNS };
-static const int64_t SECOND = 1000000000, PERIOD = @period; /* ns */
+enum { INPUTS = $inputs, COLUMNS = $columns, ROWS = 16384, NAME = 48, PRIORITY = 80 };
+enum { ALIVE = 0, STOP = $stop, QUICK_STOP = $quick_stop, LATE = COLUMNS - 3, STEP, OVERRUNS };
+static const int64_t SECOND = 1000000000, PERIOD = $period; /* ns */
 
 struct image {
     char kind[16];
@@ -47,10 +47,10 @@ struct image {
 };
 
 static const char *const NAMES[COLUMNS] = {
-@names
+$names
 };
 static const double FIRST[INPUTS] = {
-@first
+$first
 };
 
 static volatile sig_atomic_t signals;
@@ -84,23 +84,23 @@ static void give_up(const char *what)
 /* Share the image, and keep others that would drive the same axes out. */
 static struct image *shared_image(void)
 {
-    const int file = shm_open("/@name", O_RDWR | O_CREAT, 0660);
+    const int file = shm_open("/$name", O_RDWR | O_CREAT, 0660);
     if (file < 0 || flock(file, LOCK_EX | LOCK_NB)) {
-        give_up(file < 0 ? "/dev/shm/@name" : "@name runs already; end that first");
+        give_up(file < 0 ? "/dev/shm/$name" : "$name runs already; end that first");
     }
     struct image *image = MAP_FAILED;
     if (ftruncate(file, sizeof *image) == 0) {
         image = mmap(NULL, sizeof *image, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
     }
     if (image == MAP_FAILED) {
-        give_up("/dev/shm/@name");
+        give_up("/dev/shm/$name");
     }
     memset(image, 0, sizeof *image); /* also of a program that was killed */
     image->inputs = INPUTS;
     image->columns = COLUMNS;
     image->rows = ROWS;
     image->process = getpid();
-    image->cycle_time = @cycle;
+    image->cycle_time = $cycle;
     for (int k = 0; k < COLUMNS; ++k) {
         strcpy(image->names[k], NAMES[k]);
     }
@@ -124,25 +124,25 @@ static void begin_real_time(void)
     }
 }
 
-static void take(const double *row, @name_inputs *in)
+static void take(const double *row, ${name}_inputs *in)
 {
-@taken
+$taken
 }
 
-static void issue(const @name_outputs *out, double *row)
+static void issue(const ${name}_outputs *out, double *row)
 {
-@issued
+$issued
 }
 
 /* Call the planner in every cycle until a signal has stopped it; one that comes too late is left out. */
 static void run(struct image *image, int64_t patience)
 {
-    static @name_state state;
-    @name_inputs in;
-    @name_outputs out = {0};
+    static ${name}_state state;
+    ${name}_inputs in;
+    ${name}_outputs out = {0};
     double alive = 0.0, late = 0.0, latest = 0.0, longest = 0.0;
     int64_t cycles = 0, overruns = 0, due = now() + PERIOD, heard = due - patience;
-    @name_init(&state, &in);
+    ${name}_init(&state, &in);
     for (; !signals || out.bBusy || cycles == 0; due += PERIOD) {
         for (; due < now(); due += PERIOD) {
             ++overruns;
@@ -160,7 +160,7 @@ static void run(struct image *image, int64_t patience)
         row[STOP] = row[STOP] > 0.0 || signals || (patience && begun - heard >= patience);
         row[QUICK_STOP] = row[QUICK_STOP] > 0.0 || signals > 1;
         take(row, &in);
-        @name_step(&state, &in, &out);
+        ${name}_step(&state, &in, &out);
         issue(&out, row);
         row[LATE] = (begun - due) / 1e9;
         row[STEP] = (now() - begun) / 1e9;
@@ -189,6 +189,6 @@ int main(int count, char **words)
     struct image *image = shared_image();
     begin_real_time();
     run(image, (int64_t)(seconds * 1e9));
-    shm_unlink("/@name");
+    shm_unlink("/$name");
     return 0;
 }

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 from gen_profile_exporters.exporter import File
 from gen_profile_exporters.planner.c_source import c_files, c_name
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_exporters.st_to_c import translate
+from gen_profile_exporters.text_parts import filled
 
 GIVEN = {"BOOL": "row[{}] > 0.0", "LREAL": "row[{}]"}
 ALIVE, PUNCTUAL = "bAlive", ("fCycleLate", "fCycleWork", "nCyclesLeftOut")  # the host's own
@@ -55,14 +53,10 @@ def linux_files(text: str, file: str) -> tuple[File, ...]:
     return (
         *c_files(text, file),
         *(
-            File(filename=f"{file}_{name}", content=_filled(template, values).encode("ascii"))
+            File(
+                filename=f"{file}_{name}",
+                content=filled(f"planner/linux/{template}", **values).encode("ascii"),
+            )
             for name, template in (("linux.c", "host.c"), ("opcua.py", "opcua.py"))
         ),
-    )
-
-
-def _filled(template: str, values: dict[str, str]) -> str:
-    text = Path(__file__).with_name(template).read_text("ascii")
-    return re.sub(
-        "@(" + "|".join(sorted(values, key=len, reverse=True)) + ")", lambda hole: values[hole[1]], text
     )

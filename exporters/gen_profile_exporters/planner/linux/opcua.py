@@ -1,9 +1,9 @@
-"""OPC UA server of the planner that runs in this Linux machine as @name, from gen-profile.
+"""OPC UA server of the planner that runs in this Linux machine as $name, from gen-profile.
 
     pip install asyncua
-    python3 "@file_opcua.py" [--port 4840] [--certificate me.der --key me.pem --user NAME]
+    python3 "${file}_opcua.py" [--port 4840] [--certificate me.der --key me.pem --user NAME]
 
-The object @name has the planner's inputs, which clients write, and its outputs; Row, which is all of one
+The object $name has the planner's inputs, which clients write, and its outputs; Row, which is all of one
 cycle at once (its number, then what Names says); and a method Rows(first), which gives 1000 rows at most from
 a number on: a client that asks often enough misses no cycle. Inputs are taken over in the order of writing.
 
@@ -28,7 +28,7 @@ from asyncua import Server, ua, uamethod
 from asyncua.common.callback import CallbackType
 from asyncua.crypto.permission_rules import User, UserRole
 
-NAME = "@name"
+NAME = "$name"
 HEAD = struct.Struct("16s4id")  # kind, inputs, columns, rows, process, s of a cycle
 KIND = b"gen-profile 1"
 LETTERS = 48  # of a name
@@ -168,7 +168,7 @@ def main() -> None:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=f"OPC UA server of {NAME}.")
     parser.add_argument("--port", type=int, default=4840)
-    parser.add_argument("--certificate", help="of this machine, DER or PEM; its URI is urn:@name")
+    parser.add_argument("--certificate", help="of this machine, DER or PEM; its URI is urn:$name")
     parser.add_argument("--key", help="of the certificate, PEM")
     parser.add_argument("--user", help="who is let in, by the environment's OPCUA_PASSWORD")
     options = parser.parse_args()
