@@ -193,7 +193,7 @@ def _pack_compiler(ziglang: Path, licences: Path) -> None:
     licences.mkdir()
     for text in [*ziglang.rglob("LICENSE*"), *ziglang.rglob("COPYING*")]:
         shutil.copy(text, licences / "-".join(text.relative_to(ziglang).parts))
-    filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, "preset": 9}]
+    filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, "preset": 6}]
     with (
         lzma.open(ziglang / "zig.tar.xz", "wb", filters=filters) as packed,
         tarfile.open(fileobj=packed, mode="w") as archive,

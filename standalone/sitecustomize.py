@@ -1,5 +1,6 @@
 """Import a standalone folder's Python code from `code.zip`; extension modules and data lie beside it."""
 
+import os
 import sys
 import zipfile
 from importlib.machinery import ModuleSpec, SourcelessFileLoader
@@ -9,6 +10,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ARCHIVE = zipfile.ZipFile(HERE / "code.zip")
 NAMES = frozenset(ARCHIVE.namelist())
+
+# a list of this folder's few fonts would spoil other Matplotlibs of the user, which share their cache
+os.environ.setdefault("MPLCONFIGDIR", os.path.expanduser("~/.cache/gen-profile-matplotlib"))  # noqa: PTH111
 
 
 class Loader(SourcelessFileLoader):
