@@ -414,6 +414,8 @@ class TestZones:
         parts = [block.hold(3000)]
         parts += [block.hold(9000, bExecute=1.0, fTarget=target) for target in (19.0, 3.0, 25.0, 10.0)]
         parts += [block.hold(6000, bVelocity=1.0, fVelocityCommand=speed) for speed in (1.1, -1.1)]
+        for rope in (6.0, 4.0, 8.0, 5.0):  # a pulse is weighed while modes are found: it took 5990
+            parts += [block.hold(500, fVelocityCommand=speed, fL1=rope) for speed in (0.3, -0.2, 0.1)]
         assert max(part["operations"].max() for part in parts) <= 5000
         with pytest.raises(SpecError, match=r"planner\.operations: at least 5000 with zones"):
             planner_block(preset_spec("bay-crane", ["planner.zones=true", "planner.operations=3000"]))

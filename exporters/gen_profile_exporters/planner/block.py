@@ -26,7 +26,7 @@ on the way, and likewise what is for zones and events where there are none.
 - ``calming.st`` calms what sways since live parameters changed. With the left eigenvectors l of the matrix a
   mode is l * sway; what the committed future leaves in it is a sum over its coefficients, as of a plan, and
   so is its slope. A pulse of the kernel's shape that ends where it begins takes both away.
-- ``variations.st``, ``left.st``: what the committed future leaves on machines of other frequencies is a
+- ``variations.st``, ``left.st``, ``between.st``: what the committed future leaves on machines of other frequencies is a
   state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan together leave.
 - ``sensor.st`` estimates what sways, and ``damping.st`` damps the slowest mode by pulses of another kernel.
 - ``events.st`` tells what is other than in the cycle before.
@@ -347,6 +347,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cLongestKernel": _longest_kernel(c),
         "cLongKernel": min(LONG_KERNEL, _longest_kernel(c)),
         "cPulseChunk": _pulse_chunk(c),
+        "cPulseWork": _pulse_work(c),
         "cWide": WIDE,
         "cChunk": CHUNK,
         "cFuture": FUTURE,
@@ -421,20 +422,27 @@ def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 110 + 4 * c.modes * (4 * c.modes + 17)
     axes = (120 + (following if c.rates else 0) + (23 * ZONES if c.zones else 0)) * len(c.axes)
-    return axes - 35 + of_errors.cycle_work(_watched(c)) + of_sensor.cycle_work(c.sensor, c.modes)
+    finer, sensed = of_errors.cycle_work(_watched(c)), of_sensor.cycle_work(c.sensor, c.modes)
+    return axes - 35 + 15 * len(c.live) + finer + sensed
 
 
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    left = _work(c) - _cycle_work(c) - of_errors.FINE_BEGIN - 120
+    spent = _cycle_work(c) + of_errors.rest_work(_watched(c), c.modes * len(c.axes)) + 140
+    left = _work(c) - spent
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
-    spent = _cycle_work(c) + of_errors.FINE_BEGIN + 80 + (1 + 3 * len(c.axes)) * FUTURE
-    return (_work(c) - spent) // (55 + (5 * ZONES if c.zones else 0))
+    spent = _cycle_work(c) + of_errors.FINE_BEGIN + 80 + 60 * len(c.axes) + (1 + 3 * len(c.axes)) * FUTURE
+    return (_work(c) - spent) // _pulse_work(c)
+
+
+def _pulse_work(c: PlannerConstants) -> int:
+    """Operations of each slot of a pulse that is weighed."""
+    return 60 + (7 * ZONES if c.zones else 0)
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:

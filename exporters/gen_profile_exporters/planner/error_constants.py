@@ -40,6 +40,11 @@ def cycle_work(constants: Mapping[str, int]) -> int:
     return FINE_STEP * constants.get("cFineChunk", 0)
 
 
+def rest_work(constants: Mapping[str, int], modes: int) -> int:
+    """Count those of a cycle at rest, for so many modes of all axes."""
+    return (16 * constants["cVariations"] + 20) * modes if constants["cVariations"] else 0
+
+
 def real(fine: int, least_decay: float) -> dict[str, float]:
     """Give the others."""
     return {
