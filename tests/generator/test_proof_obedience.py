@@ -205,7 +205,7 @@ FAULTS = {
     "beyond": with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.7,)), STOPS),
     "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
     "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
-    "sway left": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
+    "sway left": attrs.evolve(with_output("fSwayLeft", slice(0, None), 9.0), modes=MODES, sway_limit=0.05),
     "understated": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
     "event": with_output("nEvents", 0, 0.0),
     "promise": with_output("bPromise", 300, 0.0),
