@@ -26,8 +26,8 @@ on the way, and likewise what is for zones and events where there are none.
 - ``calming.st`` calms what sways since live parameters changed. With the left eigenvectors l of the matrix a
   mode is l * sway; what the committed future leaves in it is a sum over its coefficients, as of a plan, and
   so is its slope. A pulse of the kernel's shape that ends where it begins takes both away.
-- ``variations.st``, ``left.st``, ``between.st``: what the committed future leaves on machines of other frequencies is a
-  state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan together leave.
+- ``variations.st``, ``left.st``, ``between.st``: what the committed future leaves on machines of other
+  frequencies is a state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan leave.
 - ``sensor.st`` estimates what sways, and ``damping.st`` damps the slowest mode by pulses of another kernel.
 - ``events.st`` tells what is other than in the cycle before.
 - ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
