@@ -27,12 +27,10 @@ on the way, and likewise what is for zones and events where there are none.
   mode is l * sway; what the committed future leaves in it is a sum over its coefficients, as of a plan, and
   so is its slope. A pulse of the kernel's shape that ends where it begins takes both away.
 - ``variations.st``, ``left.st``, ``between.st``: what the committed future leaves on machines of other
-  frequencies is a state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan together
-  leave.
+  frequencies is a state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan leave.
 - ``sensor.st`` estimates what sways, and ``damping.st`` damps the slowest mode by pulses of another kernel.
 - ``events.st`` tells what is other than in the cycle before.
-- ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
-  which slow zones are near.
+- ``formulas/``: modes at the live parameters, complex powers, columns that a row fills, slow zones near.
 """
 
 from __future__ import annotations
@@ -66,6 +64,7 @@ WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behin
 REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
 CHUNK = 45  # slots that a phase takes at once
+PULSE_WORK, ZONED_WORK = 60, 7 * ZONES  # operations of each slot of a pulse that is weighed; with zones
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 RAMP_LEAST = 0.05  # of full speed: a change of the stick that is planned for
 RAMP_LEAST_SLOTS = 9
@@ -348,7 +347,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cLongestKernel": _longest_kernel(c),
         "cLongKernel": min(LONG_KERNEL, _longest_kernel(c)),
         "cPulseChunk": _pulse_chunk(c),
-        "cPulseWork": _pulse_work(c),
+        "cPulseWork": PULSE_WORK + ZONED_WORK * c.zones,
         "cWide": WIDE,
         "cChunk": CHUNK,
         "cFuture": FUTURE,
@@ -430,20 +429,14 @@ def _cycle_work(c: PlannerConstants) -> int:
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    spent = _cycle_work(c) + of_errors.rest_work(_watched(c), c.modes * len(c.axes)) + 140
-    left = _work(c) - spent
+    left = _work(c) - _cycle_work(c) - of_errors.rest_work(_watched(c), c.modes * len(c.axes)) - 140
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
     spent = _cycle_work(c) + of_errors.FINE_BEGIN + 80 + 60 * len(c.axes) + (1 + 3 * len(c.axes)) * FUTURE
-    return (_work(c) - spent) // _pulse_work(c)
-
-
-def _pulse_work(c: PlannerConstants) -> int:
-    """Operations of each slot of a pulse that is weighed."""
-    return 60 + (7 * ZONES if c.zones else 0)
+    return (_work(c) - spent) // (PULSE_WORK + ZONED_WORK * c.zones)
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:
