@@ -163,12 +163,10 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 continue
         latest = begin + followed.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
-        damped = np.flatnonzero(
-            followed.sensed("bDamping")[begin:first]
-        )  # on the way: it counts from then on
-        since = begin + int(damped[-1]) if damped.size and order.kind == POSITION else begin
-        if first < end or end > latest:
-            yield Allowance(order.kind, begin, (first - since) * followed.cycle, allowed)
+        if first < end:
+            yield Allowance(order.kind, begin, (first - begin) * followed.cycle, allowed)
+        elif end > latest:
+            yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
         if first < end and order.kind == POSITION:
             yield from _left(followed, motion, (first, end), allowed)
 
