@@ -5,7 +5,7 @@ P = J G + ∂f/∂a − dG/dt. With ε = ε̄ + ψ', the motion X = x̃ + G ε +
 
     Ẋ − f(X, a, v) = x̃' − f(x̃, ã, ṽ) − P ε̄ + (dP/dt − J P) ψ − ½ D²f
 
-with second derivatives along (G ε + P ψ, ε, ε'), at places between. How far true motions are from X is told
+with second derivatives along (G ε + P ψ, ε, ε'), at places between. How far true motions are from X is measured
 in y = (q, w + D(q, ã) ṽ), the coordinates and their rates if axes were smooth.
 """
 
