@@ -40,7 +40,7 @@ class AxisPiece:
 
 
 def quintic(
-    half: arb, positions: Sequence[float], speeds: Sequence[float], bends: Sequence[float]
+    half: arb, positions: Sequence[float], speeds: Sequence[float], accelerations: Sequence[float]
 ) -> arb_poly:
     """Give the polynomial on −1 … 1 with position, velocity and acceleration at both ends."""
 
@@ -51,7 +51,7 @@ def quintic(
         return (1 - arb(0.5) * near) ** 3 * (value + second * near + third * near * near)
 
     (p, q), (u, v), (b, c) = (
-        [half**n * one for one in pair] for n, pair in enumerate([positions, speeds, bends])
+        [half**n * one for one in pair] for n, pair in enumerate([positions, speeds, accelerations])
     )
     return at_end(X, q, v, c) + at_end(-X, p, -u, b)
 

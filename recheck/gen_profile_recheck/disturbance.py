@@ -5,8 +5,8 @@ P = J G + ∂f/∂a − dG/dt. With ε = ε̄ + ψ', the motion X = x̃ + G ε +
 
     Ẋ − f(X, a, v) = x̃' − f(x̃, ã, ṽ) − P ε̄ + (dP/dt − J P) ψ − ½ D²f
 
-with second derivatives along (G ε + P ψ, ε, ε'), at places between. How far true motions are from X is told
-in y = (q, w + D(q, ã) ṽ), the coordinates and their rates if axes were smooth.
+with second derivatives along (G ε + P ψ, ε, ε'), at places between. How far true motions are from X is
+measured in y = (q, w + D(q, ã) ṽ), the coordinates and their rates if axes were smooth.
 """
 
 from __future__ import annotations
@@ -75,34 +75,34 @@ class Disturbance:
         beside = self.shift if off is None else [one + two for one, two in zip(self.shift, off, strict=True)]
         return [one + two for one, two in zip(self.state.x, beside, strict=True)]
 
-    def turned(self, change: Sequence[Any], way: int = 1, off: Sequence[Any] | None = None) -> Values:
+    def in_rates(self, change: Sequence[Any], way: int = 1, off: Sequence[Any] | None = None) -> Values:
         """Give ∂y/∂x times a vector, or with −1 its inverse times one."""
         a, v, _ = self.state.axes
         q = self.near(off)[: len(change) // 2]
-        return self.machine.turned(q, change, a, [way * one for one in v], self.state.k)
+        return self.machine.in_rates(q, change, a, [way * one for one in v], self.state.k)
 
-    def leap(self, leap: Sequence[arb], begins: bool) -> Values:
+    def leap(self, leap: Sequence[arb], at_start: bool) -> Values:
         """Enclose by how much y leaps where x̃ does, and at the beginning how far it is from the machine's."""
         (a, v, _), wides = self.state.axes, [wide(one) for one in leap]
         total = wides
         for axis, unit, lift in zip(self.piece.axes, self.units, self.lifts, strict=True):
             lifts = self.machine.rate(moved(self.near(wides), wides, 2), a, moved(v, unit, 1), self.state.k)
             own = [along(along(one, 1), 2) * wide(axis.gap.most) for one in lifts]
-            if begins:
+            if at_start:
                 own = [one + two * wide(axis.first) for one, two in zip(own, lift, strict=True)]
             total = [one + two for one, two in zip(total, own, strict=True)]
-        return self.turned(total, off=total)
+        return self.in_rates(total, off=total)
 
     def shaken(self, off: Sequence[arb]) -> Iterator[tuple[list[Values], arb]]:
         """List derivatives of ∂ẏ/∂y along axes and speeds where y is off by so much, and means of these."""
         size, (a, v, _) = range(len(off)), self.state.axes
-        columns = [self.turned([int(row == one) for row in size], -1, off) for one in size]
-        x = self.near(self.turned(off, -1, off))
+        columns = [self.in_rates([int(row == one) for row in size], -1, off) for one in size]
+        x = self.near(self.in_rates(off, -1, off))
         for one, column in zip(size, columns, strict=True):
             x = moved(x, column, SINGLE << one)
         for axis, unit in zip(self.piece.axes, self.units, strict=True):
             for order, mean in enumerate([axis.gap.mean, axis.rate.mean]):
                 near, fast = (moved(one, unit, 1) if n == order else one for n, one in enumerate(self.axes))
                 rate = self.machine.rate(x, near, fast, self.state.k)
-                turned = self.machine.turned(x[: len(x) // 2], rate, a, v, self.state.k)
-                yield [[along(along(entry, 1), SINGLE << one) for one in size] for entry in turned], mean
+                changed = self.machine.in_rates(x[: len(x) // 2], rate, a, v, self.state.k)
+                yield [[along(along(entry, 1), SINGLE << one) for one in size] for entry in changed], mean

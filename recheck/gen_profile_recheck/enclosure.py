@@ -52,7 +52,7 @@ def require(
             before, scale = scale, ScaleMatrix(piece, scales[number])
             error *= scale.change(before)
         proof = PieceProof(piece, scale, [claim for claim in claims if number >= claim.first])
-        error += scale.length(proof.beside.leap(_leap(pieces, number, start), begins=number == 0))
+        error += scale.length(proof.beside.leap(_leap(pieces, number, start), at_start=number == 0))
         error = proof.error_after(error)
 
 
@@ -86,7 +86,7 @@ class PieceProof:
         fine = tuple(count + MORE for count in self.piece.box.terms)
         outputs = self.piece.enclosed(self._defect_and_sways, TERMS, fine)
         defect = [wide(one.size) for one in outputs[: 2 * self.n]]
-        lengths = (self.scale.length(self.beside.turned(one)) for one in [defect, *self.beside.terms])
+        lengths = (self.scale.length(self.beside.in_rates(one)) for one in [defect, *self.beside.terms])
         error, greatest, off = self._step(error, sum(lengths, start=arb(0)) * 2 * self.piece.half)
         for claim, sway in zip(self.claims, outputs[2 * self.n :], strict=True):
             away = self._away(claim.loads, off, greatest)
@@ -124,7 +124,7 @@ class PieceProof:
     def _growth(self, off: Sequence[arb]) -> arb:
         """Bound the logarithmic norm on smooth axes by Gershgorin's circles of the symmetric part."""
         n, indices = self.n, range(2 * self.n)
-        tube = [one + two for one, two in zip(off, self.beside.turned(self.beside.shift), strict=True)]
+        tube = [one + two for one, two in zip(off, self.beside.in_rates(self.beside.shift), strict=True)]
 
         def symmetric(s: MachineState) -> Values:
             a, v, _ = s.axes
@@ -133,8 +133,8 @@ class PieceProof:
             lower = derivatives(lambda q, dq: self.machine.bend(q, dq, s.axes, s.k), y[:n], y[n:])
             to, back = self.scale.at(s)
             matrix = [[int(i + n == j) for j in indices] for i in range(n)] + lower
-            turned = multiplied(multiplied(to, matrix), back)
-            return [(turned[i][j] + turned[j][i]) / arb(2) for i in indices for j in indices if j <= i]
+            changed = multiplied(multiplied(to, matrix), back)
+            return [(changed[i][j] + changed[j][i]) / arb(2) for i in indices for j in indices if j <= i]
 
         found = iter(self.piece.enclosed(symmetric, FEW_TERMS, self.piece.box.terms))
         entry = {(i, j): next(found) for i in indices for j in indices if j <= i}
@@ -146,9 +146,9 @@ class PieceProof:
         beside, k, q = self.beside, self.beside.state.k, self.beside.near(off)[: self.n]
         gains = derivatives(lambda q, a: self.machine.sway(q, a, k)[loads], q, beside.axes[0])
         known = [*beside.shift[: self.n], *(wide(axis.gap.most) for axis in self.piece.axes)]
-        turned = multiplied([row[: self.n] for row in gains], self.scale.inverse[: self.n])
+        changed = multiplied([row[: self.n] for row in gains], self.scale.inverse[: self.n])
         still = ([abs(arb(one)) * abs(two) for one, two in zip(row, known, strict=True)] for row in gains)
         return [
             (norm([arb(one) for one in row]) * error + sum(sizes, start=arb(0))).abs_upper()
-            for row, sizes in zip(turned, still, strict=True)
+            for row, sizes in zip(changed, still, strict=True)
         ]

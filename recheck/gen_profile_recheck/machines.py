@@ -52,7 +52,7 @@ class Machine:
         rows = zip(self.drift(q, dq, a, v, k), self.input_matrix(q, a, k), strict=True)
         return [one + _product(row, dv) for one, row in rows]
 
-    def turned(self, q: Values, change: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+    def in_rates(self, q: Values, change: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give the change of (q, dq) for one of x, and with −v the other way round."""
         n = len(q)
         rows = self.input_matrix(moved(q, change[:n], OUTER), a, k)

@@ -142,15 +142,15 @@ def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
     if "aTable" in bare:  # a buffer: its size, what holds for all, what holds for each axis, and its columns
         table = constant("aTable")
         size, first, last, target = int(table[0]), 8 + 8 * m, table[3], table[12 : 8 + 8 * m : 8]
-        *columns, begins = (table[first + n * size :][:size] for n in range(len(names) + 1))
-        begins = begins[::m]
+        *columns, starts = (table[first + n * size :][:size] for n in range(len(names) + 1))
+        starts = starts[::m]
     else:
         columns, (last,) = [constant(name) for name in names], constant("cLast")
-        begins, target = (constant("cFirst"), constant("cTarget")) if layout == "segments" else ([], [])
+        starts, target = (constant("cFirst"), constant("cTarget")) if layout == "segments" else ([], [])
     (cycle,), flat, segment = constant("cCycleTime"), list[float](), 0
     for number in range(int(last) if layout == "segments" else 0):
-        segment += segment + 1 < len(begins) and number >= begins[segment + 1]
-        time = (number - begins[segment]) * cycle
+        segment += segment + 1 < len(starts) and number >= starts[segment + 1]
+        time = (number - starts[segment]) * cycle
         flat += [_horner([one[segment * m + axis] for one in columns], time) for axis in range(m)]
     flat = [*flat, *target] if layout == "segments" else columns[0]
     if len(flat) != m * (int(last) + 1):
