@@ -290,6 +290,7 @@ def test_a_machine_of_one_mode_without_live_parameters():
 
 CHAIN = ["plant.c1=0", "plant.c2=0", "plant.c3=0", "planner.live={m3=[0.8, 1.5]}", "limits.velocity=0.6"]
 CHAIN += ["limits.acceleration=1.5", "limits.jerk=20.0", "limits.travel=[-2.0, 2.0]", "check.uncertain={}"]
+CHAIN += ["planner.operations=3000"]
 
 
 def test_three_modes_are_left_at_rest_in_little_more_than_the_shortest_time():

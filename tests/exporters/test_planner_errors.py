@@ -15,7 +15,7 @@ name = "paper"
 plant = {{ type = "double-pendulum-crane", m1 = 0.192, m2 = 0.203, L1 = 0.47, L2 = 0.391 }}
 move = {{ distance = 0.3, duration = 3.0 }}
 limits = {{ velocity = 0.3, acceleration = 0.7, jerk = 20.0, travel = [0.0, 2.0] }}
-planner = {{ live = {{ L1 = [0.3, 0.6] }} }}
+planner = {{ live = {{ L1 = [0.3, 0.6] }}, operations = 12000 }}
 check = {{ residual_sway = 0.01 }}
 export = {{ cycle_time = {CYCLE} }}
 """

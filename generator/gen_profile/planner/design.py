@@ -37,9 +37,9 @@ DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
 # A cycle may spend so many at least, and so many for each ms, if the spec states none; the more where the
-# slowest mode swings faster than once in QUICK s, as it waits for plans.
+# slowest mode swings faster than once in LEISURELY s, as it waits for plans.
 OPERATIONS, ZONED_OPERATIONS = 3000, 5000
-QUICK = 1.0
+LEISURELY = 2.0
 TOLERATED_FRACTION = 0.1  # of the allowed sway, which the block leaves as it is
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
@@ -116,7 +116,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         events=spec.planner.events,
         zones=spec.planner.zones,
         operations=spec.planner.operations
-        or max(least, round(least * spec.export.cycle_time / 1e-3 * max(1.0, QUICK / period))),
+        or max(least, round(least * spec.export.cycle_time / 1e-3 * max(1.0, LEISURELY / period))),
         periods=tuple(
             2.0 * np.pi / _rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live)
         ),
