@@ -20,7 +20,7 @@ from gen_profile_recheck.jets import derivatives
 from gen_profile_recheck.scales import ScaleMatrix, multiplied, norm
 
 TERMS, FEW_TERMS = 16, 8  # of power series in time: for the defect and sway, and for μ
-MORE = 2  # nodes than terms in each parameter, for the defect
+MORE = (2, 6)  # nodes than terms in each parameter, for the defect, and where that is not enough
 ATTEMPTS, WIDER = 12, 2
 
 
@@ -46,6 +46,19 @@ def require(
     ------
     NotProvedError
     """
+    for more in MORE:
+        try:
+            _require(pieces, scales, start, claims, more)
+        except NotProvedError:
+            if more == MORE[-1]:
+                raise
+        else:
+            return
+
+
+def _require(
+    pieces: Sequence[MotionPiece], scales: Any, start: Sequence[float], claims: Sequence[SwayClaim], more: int
+) -> None:
     error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
     for number, piece in enumerate(pieces):
         if 0 < number < len(scales):
@@ -53,7 +66,7 @@ def require(
             error *= scale.change(before)
         proof = PieceProof(piece, scale, [claim for claim in claims if number >= claim.first])
         error += scale.length(proof.beside.leap(_leap(pieces, number, start), at_start=number == 0))
-        error = proof.error_after(error)
+        error = proof.error_after(error, more)
 
 
 def _leap(pieces: Sequence[MotionPiece], number: int, start: Sequence[float]) -> list[arb]:
@@ -76,14 +89,14 @@ class PieceProof:
         self.piece, self.scale, self.claims, self.beside = piece, scale, claims, Disturbance(piece)
         self.machine, self.n = piece.box.machine, len(piece.series) // 2
 
-    def error_after(self, error: arb) -> arb:
+    def error_after(self, error: arb, more: int) -> arb:
         """Bound the error at the end by that at the beginning, and all sways.
 
         Raises
         ------
         NotProvedError
         """
-        fine = tuple(count + MORE for count in self.piece.box.terms)
+        fine = tuple(count + more for count in self.piece.box.terms)
         outputs = self.piece.enclosed(self._defect_and_sways, TERMS, fine)
         defect = [wide(one.size) for one in outputs[: 2 * self.n]]
         lengths = (self.scale.length(self.beside.in_rates(one)) for one in [defect, *self.beside.terms])

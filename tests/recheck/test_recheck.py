@@ -161,6 +161,7 @@ def quick(tmp_path_factory):
 @pytest.fixture
 def _little_work(quick, monkeypatch):
     """Try no harder to prove a forgery than what it was made of takes."""
+    monkeypatch.setattr("gen_profile_recheck.enclosure.MORE", (2,))
     monkeypatch.setattr("gen_profile_recheck.halving.MOST_PARTS", 200)
     check(*contents(*quick))
 

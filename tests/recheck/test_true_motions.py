@@ -78,10 +78,10 @@ def test_errors_of_true_motions_are_bounded_and_not_by_far(tmp_path, monkeypatch
     case = Case(files[0], read_json(files[1])["spec"], read_json(files[2]))
     met, before = [], enclosure.PieceProof.error_after
 
-    def error_after(proof, error):
+    def error_after(proof, error, more):
         if len(met) == PIECES:
             raise EnoughError
-        met.append((proof, before(proof, error)))
+        met.append((proof, before(proof, error, more)))
         return met[-1][1]
 
     monkeypatch.setattr(enclosure.PieceProof, "error_after", error_after)
