@@ -163,13 +163,14 @@ class Drive:
             raise SpecError(f"There is no command 'point' with {len(values)} such values.")
         low, high = self._ends()[:, self._columns]
         view, *place = values
-        result = least_squares(
-            lambda target: self._marks(target)[int(view)] - place,
-            np.clip(self._axes[0, self._columns], low, high),
-            bounds=(low, high),
+        start = np.clip(self._axes[0, self._columns], low, high)
+        way = least_squares(  # from zero, since its first step is as long as what it begins with
+            lambda way: self._marks(start + way)[int(view)] - place,
+            np.zeros(len(start)),
+            bounds=(low - start, high - start),
             method="dogbox",  # the other one stays where it begins at a bound
-        )
-        return tuple(result.x.tolist())
+        ).x
+        return tuple(np.clip(start + way, low, high).tolist())
 
     def _marks(self, target: Array) -> Array:
         """Tell where in every picture the nominal machine's end load hangs at a target, shape (views, 2)."""
