@@ -118,7 +118,7 @@ def test_the_target_is_where_the_load_hangs_in_the_picture_that_is_pointed_at(pr
     part = going.moment(asked(command="point", values=(view, *place)))
     assert part["target"] == pytest.approx(there, abs=1e-6)
     assert part["marks"][view] == pytest.approx(place, abs=1e-6)
-    going._axes[:, :] += 3e-6  # hardly away from where it began
+    going._axes[0, going._columns] = 3e-6  # hardly away from where it began
     beyond = going.moment(asked(command="point", values=(view, 1e3, 1e3)))["target"]
     assert beyond == pytest.approx(np.full(len(there), {"paper": 1.0}.get(preset, 20.0)))
     assert going.moment(asked(command="stop"))["target"] is None
