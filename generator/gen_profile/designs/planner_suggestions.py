@@ -10,22 +10,24 @@ import attrs
 from gen_profile.errors import GenProfileError, Suggestion
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.limits import rounded_down, rounded_up
-from gen_profile.proof.verdict import TAKEN_BACK, Proof
+from gen_profile.proof.obedience import WORDS
+from gen_profile.proof.verdict import TAKEN_BACK, Proof, kind_of
 from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
 from gen_profile.units import RATES
 
 # the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
-UNKNOWN = 1.25  # times the limit: at least so much a block counts that takes its promise back
+UNKNOWN = 1.25  # times the limit: at least so much a block counts that shows one of the next
+OF_SWAY = {TAKEN_BACK, kind_of(WORDS["idle"])}  # it waits, too, where a plan would break its promise
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 
 
 def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Suggestion, ...]:
-    """Look for changes that help, where sway is too much, or a promise was taken back for it.
+    """Look for changes that help, where sway is too much, a promise was taken back, or an axis stands for it.
 
-    What is wrong besides a promise taken back may come of it: whatever is named is tried in full.
+    What is wrong besides these may come of it: whatever is named is tried in full.
 
     Parameters
     ----------
@@ -35,8 +37,8 @@ def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
     prove : Spec → Proof
         Of the block of a changed spec, on as many histories.
     """
-    faults = {fault for judged in proof.judged for fault in judged.faults}
-    if proof.faults or (faults and TAKEN_BACK not in faults):
+    faults = {kind_of(fault) for judged in proof.judged for fault in judged.faults}
+    if proof.faults or (faults and not faults & OF_SWAY):
         return ()
     suggestions = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
     return tuple(suggestion for suggestion in suggestions if suggestion is not None)
