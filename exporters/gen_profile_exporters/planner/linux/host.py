@@ -57,6 +57,9 @@ def linux_files(text: str, file: str) -> tuple[File, ...]:
                 filename=f"{file}_{name}",
                 content=filled(f"planner/linux/{template}", **values).encode("ascii"),
             )
-            for name, template in (("linux.c", "host.c"), ("opcua.py", "opcua.py"))
+            for name, template in (
+                ("linux.c", "host.c"),
+                ("opcua.py", "opcua.txt"),
+            )  # a .py here would be compiled
         ),
     )
