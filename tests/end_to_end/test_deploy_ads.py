@@ -3,12 +3,12 @@
 import random
 import socket
 import struct
-import threading
-from contextlib import closing, contextmanager
+from contextlib import closing
 
 import numpy as np
 import pytest
 from command_line import run_here
+from end_to_end.simulated_controllers import serving
 from end_to_end.test_deploy import BARE, free_port
 
 from gen_profile.deployment.ads import AdsAccess, AdsLink
@@ -34,24 +34,6 @@ def files(tmp_path_factory):
 @pytest.fixture(scope="module")
 def tables(files):
     return {name: read_table(files / name / "FB_paper.TcPOU") for name in ("old", "new", "other")}
-
-
-@contextmanager
-def serving(controller):
-    ready, addresses = threading.Event(), []
-
-    def tell(address):
-        addresses.append(address)
-        ready.set()
-
-    thread = threading.Thread(target=controller.serve, args=(tell,))
-    thread.start()
-    try:
-        assert ready.wait(60)
-        yield addresses[0]
-    finally:
-        controller.ended.set()
-        thread.join()
 
 
 @pytest.fixture

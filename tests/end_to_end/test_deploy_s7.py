@@ -1,13 +1,13 @@
 """Deployment by S7, to python-snap7's own server with the exported block behind it, and under faults."""
 
 import random
-import threading
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import partial
 
 import numpy as np
 import pytest
 from command_line import run_here
+from end_to_end.simulated_controllers import serving
 from end_to_end.test_deploy import BARE, free_port
 from snap7.error import S7ConnectionError, S7TimeoutError
 from snap7.server import Server
@@ -38,28 +38,10 @@ def tables(files):
     return {name: read_table(files / name / "paper.st") for name in ("old", "new", "other")}
 
 
-@contextmanager
-def controller(table):
-    """A simulated one that runs by itself."""
-    simulated, ready, addresses = SimulatedS7Controller(table, NUMBER, free_port()), threading.Event(), []
-
-    def tell(address):
-        addresses.append(address)
-        ready.set()
-
-    thread = threading.Thread(target=simulated.serve, args=(tell,))
-    thread.start()
-    try:
-        assert ready.wait(60)
-        yield simulated, addresses[0]
-    finally:
-        simulated.ended.set()
-        thread.join()
-
-
 @pytest.fixture
 def plc(tables):
-    with controller(tables["old"]) as (simulated, url):
+    simulated = SimulatedS7Controller(tables["old"], NUMBER, free_port())
+    with serving(simulated) as url:
         yield simulated, ("--to", url, "--db", f"{NUMBER}", "--security", "none")
 
 
