@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shlex
@@ -20,6 +21,7 @@ from gen_profile.spec.reading import spec_from_dict
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r'^```(\w*)(?: title="([^"\n]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 NO_BUS = "no-such-bus"
 
 
@@ -50,7 +52,10 @@ def run(block: Block, scope: dict[str, Any]) -> None:
                     f"{shlex.join(command)}\n{outcome.err}"
                 )
         case Block(language="sh", title=""):
-            _run_commands(block.text)
+            scope["printed"] = _run_commands(block.text)
+        case Block(language="text", title="it prints"):
+            missing = [line for line in block.text.splitlines() if not _is_printed(line, scope["printed"])]
+            assert not missing, f"{missing}\n{scope['printed']}"
         case Block(language="python", title=""):
             exec(block.text, scope)
         case Block(language="toml", title=""):
@@ -107,9 +112,23 @@ def _commands(text: str) -> list[list[str]]:
     return [words for words in split if words]
 
 
-def _run_commands(text: str) -> None:
+def _is_printed(line: str, printed: str) -> bool:
+    """Look for a line of a page: numbers to 1 % or two units of the last digit, anything for ``…``."""
+    pattern = f"({NUMBER.pattern})".join(re.escape(part).replace("…", ".*") for part in NUMBER.split(line))
+    shown = NUMBER.findall(line)
+    found = re.finditer(f"^{pattern}$", printed, re.MULTILINE)
+    return any(all(map(_is_about, shown, match.groups())) for match in found)
+
+
+def _is_about(shown: str, found: str) -> bool:
+    unit = 10.0 ** -len(shown.partition(".")[2])
+    return math.isclose(float(shown), float(found), rel_tol=0.01, abs_tol=2.0 * unit if "." in shown else 0.0)
+
+
+def _run_commands(text: str) -> str:
     """Run this program's commands in this process, which is quicker, and other blocks in a shell.
 
+    Returns what they print.
     A comment ``exit code N`` says how the command on its line or on the next one is to end, if not in 0.
     """
     if not all(_is_plain(command) for command in _commands(text)):
@@ -122,7 +141,8 @@ def _run_commands(text: str) -> None:
             check=False,
         )
         assert done.returncode == 0, f"{text}\n{done.stderr.decode()}"
-        return
+        return done.stdout.decode()
+    printed = ""
     code = 0
     for line in text.replace("\\\n", " ").splitlines():
         expected = re.search(r"# exit code (\d)", line)
@@ -130,7 +150,9 @@ def _run_commands(text: str) -> None:
         for command in _commands(line):
             outcome = run_here(*command[1:])
             assert outcome.code == code, f"{line}\n{outcome.err}"
+            printed += outcome.out
             code = 0
+    return printed
 
 
 def _is_plain(command: list[str]) -> bool:
