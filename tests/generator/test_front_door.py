@@ -140,7 +140,9 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             lambda spec: gp.evaluate(spec, straight(2, "mine")),
             r"moves 2 axes, .* machine has 1 \(cart\)",
         ),
-        (lambda spec: gp.compare(spec, own=[straight(1, "zvd")]), "Two motions are called 'zvd'"),
+        (lambda _: gp.plan(3), "A spec, or the path of one, is expected, found 3"),
+        (lambda spec: gp.compare(spec, own="mine.csv"), "takes a list of profiles, .* found 'm'"),
+        (lambda spec: gp.compare(spec, own=straight(1, "zvd")), "Two motions are called 'zvd'"),
         (lambda spec: gp.export_fmu(spec, "plnt"), "no FMU of the kind 'plnt'; did you mean 'plant'"),
         (lambda spec: gp.cosimulate(spec, STANDING, {"L3": 1.0}), "machine has no 'L3'"),
         (

@@ -73,10 +73,12 @@ def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
     Raises
     ------
     SpecError
-        Two have the same name.
+        Two have the same name, or one is no profile.
     """
     known = [*SHAPERS, *(candidate.method for candidate in _optimal_candidates(spec))]
     for motion in own:
+        if not isinstance(motion, Profile):
+            raise SpecError(f"own: takes a list of profiles, such as gp.plan(spec).motion, found {motion!r}.")
         if motion.method in known:
             raise SpecError(f"Two motions are called {motion.method!r}; give yours another method.")
         known.append(motion.method)

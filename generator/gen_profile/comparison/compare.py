@@ -131,7 +131,7 @@ class Comparison(Drawable, Tabled):
 
 
 def compare(
-    spec: Spec | Path | str, progress: Progress = no_progress, *, own: Sequence[Profile] = ()
+    spec: Spec | Path | str, progress: Progress = no_progress, *, own: Sequence[Profile] | Profile = ()
 ) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 
@@ -140,7 +140,7 @@ def compare(
     spec : Spec, or the path of one
     progress : callable
         Told what is being done.
-    own : sequence of Profile
+    own : sequence of Profile, or Profile
         Further motions of the axes, each of a ``method`` of its own.
 
     Examples
@@ -153,7 +153,7 @@ def compare(
     left_out: dict[str, str] = {}
     too_slow: dict[str, float] = {}
     impossible: dict[str, str] = {}
-    listed = tuple(candidates(spec, own))
+    listed = tuple(candidates(spec, (own,) if isinstance(own, Profile) else own))
     for done, candidate in enumerate(listed):
         progress("comparing", done, len(listed), candidate.method)
         try:

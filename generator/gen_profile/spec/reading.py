@@ -48,7 +48,7 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
     OutputError
         The file cannot be read.
     SpecError
-        The text is no TOML, or its content has faults: all of them are listed.
+        No path, or the text is no TOML, or its content has faults: all of them are listed.
 
     Examples
     --------
@@ -57,6 +57,8 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
     >>> gp.read_spec("tank.toml", move={"duration": 2.2}).move.duration
     2.2
     """
+    if not isinstance(path, Path | str):
+        raise SpecError(f"A spec, or the path of one, is expected, found {path!r}.")
     path = Path(path)
     return parse_spec(read_text(path), overrides, str(path), path.parent, **tables)
 
