@@ -1,6 +1,5 @@
 """The picture of a comparison."""
 
-import os
 import subprocess
 import sys
 from itertools import combinations
@@ -8,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from command_line import run_here, run_process
+from command_line import run_here
 from matplotlib import image
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pictures import colours
@@ -251,33 +250,6 @@ def test_every_method_has_a_look_of_its_own_whoever_else_takes_part():
     assert len({(style.colour, style.dash) for style in styles.values()}) == len(methods)
     assert {style.dash for method, style in styles.items() if method.startswith("optimal")} == {"solid"}
     assert all(method_styles([method])[method] == style for method, style in styles.items())
-
-
-HIDE = """
-import sys
-from importlib.machinery import PathFinder
-
-find = PathFinder.find_spec
-PathFinder.find_spec = lambda name, *more: None if name == "matplotlib" else find(name, *more)
-"""
-INSTALL = "Error: --plot needs Matplotlib: pip install 'gen-profile[plot]'."
-
-
-def test_without_matplotlib_the_sentence_tells_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda _: None)
-    outcome = run_here("compare", *FEW, "--plot", tmp_path / "picture.png")
-    assert (outcome.code, outcome.errors) == (2, [INSTALL])
-
-
-@pytest.mark.slow
-def test_where_matplotlib_is_not_installed_the_program_says_so_too(tmp_path):
-    """A start-up file of Python hides it."""
-    (tmp_path / "sitecustomize.py").write_text(HIDE, "utf-8")
-    paths = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
-    words = ("compare", *FEW, "--plot", "picture.png")
-    outcome = run_process(*words, cwd=tmp_path, PYTHONPATH=os.pathsep.join(paths))
-    assert (outcome.code, outcome.errors) == (2, [INSTALL])
-    assert not (tmp_path / "picture.png").exists()
 
 
 def test_where_no_method_has_a_motion_there_is_nothing_to_draw(tmp_path):

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import time
-from importlib import util
 from pathlib import Path
 
 import attrs
@@ -19,7 +18,6 @@ import pytest
 from command_line import PROGRAM, run_here, run_process
 from exporters.can.bench import MS, FakeClock, HastyClock, RigidLoad
 
-from gen_profile import plugins
 from gen_profile.artefacts import writing as delivery
 from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
@@ -342,14 +340,6 @@ def test_a_machine_that_cannot_hold_the_cycle(deployed, monkeypatch):
     outcome = run_here("stream", deployed / "paper.log", "--simulate-drive", "--self-test")
     assert outcome.code == 6
     assert "cannot hold a cycle of 20 ms" in outcome.err
-
-
-def test_the_missing_extra_is_a_sentence(deployed, monkeypatch):
-    monkeypatch.setattr(
-        plugins, "find_spec", lambda name: None if name == "canopen" else util.find_spec(name)
-    )
-    outcome = run_here("stream", deployed / "paper.log", "--dry-run")
-    assert (outcome.code, "pip install 'gen-profile[can]'" in outcome.err) == (2, True)
 
 
 def test_eds_of_the_simulated_drive(tmp_path):

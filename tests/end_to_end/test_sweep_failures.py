@@ -3,7 +3,6 @@
 import json
 import multiprocessing
 import os
-from importlib.util import find_spec
 from types import SimpleNamespace
 
 import attrs
@@ -13,7 +12,7 @@ import pytest
 from command_line import run_here
 from distributed import KilledWorker, LocalCluster
 
-from gen_profile import cluster, plugins
+from gen_profile import cluster
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import preset_text
 from gen_profile.sweep import case as sweep_case
@@ -112,15 +111,6 @@ def test_a_senseless_sweep_is_refused_before_any_work(tmp_path, arguments, sente
     assert outcome.code == 2
     assert sentence in outcome.err
     assert not (tmp_path / "out").exists()
-
-
-def test_names_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr(plugins, "find_spec", lambda name: None if name == "distributed" else find_spec(name))
-    outcome = run_here("sweep", *QUICK, "--vary", "plant.L1=1,2", "--out", tmp_path)
-    assert (outcome.code, outcome.errors) == (
-        2,
-        ["Error: Sweeps need Dask and PyArrow: pip install 'gen-profile[sweep]'."],
-    )
 
 
 def test_a_folder_holds_one_sweep(tmp_path):

@@ -71,12 +71,11 @@ def sweep(
     """
     from gen_profile.cli import words
     from gen_profile.sweep.grid import parse_grid
-    from gen_profile.sweep.plan import prepare, require_libraries
+    from gen_profile.sweep.plan import prepare
+    from gen_profile.sweep.run import sweep as run
 
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers is for processes of this computer; a scheduler has its own.")
-    require_libraries()
-    from gen_profile.sweep.run import sweep as run
 
     text = chosen.text()
     store = prepare(text, chosen.overrides, parse_grid(axes), formats, folder)
@@ -104,9 +103,6 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     away is no answer. Safe is what, played on the machine asked for, keeps the limits of the check.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.sweep.plan import require_libraries
-
-    require_libraries()
     from gen_profile.sweep.lookup import lookup as run
 
     folder, asked = _folder_and_values(words)
@@ -131,9 +127,6 @@ def library(folder: Path, path: Path, as_json: bool) -> None:
     An input of the block selects the profile.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.sweep.plan import require_libraries
-
-    require_libraries()
     from gen_profile.sweep.library import write_library
 
     with progress() as tell:

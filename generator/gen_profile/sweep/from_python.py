@@ -12,7 +12,7 @@ import tomli_w
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.sweep.grid import grid_of_values
-from gen_profile.sweep.plan import prepare, require_libraries
+from gen_profile.sweep.plan import prepare
 from gen_profile.sweep.run import Sweep, sweep
 
 
@@ -54,7 +54,6 @@ def run_sweep(
     >>> sweep.statuses
     {'passed': 2}
     """
-    require_libraries()
     spec = as_spec(spec)
     grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())

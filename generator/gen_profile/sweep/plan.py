@@ -8,24 +8,10 @@ from typing import Any
 
 from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import SpecError
-from gen_profile.plugins import require_installed
 from gen_profile.sweep.case import Recipe
 from gen_profile.sweep.grid import Grid
 from gen_profile.sweep.store import Store
 from gen_profile_exporters.registry import find_exporter
-
-LIBRARIES = ("cryptography", "distributed", "pyarrow")
-
-
-def require_libraries() -> None:
-    """Find out whether sweeps can run here at all.
-
-    Raises
-    ------
-    OutputError
-        With the command that installs what is missing.
-    """
-    require_installed("Sweeps need Dask and PyArrow", "sweep", *LIBRARIES)
 
 
 def prepare(

@@ -59,9 +59,10 @@ def log_swing(
     if source.startswith("opc.tcp:"):
         if node is None:
             raise SpecError("--node: name the node whose value swings, as ns=4;s=GVL.rAngle.")
-        from gen_profile.deployment.opcua import OpcUaNode
 
         access = Access(url=source, instance="", data_block=None, **security).opcua()
+        from gen_profile.deployment.opcua import OpcUaNode
+
         with closing(OpcUaNode(access, node)) as link:
             table = _logged(link.tables(), seconds)
     else:
