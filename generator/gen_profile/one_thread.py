@@ -6,14 +6,14 @@ to a hundredfold, and how they share the work would show in the last bits.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from contextlib import ContextDecorator
 from functools import cache
 from threading import Lock
 
 from threadpoolctl import ThreadpoolController
 
 
-class _OneThread(AbstractContextManager[None]):
+class _OneThread(ContextDecorator):
     """The limit of the whole process, from the first context that begins to the last one that ends."""
 
     def __init__(self) -> None:
@@ -35,8 +35,8 @@ class _OneThread(AbstractContextManager[None]):
 _ONE_THREAD = _OneThread()
 
 
-def one_thread() -> AbstractContextManager[None]:
-    """Let BLAS and LAPACK use one thread in the context, and in all others that are open at the same time."""
+def one_thread() -> _OneThread:
+    """Let BLAS and LAPACK use one thread in the context or function, and in all that run at the same time."""
     return _ONE_THREAD
 
 

@@ -17,6 +17,8 @@ from gen_profile.cli.outcome import print_error
 
 def main() -> None:
     """Run the command line; the entry point."""
+    # for matrices this small, threads that wait for one another cost several times what they save
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # else Python looks for garbage among all that it loaded, just before it ends
     _open_streams()
     for stream in (sys.stdout, sys.stderr):

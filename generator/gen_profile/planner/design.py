@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
+from gen_profile.one_thread import one_thread
 from gen_profile.phrase import Phrase, placed
 from gen_profile.planner.chebyshev import Array, same_terms
 from gen_profile.planner.machine import (
@@ -72,6 +73,7 @@ class PlannerBlock:
     period: float
 
 
+@one_thread()
 def planner_block(spec: Spec) -> PlannerBlock:
     """Write the planner block of a spec.
 
