@@ -220,7 +220,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
     assert "motions begun: 1, arrived: 1." in done.out and "motion 1 begins" in done.err
     rows = [line.split(",") for line in log.read_text("utf-8").splitlines()]
     moving = {float(row[5]): float(row[7]) for row in rows if row[2] == "moving"}
-    played = read_table(old).playback().played.position[:, 0]
+    played = read_table(old).motions[0].played.position[:, 0]
     assert len(moving) > 20 and all(played[int(place)] == at for place, at in moving.items())
     execute(False)
 
