@@ -11,8 +11,8 @@ stands. A buffer holds
         room, inverse, stop jerk, start, target, least scale, mirrors, shifts of each axis,
         the table, column by column
 
-The first checksum is over the whole buffer, with the cycle time in its own place: a table for another cycle has
-a wrong one here. A motion's own is that of its block of constants, which can be told from it.
+The first checksum is over the whole buffer, with the cycle time in its own place: a table for another cycle
+has a wrong one here. A motion's own is that of its block of constants, which can be told from it.
 """
 
 from __future__ import annotations

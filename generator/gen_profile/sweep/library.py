@@ -177,7 +177,7 @@ def _require_same(library: BlockSource, target: Target, profiles: list[dict[str,
 def index_of(
     block: str, written: bytes, profiles: list[dict[str, Any]], specs: list[Mapping[str, Any]]
 ) -> bytes:
-    """Write the index beside a library: what each profile is, and its spec, which the hash at the end seals."""
+    """Write the index beside a library: what each profile is, its spec, and a hash of all that."""
     document = {"block": block, "sha256": sha256(written), "profiles": profiles, "specs": specs}
     document[SEAL] = seal_of(document)
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
