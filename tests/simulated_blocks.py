@@ -1,10 +1,15 @@
 """A simulated playback block for the tests of deployment, and the shortest way to it."""
 
+import json
 from pathlib import Path
 
 from gen_profile.deployment.mailbox import Mailbox
 from gen_profile.designs.design import design
 from gen_profile.spec.reading import preset_spec
+from gen_profile.sweep.library import index_of
+from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.playback.library import LibraryEntry, library_source
 
 VARIABLES = ("export.plc_tables=variables", "export.cycle_time=0.02", "move.duration=3.0")
 
@@ -14,6 +19,21 @@ def exported(folder, *changes, preset="paper"):
     spec = preset_spec(preset, [*VARIABLES, *changes])
     outcome = design(spec, ["plc"], folder, check=False)
     return Path(folder) / outcome.artefacts[0].path
+
+
+def exported_library(folder, distances, *changes):
+    """Moves of some distances in one block, as `write_library` writes it after a sweep."""
+    paths = [exported(folder / str(one), f"move.distance={one}", *changes) for one in distances]
+    entries = [
+        LibraryEntry(source=parse_function_block(path.read_text("ascii")), label=path.parent.name)
+        for path in paths
+    ]
+    specs = [json.loads((path.parent / "manifest.json").read_bytes())["spec"] for path in paths]
+    library = library_source(entries, target_of(preset_spec("paper", [*VARIABLES, *changes])))
+    path = folder / "moves.st"
+    path.write_text(library.text(), "ascii")
+    path.with_suffix(".json").write_bytes(index_of(library.name, path.read_bytes(), [], specs))
+    return path
 
 
 class DirectLink:

@@ -159,7 +159,7 @@ def test_the_controller_plays_what_was_deployed(files, plc, access):
         while not runner.run(done.read_value()):
             time.sleep(0.05)
         position = runner.run(instance.get_child("2:fPosition"))
-        assert runner.run(position.read_value()) == table.values[table.start.size - 1 + 8 + 4] == 0.25
+        assert runner.run(position.read_value()) == table.motions[0].target == 0.25
         runner.run(execute.write_value(False))
 
 
@@ -220,7 +220,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
     assert "motions begun: 1, arrived: 1." in done.out and "motion 1 begins" in done.err
     rows = [line.split(",") for line in log.read_text("utf-8").splitlines()]
     moving = {float(row[5]): float(row[7]) for row in rows if row[2] == "moving"}
-    played = read_table(old).playback().played.position[:, 0]
+    played = read_table(old).motions[0].played.position[:, 0]
     assert len(moving) > 20 and all(played[int(place)] == at for place, at in moving.items())
     execute(False)
 
@@ -296,7 +296,7 @@ def test_what_is_not_as_it_should_be_is_told_in_a_sentence(changes, code, words,
 
 def test_a_wrapper_has_no_table(files, access):
     found = run_here("deploy", files / "old" / "FB_paper_Axis.TcPOU", *access)
-    assert found.code == 5 and "is a library or a wrapper" in found.err
+    assert found.code == 5 and "is a wrapper; name the file of the playback block" in found.err
 
 
 @pytest.fixture(scope="module")

@@ -249,7 +249,7 @@ def test_every_bit_of_a_number_arrives(bench):
 def test_an_array_of_another_length_is_refused(bench, monkeypatch):
     with closing(bench.link()) as link:
         monkeypatch.setitem(bench.block.outputs, "aState", np.zeros(5))
-        with pytest.raises(DeploymentError, match=r"aState is no array of 19 LREAL there"):
+        with pytest.raises(DeploymentError, match=r"aState is no array of 20 LREAL there"):
             link.state()
 
 

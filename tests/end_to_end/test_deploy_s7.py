@@ -280,7 +280,7 @@ def test_the_connection_may_break_at_every_pdu(lose, bench, tables, unchecked):
 def test_nothing_is_written_to_a_data_block_of_something_else(bench, tables):
     bench.reset()
     before = bytes(bench.controller.data)
-    bench.controller.data[4096 + 12 * 8] ^= 1  # the kind of the block
+    bench.controller.data[4096 + 13 * 8] ^= 1  # the kind of the block
     foreign = bytes(bench.controller.data)
     with pytest.raises(DeploymentError, match=r"DB7 of .* is not of a running block that takes paper\.st"):
         bench.link()
@@ -310,7 +310,7 @@ def test_the_exported_data_block_has_the_arrays_where_they_are_looked_for(files)
     assert arrays == [
         "aRequest : Array[0..255] OF LREAL;",
         "aReply : Array[0..255] OF LREAL;",
-        "aState : Array[0..18] OF LREAL;",
+        "aState : Array[0..19] OF LREAL;",
     ]
     call = text[text.index("#fbMotion(") :].split(");")[0]
     for name, arrow in {"aRequest": ":=", "aReply": "=>", "aState": "=>"}.items():

@@ -12,7 +12,7 @@ from gen_profile.errors import ExportError
 from gen_profile.planner.execution import BlockInstance
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback import buffers, structured_text
-from gen_profile_exporters.playback.library import LibraryEntry, library_source
+from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
 from gen_profile_exporters.playback.table import tabulate
 from gen_profile_exporters.registry import containers, find_container
 from gen_profile_exporters.vendors import twincat
@@ -31,6 +31,15 @@ def goal_of(profile, layout="segments", tables="variables"):
 
 def text_of(profile, layout="segments"):
     return structured_text.block_text(profile, goal_of(profile, layout))
+
+
+def library_of(*profiles, layout="segments"):
+    goal = goal_of(profiles[0], layout)
+    entries = [
+        LibraryEntry(source=parse_function_block(text_of(profile, layout)), label=f"move {number}")
+        for number, profile in enumerate(profiles)
+    ]
+    return library_source(entries, goal).text()
 
 
 def values_of(text):
@@ -104,7 +113,7 @@ def test_it_takes_another_table_and_goes_back():
     client.write(values)
     assert client.in_use(len(before)) == before  # until it is switched to
     for wanted, profile in ((values, OTHER), (before, ONE)):
-        assert client.ask(SWITCH, checksum=wanted[5])[1] == 0.0
+        assert client.ask(SWITCH, checksum=wanted[1])[1] == 0.0
         while not fb["bChecked"]:
             fb.call()
         assert client.in_use(len(wanted)) == wanted and client.ask(READ)[9] == 2.0
@@ -118,7 +127,7 @@ def test_a_start_waits_until_the_new_table_is_checked():
     client, values = Client(fb), values_of(text_of(OTHER))
     client.write(values)
     fb.call(**IDLE)
-    client.ask(SWITCH, checksum=values[5])
+    client.ask(SWITCH, checksum=values[1])
     row = fb.call(bExecute=True, fActPosition=fb["tStart"], fCycleTime=CYCLE)
     assert row["bbusy"] and not fb["bChecked"]
     rows = play(fb, row)
@@ -126,35 +135,51 @@ def test_a_start_waits_until_the_new_table_is_checked():
 
 
 @pytest.mark.parametrize("start_first", [False, True])
-@pytest.mark.parametrize("place", [0, 1, 3, 4, 6, 8, 11, 13, 17, 40, -1])
-def test_a_wrong_table_is_left_again_and_never_played(place, start_first):
-    fb = checked(text_of(ONE))
-    client, values, before = Client(fb), values_of(text_of(OTHER)), values_of(text_of(ONE))
+@pytest.mark.parametrize(
+    ("place", "library"),
+    [*((place, False) for place in (0, 2, 3, 5, 9, 13, 17, 40, -1)), *((k, True) for k in (3, 5, -1))],
+)
+def test_a_wrong_table_is_left_again_and_never_played(place, library, start_first):
+    old, new = (library_of(ONE, ONE), library_of(OTHER, ONE)) if library else (text_of(ONE), text_of(OTHER))
+    fb = checked(old)
+    client, values, before = Client(fb), values_of(new), values_of(old)
     values[place] += 1.0
     client.write(values)
     fb.call(**IDLE)
-    accepted = client.ask(SWITCH, checksum=values[5])[1] == 0.0
+    assert client.ask(SWITCH, checksum=values[1])[1] == 0.0
     if start_first:
         start = {"bExecute": True, "fActPosition": fb["tStart"], "fCycleTime": CYCLE}
         rows = [fb.call(**start), *(fb.call() for _ in range(60))]
-        assert accepted or rows[-1]["bdone"]  # refused at once, it plays the former one
-        if accepted:
-            assert rows[-1]["nerrorid"] in (2, 5) and len({row["fposition"] for row in rows}) == 1
+        assert rows[-1]["nerrorid"] in (2, 5, 6) and len({row["fposition"] for row in rows}) == 1
     while not (fb["bChecked"] and not fb["bTrial"]):
         fb.call()
     assert client.in_use(len(before)) == before and fb["bIntact"]
-    assert client.ask(READ)[9] == (3.0 if accepted else 0.0)
+    assert client.ask(READ)[9] == 3.0
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 1e300, 0.0, 2e9])
-@pytest.mark.parametrize("place", [0, 1])
-def test_sizes_that_lead_out_of_the_buffer_are_refused(place, value):
-    fb = checked(text_of(ONE))
-    client, values = Client(fb), values_of(text_of(OTHER))
+@pytest.mark.parametrize("value", [float("nan"), -1.0, 1e300, 2e9, 2000.0])
+@pytest.mark.parametrize("place", [0, 2, 3, 4, 7])
+def test_sizes_that_lead_out_of_the_buffer_are_never_used(place, value):
+    """Those of the buffer, of a library, of a motion; the interpreter refuses such an index."""
+    fb = checked(library_of(ONE, OTHER))
+    client, values = Client(fb), values_of(library_of(OTHER, ONE, ONE))
     values[place] = value
     client.write(values)
-    assert client.ask(SWITCH, checksum=values[5])[1] == UNFIT
+    client.ask(SWITCH, checksum=values[1])
+    for number in (2, 1, 0, 1_000_000, 2040, -1):
+        fb.call(nProfile=number)
+    while not fb["bChecked"] or fb["bTrial"]:
+        fb.call()
     assert fb["bIntact"] and fb["nBase"] == 0
+    fb.call(nProfile=0)
+    assert column(play(fb, started(fb)), "position")[-1] == ONE.target
+
+
+def test_another_table_than_was_asked_for_is_not_switched_to():
+    fb = checked(text_of(ONE))
+    client, values = Client(fb), values_of(text_of(OTHER))
+    client.write(values)
+    assert client.ask(SWITCH, checksum=values[1] + 1.0)[1] == UNFIT
 
 
 def test_nothing_is_switched_while_it_moves_or_waits():
@@ -162,14 +187,14 @@ def test_nothing_is_switched_while_it_moves_or_waits():
     client, values = Client(fb), values_of(text_of(OTHER))
     started(fb)  # and waits for the checksum
     client.write(values)
-    assert client.ask(SWITCH, checksum=values[5])[1] == MOVES
+    assert client.ask(SWITCH, checksum=values[1])[1] == MOVES
     while fb["nState"] != fb["cMoving"]:
         fb.call()
     client.write(values)
-    assert client.ask(SWITCH, checksum=values[5])[1] == MOVES
+    assert client.ask(SWITCH, checksum=values[1])[1] == MOVES
     rows = play(fb, fb.call())
     assert rows[-1]["bdone"] and column(rows, "position")[-1] == ONE.target
-    assert client.ask(SWITCH, checksum=values[5])[1] == 0.0
+    assert client.ask(SWITCH, checksum=values[1])[1] == 0.0
 
 
 def test_an_aborted_motion_is_not_continued_on_another_table():
@@ -181,7 +206,7 @@ def test_an_aborted_motion_is_not_continued_on_another_table():
     while row["bbusy"]:
         row = fb.call()
     assert row["baborted"] and fb["bLeft"]
-    client.ask(SWITCH, checksum=values[5])
+    client.ask(SWITCH, checksum=values[1])
     fb.call(bAbort=False)
     assert fb.call(bContinue=True)["nerrorid"] == 8
 
@@ -190,7 +215,7 @@ def test_one_client_at_a_time_writes():
     fb = checked(text_of(ONE))
     one, other, values = Client(fb), Client(fb, owner=2.0), values_of(text_of(OTHER))
     one.write(values)
-    assert other.ask(WRITE, 1.0, 0, [7.0])[1] == HELD and other.ask(SWITCH, checksum=values[5])[1] == HELD
+    assert other.ask(WRITE, 1.0, 0, [7.0])[1] == HELD and other.ask(SWITCH, checksum=values[1])[1] == HELD
     assert other.ask(READ, 1.0, count=1)[16] == values[0]
     one.ask(RELEASE)
     assert other.ask(WRITE, 1.0, 0, [7.0])[1] == 0.0
@@ -213,8 +238,9 @@ def test_half_a_request_and_places_beyond_the_buffer_do_nothing():
 NUMBERS = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:E[+-]\d+)?|\d+|TRUE|FALSE)(?!\w)")
 
 
-def test_replay_refuses_altered_numbers_and_statements():
-    text, goal = text_of(ONE), goal_of(ONE)
+@pytest.mark.parametrize("library", [False, True])
+def test_replay_refuses_altered_numbers_and_statements(library):
+    text, goal = library_of(ONE, OTHER) if library else text_of(ONE), goal_of(ONE)
     program = re.sub(r"\(\*.*?\*\)", lambda found: " " * len(found[0]), text, flags=re.DOTALL)
     program = re.sub(r"fStartTolerance : [^;]*;", lambda found: " " * len(found[0]), program)
     found = list(NUMBERS.finditer(program))
@@ -222,8 +248,12 @@ def test_replay_refuses_altered_numbers_and_statements():
     chosen = [one for one in found if one.start() < table] + found[len(found) // 3 :: 97] + found[-300::7]
     for number in chosen:
         new = {"TRUE": "FALSE", "FALSE": "TRUE"}.get(number[0], f"9{number[0]}")
+        altered = text[: number.start()] + new + text[number.end() :]
         with pytest.raises(ExportError):
-            structured_text.read_block(text[: number.start()] + new + text[number.end() :], goal)
+            if library:
+                read_library(parse_function_block(altered), goal)
+            else:
+                structured_text.read_block(altered, goal)
 
 
 @pytest.mark.parametrize(
@@ -242,10 +272,39 @@ def test_it_is_for_its_own_axes_only(layout, names, other):
         structured_text.read_block(text_of(ONE, layout), elsewhere)
 
 
-def test_a_table_beyond_a_buffer_and_a_library_of_such_blocks_are_refused():
-    source = parse_function_block(text_of(ONE))
-    with pytest.raises(ExportError, match="plc_tables: a library holds constants"):
-        library_source([LibraryEntry(source=source, label="one")], goal_of(ONE))
+@pytest.mark.parametrize("profile", [(ONE, OTHER), (TWO, TWO)], ids=["one axis", "two axes"])
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_a_library_plays_each_of_its_motions_and_takes_another_one(layout, profile):
+    """Selected while nothing moves; the one that is selected and is not in the other library is refused."""
+    goal = goal_of(profile[0], layout)
+    fb = checked(library_of(*profile, layout=layout))
+    others = values_of(library_of(profile[1], layout=layout))
+    for number, motion in enumerate(profile):
+        fb.call(**IDLE, nProfile=number)
+        rows = play(fb, started(fb))
+        assert fb["aState"][9] == float(number)
+        expected = tabulate(motion, goal).played.position
+        np.testing.assert_array_equal(column(rows, "position")[-len(expected) :], expected)
+    client = Client(fb)
+    client.write(others)
+    fb.call(**IDLE)
+    assert client.ask(SWITCH, checksum=others[1])[1] == 0.0
+    assert fb["nSelected"] == 0 and started(fb)["nerrorid"] == 6
+    fb.call(**IDLE, nProfile=0)
+    rows = play(fb, started(fb))
+    np.testing.assert_array_equal(column(rows, "position")[-1], tabulate(profile[1], goal).target)
+
+
+def test_a_library_reads_back_to_what_was_put_in():
+    text, goal = library_of(ONE, OTHER), goal_of(ONE)
+    hashes = [structured_text.read_block(text_of(one), goal).payload_hash() for one in (ONE, OTHER)]
+    found = read_library(parse_function_block(text), goal)
+    assert [motion.payload_hash() for motion in found] == hashes
+    with pytest.raises(ExportError, match="is a library of motions"):
+        structured_text.read_block(text, goal)
+
+
+def test_a_table_beyond_a_buffer_is_refused():
     long = goal_of(quintic((0.0, 1.0), duration=3000.0), "samples")
     with pytest.raises(ExportError, match="do not fit a buffer"):
         structured_text.block_text(quintic((0.0, 1.0), duration=3000.0), long)

@@ -22,6 +22,7 @@ from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.planner.axis_wrapper import LIBRARIES
+from gen_profile_exporters.planner.openplc import openplc_files
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
 
@@ -234,6 +235,15 @@ def test_a_format_without_blocks_is_refused(block):
         block_files(block, SPEC, ["csv"])
     with pytest.raises(SpecError, match=r"no form 'csv' \(known: codesys, .*, c, linux, openplc\)"):
         require_forms(["c", "csv"])
+
+
+@pytest.mark.parametrize("inputs", [10, 70, 130])
+def test_every_variable_of_openplc_has_an_address_of_its_own(block, inputs):
+    many = "".join(f"    bMore{number} : BOOL;\n" for number in range(inputs))
+    (file,) = openplc_files(block.text.replace("VAR_INPUT\n", f"VAR_INPUT\n{many}", 1), "crane")
+    places = re.findall(r"(\w+) AT %(\S+) :", file.content.decode("ascii"))
+    assert len(places) > inputs and len({place for _, place in places}) == len(places)
+    assert dict(places)["nCycle"] == {10: "ML64", 70: "ML128", 130: "ML192"}[inputs]
 
 
 @pytest.mark.parametrize(

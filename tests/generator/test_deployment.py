@@ -6,13 +6,13 @@ import struct
 import attrs
 import numpy as np
 import pytest
-from simulated_blocks import VARIABLES, DirectLink, box_of, exported, poked
+from simulated_blocks import VARIABLES, DirectLink, box_of, exported, exported_library, poked
 
 from gen_profile.deployment.deploy import deploy, require_fit, verify
 from gen_profile.deployment.mailbox import IN_USE, RIGHT, LinkLostError
 from gen_profile.deployment.simulated_block import SimulatedBlock
 from gen_profile.deployment.table import BlockTable, read_table
-from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.errors import CheckFailed, DeploymentError, ExportError, OutputError
 from gen_profile.spec.reading import preset_spec
 
 FAULTS = 150
@@ -25,6 +25,16 @@ def tables(tmp_path_factory):
     return {
         name: read_table(exported(tmp_path_factory.mktemp(name), f"move.distance={distance}"))
         for name, distance in moves.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory):
+    """The same, of several motions."""
+    moves = {"old": [0.3, 0.25, 0.2], "new": [0.25, 0.2, 0.15], "other": [0.2, 0.3]}
+    return {
+        name: read_table(exported_library(tmp_path_factory.mktemp(name), distances))
+        for name, distances in moves.items()
     }
 
 
@@ -161,11 +171,13 @@ def used(block, tables):
 
 
 @pytest.mark.slow
-def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tables, unchecked):
+def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tables, libraries, unchecked):
     choices, ends = random.Random(31), []
-    count = DirectLink(fresh(tables))
-    deploy(tables["new"], box_of(count))
+    kinds = [(kind, DirectLink(fresh(kind))) for kind in (tables, libraries)]
+    for kind, count in kinds:
+        deploy(kind["new"], box_of(count))
     for number in range(FAULTS):
+        tables, count = kinds[number % 2]
         block, times = fresh(tables), choices.choice([1, 1, 1, 2, 3, 20, 1000])
         fault = faults(tables, block, choices)
         link = FaultyLink(block, choices.randint(1, count.operations), times, **fault)
@@ -218,7 +230,7 @@ def test_what_is_deployed_is_in_use_already_the_next_time_and_can_be_rolled_back
 def test_what_sways_too_much_is_not_switched_to(tables, block):
     """Another machine than the one that the table was designed for, as if a manifest were wrong."""
     spec = preset_spec("paper", [*VARIABLES, "move.distance=0.25", "plant.L1=0.9"])
-    wrong = attrs.evolve(tables["new"], spec=spec)
+    wrong = attrs.evolve(tables["new"], specs=(spec,))
     with pytest.raises(CheckFailed, match="The controller uses the table that it had"):
         deploy(wrong, box_of(DirectLink(block)))
     assert used(block, tables) == "old"
@@ -229,8 +241,54 @@ def test_the_check_is_of_what_was_read_back(tables):
     assert judgement.check.passed and judgement.manifest == "none"
     altered = tables["new"].values.copy()
     altered[100] += 1e-9
-    with pytest.raises(ExportError, match="checksum"):
+    with pytest.raises(ExportError, match="was altered"):
         tables["new"].check(altered, lambda *_: None)
+
+
+def test_a_library_is_deployed_and_any_motion_of_it_that_sways_too_much_stops_that(libraries):
+    block, (old, new) = fresh(libraries), (libraries["old"], libraries["new"])
+    spec = preset_spec("paper", [*VARIABLES, "move.distance=0.2", "plant.L1=0.9"])
+    with pytest.raises(CheckFailed, match="The controller uses the table that it had"):
+        deploy(attrs.evolve(new, specs=(new.specs[0], spec, new.specs[2])), box_of(DirectLink(block)))
+    assert used(block, libraries) == "old"
+    done = deploy(new, box_of(DirectLink(block)))
+    assert (done.action, done.to_dict()["motions"]) == ("deployed", 3)
+    block.set("nProfile", np.array([2.0]))
+    block.run(100)
+    started(block)
+    while block.outputs["bBusy"][0]:
+        block.run(1)
+    assert block.outputs["fPosition"].tolist() == [0.15] and block.outputs["bDone"][0]
+    assert used(block, libraries) == "new"  # whatever is selected
+    assert deploy(old, box_of(DirectLink(block)), rollback=True).action == "rolled back"
+    assert used(block, libraries) == "old"
+
+
+def test_libraries_and_single_motions_are_told_apart(tables, libraries, block):
+    with pytest.raises(ExportError, match=r"moves\.st is a library, and .* takes a single motion"):
+        deploy(libraries["new"], box_of(DirectLink(block)))
+    with pytest.raises(ExportError, match=r"paper\.st is a single motion, and .* takes a library"):
+        deploy(tables["new"], box_of(DirectLink(fresh(libraries))))
+
+
+def test_a_library_of_constants_is_deployed_likewise(libraries, unchecked, tmp_path):
+    block = fresh(libraries)
+    path = exported_library(tmp_path, [0.25, 0.2, 0.15], "export.plc_tables=constants")
+    table = read_table(path)
+    assert deploy(table, box_of(DirectLink(block))).action == "deployed"
+    assert used(block, libraries) == "new"
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b"fStartTolerance", b"FSTARTTOLERANCE"))
+    with pytest.raises(CheckFailed, match=r"is not the library of moves\.json"):
+        read_table(path)
+    path.write_bytes(whole)
+    index = path.with_suffix(".json")
+    index.write_bytes(index.read_bytes().replace(b'"L1": ', b'"L1": 1', 1))
+    with pytest.raises(OutputError, match="tells no specs; make the library again"):
+        read_table(path)
+    index.unlink()
+    with pytest.raises(OutputError, match="no manifest"):
+        read_table(path)
 
 
 def test_a_block_that_moves_is_left_alone(tables, block, unchecked):
@@ -257,7 +315,7 @@ def test_what_does_not_fit_is_refused_with_the_cure(change, words, tables, block
 @pytest.mark.parametrize(
     ("there", "words"),
     [
-        ({"interface": 2}, "another version, 2 and not 1"),
+        ({"interface": 1}, "another version, 1 and not 2"),
         ({"axes": 2}, "another number of axes, 2 and not 1"),
         ({"capacity": 100}, "The buffers in the controller hold 100 values"),
     ],

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import parse_qsl, urlsplit
 
+import can
 import numpy as np
 import pytest
 from asyncua import Server, ua
@@ -206,3 +207,70 @@ def test_a_node_of_a_controller_is_logged(tmp_path):
     assert log.times[-1] >= 2.0 and len(log.times) > 40
     apart = [np.std(log.values - rate(log.times + late)) for late in np.linspace(0.0, 4.0, 200)]
     assert min(apart) < 0.01
+
+
+COUNTS = 4096  # of a turn
+
+
+@contextmanager
+def encoder(channel, *, answers=True, size=4):
+    """Node 5 swings about where its position turns over, in the midst of other frames."""
+    ended = threading.Event()
+
+    def message(cob_id, data, **more):
+        return can.Message(arbitration_id=cob_id, data=data, **{"is_extended_id": False} | more)
+
+    def swing():
+        with can.Bus(channel, interface="virtual") as bus:
+            while not ended.is_set():
+                asked = bus.recv(0.01)
+                if asked is not None and asked.arbitration_id == 0x605 and answers:
+                    bus.send(message(0x585, b"\x43\x01\x60\x00" + COUNTS.to_bytes(4, "little")))
+                angle = rate(time.time())
+                counted = round(angle * COUNTS / (2.0 * np.pi)) % COUNTS
+                bus.send(message(0x185, counted.to_bytes(size, "little")))
+                bus.send(message(0x186, bytes(4)))
+                bus.send(message(0x185, bytes(4), is_extended_id=True))
+                bus.send(message(0x185, b"", is_remote_frame=True))
+
+    thread = threading.Thread(target=swing)
+    thread.start()
+    try:
+        yield f"can:virtual:{channel}"
+    finally:
+        ended.set()
+        thread.join()
+
+
+@pytest.mark.parametrize(
+    ("size", "more"), [(4, ()), (2, ("--counts", "4096"))], ids=["asked for its counts", "of two bytes"]
+)
+def test_an_encoder_on_a_can_bus_is_logged(tmp_path, size, more):
+    with encoder(f"swing {size}", answers=not more, size=size) as source:
+        how = ("--node", "5", "--out", tmp_path / "swing.csv", "--for", "1.2", "--json")
+        outcome = run_here("log-swing", source, *how, *more)
+    assert outcome.code == 0, outcome.err
+    log = read_swing(tmp_path / "swing.csv", preset_spec("bay-crane"), columns=("1", "2"))
+    assert log.times[-1] >= 1.2 and len(log.times) > 40
+    waves = [np.cos(FREQUENCY * log.times), np.sin(FREQUENCY * log.times), np.ones_like(log.times)]
+    (cosine, sine, _), *_ = np.linalg.lstsq(np.stack(waves, axis=1), log.values)
+    assert np.hypot(cosine, sine) == pytest.approx(0.2, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "code", "sentence"),
+    [
+        ("can:can0", ("--node", "5"), 2, "name interface and channel, as can:socketcan:can0"),
+        ("can:virtual:x", (), 2, "--node: name the encoder's number on the bus, from 1 to 127"),
+        ("can:virtual:x", ("--node", "128"), 2, "--node: name the encoder's number"),
+        ("can:virtual:x", ("--node", "5", "--unit", "deg"), 2, "mean nothing with CAN"),
+        ("can:vitual:x", ("--node", "5"), 2, "interface vitual, channel x: cannot be opened"),
+        ("can:virtual:x", ("--node", "5"), 2, "does not tell the counts of a turn (6001h)"),
+        ("can:virtual:x", ("--node", "5", "--counts", "9"), 2, "Node 5 sends no position (185h) on x"),
+    ],
+)
+def test_an_encoder_that_is_not_there(tmp_path, monkeypatch, source, more, code, sentence):
+    monkeypatch.setattr("gen_profile.identification.encoder.SILENT", 0.5)
+    outcome = run_here("log-swing", source, *more, "--out", tmp_path / "swing.csv")
+    assert outcome.code == code and sentence in outcome.err, outcome.err
+    assert not list(tmp_path.iterdir())

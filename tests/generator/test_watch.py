@@ -144,14 +144,15 @@ def altered(place, change, phase=MOVING):
 @pytest.mark.parametrize(
     ("place", "change", "words"),
     [
-        (13, lambda x: x + 1e-9, "The position of cart is .* in cycle 4., and|of the motion"),
-        (14, lambda x: x * (1 + 1e-9), "The velocity of cart"),
-        (15, lambda x: -x, "The acceleration of cart"),
+        (14, lambda x: x + 1e-9, "The position of cart is .* in cycle 4., and|of the motion"),
+        (15, lambda x: x * (1 + 1e-9), "The velocity of cart"),
+        (16, lambda x: -x, "The acceleration of cart"),
         (8, lambda x: x + 1.0, "The position of cart"),
-        (9, lambda _: 0.25, "The position of cart"),
-        (16, lambda _: 0.999, "The position of cart"),
-        (17, lambda _: 1e-6, "The position of cart"),
-        (10, lambda _: 1.5, "The velocity of cart"),
+        (10, lambda _: 0.25, "The position of cart"),
+        (17, lambda _: 0.999, "The position of cart"),
+        (18, lambda _: 1e-6, "The position of cart"),
+        (11, lambda _: 1.5, "The velocity of cart"),
+        (9, lambda _: 1.0, "has selected motion 1, which paper.st does not hold"),
         (6, lambda x: x + 1.0, "no longer uses paper.st"),
         (4, lambda _: 1.0, "no longer uses paper.st"),
         (5, lambda _: 2.0, "the checksum of its table wrong"),
@@ -166,16 +167,16 @@ def test_whatever_differs_is_named(place, change, words, table):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 7.5])
-@pytest.mark.parametrize("place", [1, 8, 13])
+@pytest.mark.parametrize("place", [1, 8, 14])
 def test_what_is_no_state_of_a_block_is_refused(place, value, table):
     found, _ = seen(table, Machine(table, [START], altered(place, lambda _: value)))
     assert found.fault is not None
-    assert ("holds no state of a block" in str(found.fault)) == (place < 13 or not np.isfinite(value))
+    assert ("holds no state of a block" in str(found.fault)) == (place < 14 or not np.isfinite(value))
 
 
 def test_last_digits_may_differ_and_are_counted(table):
     """As a controller's compiler makes them that fuses multiplication and addition."""
-    found, _ = seen(table, Machine(table, [START], altered(14, lambda x: np.nextafter(x, 9.0))))
+    found, _ = seen(table, Machine(table, [START], altered(15, lambda x: np.nextafter(x, 9.0))))
     assert found.fault is None and 0 < found.exact < found.moving
 
 
@@ -186,8 +187,8 @@ def test_a_value_of_the_table_that_is_altered_in_the_controller_is_seen_in_the_m
         memory = machine.block._instance._memory
         at = memory.raw.find(table.values.tobytes())
         assert at >= 0
-        for row in range(int(table.values[0])):  # the first power: position at each segment's beginning
-            place = at + 8 * (table.constant("cOwn") + row)
+        for row in range(int(table.values[3])):  # the first power: position at each segment's beginning
+            place = at + 8 * (3 + table.constant("cOwn") + row)
             value = np.frombuffer(memory.raw[place : place + 8]) + 1e-6
             memory[place : place + 8] = value.tobytes()
 
@@ -267,7 +268,7 @@ def test_a_motion_that_jumps_waits_or_bends_is_told(calls, gain, words, table):
     after = machine.block.outputs["aState"].copy()
     judge.take(read_state(before, 1), 0.0)
     after[[0, -1]] = before[0] + calls
-    after[13:17] *= gain
+    after[14:18] *= gain
     with pytest.raises(CheckFailed, match=words):
         judge.take(read_state(after, 1), 0.02)
 
@@ -288,7 +289,7 @@ def test_states_of_two_cycles_are_read_again(table):
 
 def test_a_state_of_another_length_is_refused(table):
     found, _ = seen(table, Machine(table, alter=lambda values: values[:-1]))
-    assert "aState has 18 values there in place of 19" in str(found.fault)
+    assert "aState has 19 values there in place of 20" in str(found.fault)
 
 
 def test_a_refused_start_is_told_and_no_fault(table):

@@ -11,7 +11,7 @@ from gen_profile_exporters.text_parts import text_parts
 
 OPENPLC = "_openplc.st"
 CYCLE = "fCycleTime"  # is the task's
-FIRST = {"VAR_INPUT": 0, "VAR_OUTPUT": 64}  # numbers of the addresses
+STEP = 64  # the first address of the outputs, or a multiple of it behind many inputs
 AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML", "LINT": "ML"}  # coils, memory of 32 and of 64 bits
 NUMBER = BlockVariable(section="VAR_OUTPUT", name="nCycle", type="LINT", comment="so many")
 
@@ -35,26 +35,28 @@ def openplc_files(text: str, file: str) -> tuple[File]:
     (cycle,) = (float(v.initial) for v in source.variables if v.name == CYCLE)
     inputs, outputs = (
         [v for v in source.variables if v.section == section and not v.array and v.name != CYCLE]
-        for section in FIRST
+        for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
     project = text_parts("planner/openplc.st")["project"].format(
         file=plain(file),
         name=source.name,
         milliseconds=f"{1e3 * cycle:g}",
         block=text,
-        located="\n".join([*_located(inputs), *_located([NUMBER, *outputs])]),
+        located="\n".join(
+            [*_located(inputs, 0), *_located([NUMBER, *outputs], STEP * -(-len(inputs) // STEP))]
+        ),
         arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
         results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
     )
     return (File(filename=f"{file}{OPENPLC}", content=f"{project}\n".encode("ascii")),)
 
 
-def _located(variables: Iterable[BlockVariable]) -> Iterator[str]:
-    """Declare variables at the next addresses of their areas."""
+def _located(variables: Iterable[BlockVariable], first: int) -> Iterator[str]:
+    """Declare variables at the next addresses of their areas, from the first one on."""
     numbers: dict[str, int] = {}
     for v in variables:
         area = AREAS[v.type]
-        number = numbers.setdefault(area, FIRST[v.section])
+        number = numbers.setdefault(area, first)
         numbers[area] += 1
         place = f"{number // 8}.{number % 8}" if v.type == "BOOL" else str(number)
         initial = f" := {v.initial}" if v.initial else ""

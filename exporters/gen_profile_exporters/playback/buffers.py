@@ -1,58 +1,91 @@
 """The playback block with variables in place of constants: two buffers, of which one is in use.
 
-The block is that of constants (`structured_text`), with a handful of changes that can be undone: what is the
-motion's own stands in an array of LREAL, twice; the statements take it from the buffer in use; ahead of
-them stand others (``text/buffers.st``) that answer requests, and behind them some (``text/state.st``) that
-show how the block stands. A buffer holds
+The block is that of constants (`structured_text`), with a handful of changes: what is the motion's own stands
+in an array of LREAL, twice; the statements take it from the buffer in use; ahead of them stand others
+(``text/buffers.st``) that answer requests, and behind them some (``text/state.st``) that show how the block
+stands. A buffer holds
 
-    rows, checks, last segment, last, play on, checksum, slope, slope rate,
-    room, inverse, stop jerk, start, target, least scale, mirrors, shifts of each axis,
-    the table, column by column
+    length, checksum, checks                           of all that it holds
+    number of motions, where each begins               in a library (`library`) only
+    of each motion: rows, checks, last segment, last, play on, checksum, slope, slope rate,
+        room, inverse, stop jerk, start, target, least scale, mirrors, shifts of each axis,
+        the table, column by column
 
-The checksum is that of the block of constants: over the table and all other numbers, those included that
-stay constants, as the cycle time. So a table for another cycle or number of axes has a wrong one here.
+The first checksum is over the whole buffer, with the cycle time in its own place: a table for another cycle
+has a wrong one here. A motion's own is that of its block of constants, which can be told from it.
 """
 
 from __future__ import annotations
 
 import re
 import zlib
-from itertools import chain
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import accumulate, chain
 from math import ceil
 from pathlib import Path
 
 import attrs
+import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser, ordered
+from gen_profile_exporters.block_source import (
+    BlockSource,
+    BlockVariable,
+    initialiser,
+    parse_function_block,
+)
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.block import variable_names
+from gen_profile_exporters.playback.block import fill
 from gen_profile_exporters.playback.layouts import LAYOUTS
-from gen_profile_exporters.playback.table import counted_axes
+from gen_profile_exporters.playback.table import checks_of, counted_axes
+from gen_profile_exporters.playback.table_checksum import checksum
+from gen_profile_exporters.text_parts import text_parts
 
-INTERFACE = 1  # version of the requests
+INTERFACE = 2  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
 LEAST_CAPACITY, MOST_CAPACITY = 2048, 1 << 17
 PATIENCE = 30.0  # s that a client may be silent before another one may write
 REQUEST, REPLY, STATE, TABLE = "aRequest", "aReply", "aState", "aTable"
 
+HEAD = ("length", "checksum", "checks")
+CHECKSUM = HEAD.index("checksum")
 SCALARS = ("Rows", "Checks", "LastSegment", "Last", "PlayOn", "Checksum", "Slope", "SlopeRate")
 PER_AXIS = ("Room", "Inverse", "StopJerk", "Start", "Target", "LeastScale", "Mirrors", "Shifts")
-CHECKSUM = SCALARS.index("Checksum")
+OF_BUFFER = ("Checks", "Checksum")  # not the motion's own: that of the whole buffer counts
+WHOLE = SCALARS[:6]
 LAYOUT_NAMES = tuple(LAYOUTS)
+SAMPLED = ("Position", "Velocity", "Acceleration")
 COLUMNS = {
-    "segments": (*(f"cPower{power}" for power in range(6)), "cFirst"),
-    "samples": ("cPosition", "cVelocity", "cAcceleration"),
-    "counts": ("cPosition", "cVelocity", "cAcceleration"),
+    "segments": (*(f"Power{power}" for power in range(6)), "First"),
+    "samples": SAMPLED,
+    "counts": SAMPLED,
 }
-STATE_HEAD = 13  # values of the state ahead of those of each axis
+LIBRARY = "nProfile"  # the input that a library has
+_REFUSAL = "    IF nProfile <> nSelected THEN nErrorId := 6; END_IF;\n"
+_LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others mean nothing without a motion
+ALTERED = "The block's buffers were altered; export it again."
+STATE_HEAD = 14  # values of the state ahead of those of each axis
 AXIS_STATE = ("Position", "Velocity", "Acceleration", "Gain", "Shift")
 RESULTS = ("cAccepted", "cHeld", "cMoves", "cUnfit")
 TRIALS = ("cUntried", "cTried", "cPassed", "cRejected")
 VARIABLES = {
     "LREAL": ("fHolder", "fCalls"),
-    "DINT": ("nBase", "nIdle", "nTable", "nPlace", "nCount", "nResult", "nTrial", "nQuiet", "nRuns"),
-    "BOOL": ("bLoaded", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
+    "DINT": (
+        "nBase",
+        "nIdle",
+        "nMotion",
+        "nTable",
+        "nLength",
+        "nChecks",
+        "nPlace",
+        "nCount",
+        "nResult",
+        "nTrial",
+        "nQuiet",
+        "nRuns",
+    ),
+    "BOOL": ("bLoaded", "bLoad", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
 }
 NOTE = """\
     Its numbers are variables, in two buffers, which gen-profile deploy writes through aRequest and reads
@@ -61,14 +94,17 @@ NOTE = """\
 
 """
 
-TEXT = Path(__file__).with_name("text")
-_TEMPLATE, _STATE = ((TEXT / f"{name}.st").read_text("ascii") for name in ("buffers", "state"))
+DROPPED = ("nCheckRows", "nCheckColumn")  # of the block of constants
+
+_PARTS = text_parts("playback/text/buffers.st")
+_STATE = Path(__file__).with_name("text").joinpath("state.st").read_text("ascii")
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
-_TAKEN = re.compile(rf"\bt({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(
-    r"(DINT_TO_LREAL\()?\b(cPower\d|cFirst|cPosition|cVelocity|cAcceleration)\[([^\[\]]*)\](?(1)\))"
+    r"(DINT_TO_LREAL\()?\bc(Power\d|First|Position|Velocity|Acceleration)\[([^\[\]]*)\](?(1)\))"
 )
-_PLACE = re.compile(rf"(LREAL_TO_DINT\()?{TABLE}\[nTable \+ (\d) \* tRows \+ ([^\[\]]*)\](?(1)\))")
+_CHECKED = re.compile(r" *fValue := 0\.0;\n.*?(?= *\(\* A double as)", re.DOTALL)
+_CHECKED_END = re.compile(r" *IF nCheckRow >= nCheckRows THEN\n.*?(?= *END_FOR;\nEND_IF;)", re.DOTALL)
+_WAIT = re.compile(r"\d+ cycles after power-up")
 
 
 def is_buffered(source: BlockSource) -> bool:
@@ -76,75 +112,97 @@ def is_buffered(source: BlockSource) -> bool:
     return any(variable.name == TABLE for variable in source.variables)
 
 
-def kind_of(target: Target, layout: str) -> int:
-    """Hash what two blocks must have in common for one to play the other's table: layout, axes, units."""
+def kind_of(target: Target, layout: str, *, library: bool) -> int:
+    """Hash what two blocks must have in common for one to play the other's tables: layout, axes, units."""
     counted = counted_axes(target, layout)
     axes = ", ".join(f"{axis.name} {axis.unit} {axis.factor!r}" for axis in counted)
-    return zlib.crc32(f"playback {layout}: {axes}".encode()) >> 1
+    return zlib.crc32(f"playback {layout}{' library' * library}: {axes}".encode()) >> 1
 
 
-def buffered(source: BlockSource, target: Target, capacity: int | None = None) -> BlockSource:
-    """Put variables in place of a block's constants.
+def buffered(sources: Sequence[BlockSource], target: Target, *, library: bool = False) -> BlockSource:
+    """Put variables in place of constants.
 
     Parameters
     ----------
-    source : BlockSource
-        With constants.
+    sources : sequence of BlockSource
+        Blocks of constants that differ in their motions only: one, or those of a library.
     target : Target
-    capacity : int, optional
-        Values that a buffer holds; with room for a longer table if not given.
+    library : bool
+        Whether an input selects the motion.
 
     Raises
     ------
     ExportError
-        The table is too long.
+        They are too long.
     """
-    declared = {variable.name: variable for variable in source.variables}
-    layout = _layout(declared)
-    columns, axes = COLUMNS[layout], len(_split(declared["cStart"]))
-    texts = _texts(declared, columns, axes)
+    return _buffered(sources, target, None, library=library)
+
+
+def _buffered(
+    sources: Sequence[BlockSource], target: Target, capacity: int | None, *, library: bool
+) -> BlockSource:
+    declared = {variable.name: variable for variable in sources[0].variables}
+    layout, axes = _layout(declared), len(_split(declared["cStart"]))
+    cycle = float(declared["cCycleTime"].initial)
+    texts = _texts([_motion_texts(source, layout, axes) for source in sources], cycle, library=library)
     if capacity is None:
-        capacity = max(LEAST_CAPACITY, 1 << (len(texts) + len(columns) - 1).bit_length())
-    if len(texts) + len(columns) > min(capacity, MOST_CAPACITY):
+        capacity = max(LEAST_CAPACITY, 1 << len(texts).bit_length())
+    if len(texts) > min(capacity, MOST_CAPACITY):
         raise ExportError(
             f"export.plc_tables: {len(texts)} values do not fit a buffer of {min(capacity, MOST_CAPACITY)}; "
             'take export.plc_layout = "segments", a longer export.cycle_time, or plc_tables = "constants".'
         )
-    empty = ["0.0"] * (2 * capacity - len(texts))
     constants = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)}
     constants |= {
         "cInterface": INTERFACE,
-        "cKind": kind_of(target, layout),
+        "cKind": kind_of(target, layout, library=library),
         "cLayout": LAYOUT_NAMES.index(layout),
         "cCapacity": capacity,
         "cOwn": len(SCALARS) + axes * len(PER_AXIS),
-        "cPatience": ceil(PATIENCE / float(declared["cCycleTime"].initial)),
+        "cPatience": ceil(PATIENCE / cycle),
     }
+    of_constants = {*(f"c{name}" for name in (*COLUMNS[layout], *OF_BUFFER)), *DROPPED}
+    taken = (_taken(one) for one in sources[0].variables if one.name not in of_constants)
+    wait = f"{-(-len(texts) // int(float(texts[HEAD.index('checks')])))} cycles after power-up"
+    return BlockSource(
+        header=_WAIT.sub(
+            wait, sources[0].header.replace("    nErrorId: 0 none", f"{NOTE}    nErrorId: 0 none")
+        ),
+        name=sources[0].name,
+        variables=(*taken, *_added(texts, capacity, axes, constants, library=library)),
+        body=_prelude(layout, axes, library=library)
+        + _from_buffer(refusing(sources[0].body) if library else sources[0].body, layout)
+        + _shown_state(axes, library=library),
+    )
+
+
+def _added(
+    texts: list[str], capacity: int, axes: int, constants: dict[str, int], *, library: bool
+) -> list[BlockVariable]:
+    """Declare the requests, the buffers, and what belongs to them."""
     window, both = f"ARRAY [0..{LENGTH - 1}] OF LREAL", f"ARRAY [0..{2 * capacity - 1}] OF LREAL"
-    variables = (
-        *(_taken(one) for one in source.variables if one.name not in columns),
+    whole = [*texts, *["0.0"] * (2 * capacity - len(texts))]
+    state = f"ARRAY [0..{state_length(axes) - 1}] OF LREAL"
+    variables = [
         BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
         BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
-        BlockVariable(section="VAR_OUTPUT", name=STATE, type=f"ARRAY [0..{state_length(axes) - 1}] OF LREAL"),
-        BlockVariable(section="VAR", name=TABLE, type=both, initial=initialiser([*texts, *empty])),
-        *(
-            BlockVariable(section="VAR", name=name, type=kind)
-            for kind, of in VARIABLES.items()
-            for name in of
-        ),
-        *(
-            BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(value))
-            for name, value in constants.items()
-        ),
-    )
-    if layout != "segments":  # its place in a buffer is there all the same
-        variables = (*variables, BlockVariable(section="VAR", name="tLastSegment", type="DINT"))
-    return BlockSource(
-        header=source.header.replace("    nErrorId: 0 none", f"{NOTE}    nErrorId: 0 none"),
-        name=source.name,
-        variables=variables,
-        body=_prelude(layout, axes) + _from_buffer(source.body, layout) + _shown_state(axes),
-    )
+        BlockVariable(section="VAR_OUTPUT", name=STATE, type=state),
+        BlockVariable(section="VAR", name=TABLE, type=both, initial=initialiser(whole)),
+    ]
+    variables += [
+        BlockVariable(section="VAR", name=name, type=kind) for kind, of in VARIABLES.items() for name in of
+    ]
+    if library:
+        comment = "which motion, from 0 on"
+        variables += [
+            BlockVariable(section="VAR_INPUT", name=LIBRARY, type="DINT", comment=comment),
+            BlockVariable(section="VAR", name="nSelected", type="DINT", comment="it, once nothing moved"),
+        ]
+    variables += [
+        BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(value))
+        for name, value in constants.items()
+    ]
+    return variables
 
 
 def state_length(axes: int) -> int:
@@ -153,22 +211,20 @@ def state_length(axes: int) -> int:
 
 
 def buffer_texts(source: BlockSource) -> list[str]:
-    """List the values of the first buffer that belong to the table in it.
+    """List the values of the first buffer that belong to the motions in it.
 
     Raises
     ------
     ExportError
         They were altered so that they are none.
     """
-    variables = {variable.name: variable for variable in source.variables}
     try:
-        texts, rows = variables[TABLE].elements, int(float(variables[TABLE].elements[0]))
-        layout = LAYOUT_NAMES[int(variables["cLayout"].initial)]
-        length = int(variables["cOwn"].initial) + rows * len(COLUMNS[layout])
-        if rows < 1 or length > len(texts) // 2:
-            raise ValueError("sizes")
-    except (KeyError, ValueError, IndexError, OverflowError) as error:
-        raise ExportError("The block's buffers were altered; export it again.") from error
+        (texts,) = (variable.elements for variable in source.variables if variable.name == TABLE)
+        length = int(float(texts[0]))
+        if not len(HEAD) < length <= len(texts) // 2:
+            raise ValueError("length")
+    except (ValueError, IndexError, OverflowError) as error:
+        raise ExportError(ALTERED) from error
     return texts[:length]
 
 
@@ -182,28 +238,50 @@ def with_buffer(source: BlockSource, texts: list[str]) -> BlockSource:
     )
 
 
-def constant_source(source: BlockSource, target: Target) -> BlockSource:
-    """Undo `buffered`: give the block of constants that plays what the first buffer holds.
+def constant_sources(source: BlockSource, target: Target) -> list[BlockSource]:
+    """Undo `buffered`: give the blocks of constants that play what the first buffer holds.
 
     Raises
     ------
     ExportError
         The block is none that `buffered` gives.
     """
-    texts = buffer_texts(source)
+    texts, library = buffer_texts(source), is_library(source)
     try:
         variables = {variable.name: variable for variable in source.variables}
         layout = LAYOUT_NAMES[int(variables["cLayout"].initial)]
-        back = _constants(source, texts, layout, len(target.axes))
-        again = buffered(back, target, len(variables[TABLE].elements) // 2)
+        starts = [len(HEAD)]
+        if library:
+            count = int(float(texts[len(HEAD)]))
+            starts = [int(float(text)) for text in texts[len(HEAD) + 1 :][:count]]
+        parts = [texts[start:end] for start, end in zip(starts, [*starts[1:], len(texts)], strict=True)]
+        back = [
+            parse_function_block(_constant_text(variables, source, part, layout, target)) for part in parts
+        ]
+        again = _buffered(back, target, len(variables[TABLE].elements) // 2, library=library)
     except (KeyError, ValueError, IndexError, OverflowError, ZeroDivisionError) as error:
-        raise ExportError("The block's buffers were altered; export it again.") from error
+        raise ExportError(ALTERED) from error
     if again.program() != source.program():
         raise ExportError(
             "The block does not take its numbers from its buffers as it should, or is for other axes: it was "
             "altered; export it again."
         )
-    return back
+    return [attrs.evolve(one, header=source.header) for one in back]
+
+
+def refusing(body: str) -> str:
+    """Refuse to start while `LIBRARY` counts no motion."""
+    return body.replace(_LAST_REFUSAL, _LAST_REFUSAL + _REFUSAL)
+
+
+def without_refusal(body: str) -> str:
+    """Undo `refusing`."""
+    return body.replace(_LAST_REFUSAL + _REFUSAL, _LAST_REFUSAL)
+
+
+def is_library(source: BlockSource) -> bool:
+    """Tell whether an input selects what a block plays."""
+    return any(variable.name == LIBRARY for variable in source.variables)
 
 
 def _layout(variables: dict[str, BlockVariable]) -> str:
@@ -213,12 +291,26 @@ def _layout(variables: dict[str, BlockVariable]) -> str:
     return "counts" if array is not None and array[2] == "DINT" else "samples"
 
 
-def _texts(variables: dict[str, BlockVariable], columns: tuple[str, ...], axes: int) -> list[str]:
+def _texts(motions: Sequence[list[str]], cycle: float, *, library: bool) -> list[str]:
+    """List the values of a buffer, as literals of LREAL."""
+    starts: list[int] = []
+    if library:
+        begin = len(HEAD) + 1 + len(motions)
+        starts = [len(motions), *accumulate(map(len, motions[:-1]), initial=begin)]
+    content = [*(f"{number}.0" for number in starts), *chain.from_iterable(motions)]
+    length = len(HEAD) + len(content)
+    checks = checks_of(length, cycle)
+    counted = np.array([length, cycle, checks, *map(float, content)])
+    return [f"{number}.0" for number in (length, checksum(counted), checks)] + content
+
+
+def _motion_texts(source: BlockSource, layout: str, axes: int) -> list[str]:
     """List the values of a block of constants in the order of a buffer, as literals of LREAL."""
+    variables = {variable.name: variable for variable in source.variables}
     scalars = [variables[f"c{name}"].initial if f"c{name}" in variables else "0" for name in SCALARS]
     own = [_split(variables[f"c{name}"]) for name in PER_AXIS]
-    rows = [_split(variables[name]) for name in columns]
-    if "cFirst" in columns:  # of every axis alike
+    rows = [_split(variables[f"c{name}"]) for name in COLUMNS[layout]]
+    if layout == "segments":  # of every axis alike
         rows[-1] = [text for text in rows[-1] for _ in range(axes)]
     return [_as_real(text) for text in chain(scalars, *zip(*own, strict=True), *rows)]
 
@@ -232,6 +324,39 @@ def _as_real(text: str) -> str:
     return text if "." in text else f"{text}.0"
 
 
+def _constant_text(
+    variables: dict[str, BlockVariable], source: BlockSource, texts: list[str], layout: str, target: Target
+) -> str:
+    """Write the block of constants of a motion's values."""
+    axes, columns = len(target.axes), COLUMNS[layout]
+    own = len(SCALARS) + axes * len(PER_AXIS)
+    rows = (len(texts) - own) // len(columns)
+    values = {name: [text.removesuffix(".0")] for name, text in zip(WHOLE, texts, strict=False)}
+    values |= dict(zip(SCALARS[len(WHOLE) :], ([text] for text in texts[len(WHOLE) :]), strict=False))
+    values |= {name: texts[len(SCALARS) + k : own : len(PER_AXIS)] for k, name in enumerate(PER_AXIS)}
+    for name in ("Mirrors", "Shifts"):
+        values[name] = [{"0.0": "FALSE", "1.0": "TRUE"}.get(text, text) for text in values[name]]
+    for number, name in enumerate(columns):
+        column = texts[own + number * rows : own + (number + 1) * rows]
+        column = column[::axes] if name == "First" else column
+        whole = _is_whole(name, layout)
+        values[name] = [text.removesuffix(".0") if whole else text for text in column]
+    arrays = (*columns, *(PER_AXIS if axes > 1 else ()))
+    holes = {
+        re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): f"[{', '.join(of)}]" if name in arrays else of[0]
+        for name, of in values.items()
+    }
+    holes |= {
+        "row_count": holes.pop("rows"),
+        "rows": f"[0..{rows - 1}]",
+        "segments": f"[0..{rows // axes - 1}]",
+        "cycle_time": variables["cCycleTime"].initial,
+        "start_tolerance": variables["fStartTolerance"].initial,
+        "block": source.name,
+    }
+    return fill(defaultdict(str, holes), layout, axes)
+
+
 def _taken(variable: BlockVariable) -> BlockVariable:
     """Make a variable of a constant that is the motion's own."""
     if not _OWN.fullmatch(variable.name):
@@ -243,94 +368,57 @@ def _from_buffer(body: str, layout: str) -> str:
     """Make the statements look their numbers up in the buffer in use."""
 
     def place(match: re.Match[str]) -> str:
-        name, index = match[2], match[3] if match[2] != "cFirst" else f"cAxes * ({match[3]})"
-        text = f"{TABLE}[nTable + {COLUMNS[layout].index(name)} * cRows + {index}]"
+        name, index = match[2], match[3] if match[2] != "First" else f"cAxes * ({match[3]})"
+        text = f"{TABLE}[nTable + {COLUMNS[layout].index(name)} * tRows + {index}]"
         # one that is wanted as a real number need not fit DINT if it was altered
         return f"LREAL_TO_DINT({text})" if _is_whole(name, layout) and not match[1] else text
 
+    body = _CHECKED.sub(lambda _: f"{_PARTS['checked_value']}\n", body, count=1)
+    body = _CHECKED_END.sub(lambda _: f"{_PARTS['checked_end']}\n", body, count=1)
+    body = body.replace("TO cChecks DO", "TO nChecks DO")
     return _OWN.sub(r"t\1", _COLUMN.sub(place, body))
 
 
-def _to_constants(body: str, layout: str) -> str:
-    """Undo `_from_buffer`."""
-
-    def place(match: re.Match[str]) -> str:
-        name, index = COLUMNS[layout][int(match[2])], match[3]
-        if name == "cFirst":
-            index = index.removeprefix("cAxes * (").removesuffix(")")
-        text = f"{name}[{index}]"
-        return f"DINT_TO_LREAL({text})" if _is_whole(name, layout) and not match[1] else text
-
-    return _TAKEN.sub(r"c\1", _PLACE.sub(place, body))
-
-
 def _is_whole(column: str, layout: str) -> bool:
-    return column == "cFirst" or layout == "counts"
+    return column == "First" or layout == "counts"
 
 
-def _constants(source: BlockSource, texts: list[str], layout: str, axes: int) -> BlockSource:
-    """Undo all changes but the header's."""
-    columns = COLUMNS[layout]
-    own = len(SCALARS) + axes * len(PER_AXIS)
-    rows = (len(texts) - own) // len(columns)
-    values = {name: [texts[number]] for number, name in enumerate(SCALARS)}
-    values |= {name: texts[len(SCALARS) + k : own : len(PER_AXIS)] for k, name in enumerate(PER_AXIS)}
-    back = [_given_back(one, values) for one in source.variables]
-    for number, name in enumerate(columns):
-        column = texts[own + number * rows : own + (number + 1) * rows]
-        if name == "cFirst":
-            column = column[::axes]
-        of = "DINT" if _is_whole(name, layout) else "LREAL"
-        initial = initialiser([_as(of, text) for text in column])
-        declared = f"ARRAY [0..{len(column) - 1}] OF {of}"
-        back.append(BlockVariable(section="VAR CONSTANT", name=name, type=declared, initial=initial))
-    names = variable_names(layout, axes)
-    back = [one for one in back if one.name in names]
-    body = source.body.removeprefix(_prelude(layout, axes)).removesuffix(_shown_state(axes))
-    body = _to_constants(body, layout)
-    return ordered(attrs.evolve(source, variables=tuple(back), body=body), names)
-
-
-def _given_back(variable: BlockVariable, values: dict[str, list[str]]) -> BlockVariable:
-    if not _TAKEN.fullmatch(variable.name):
-        return variable
-    type_ = variable.array[2] if variable.array else variable.type
-    texts = [_as(type_, text) for text in values[variable.name[1:]]]
-    initial = f"[{', '.join(texts)}]" if variable.array else texts[0]
-    return attrs.evolve(variable, section="VAR CONSTANT", name=f"c{variable.name[1:]}", initial=initial)
-
-
-def _as(type_: str, text: str) -> str:
-    if type_ == "BOOL":
-        return {"0.0": "FALSE", "1.0": "TRUE"}.get(text, text)
-    return text.removesuffix(".0") if type_ == "DINT" else text
-
-
-def _prelude(layout: str, axes: int) -> str:
-    types = dict.fromkeys(SCALARS[: CHECKSUM + 1], "LREAL_TO_DINT({})")
+def _prelude(layout: str, axes: int, *, library: bool) -> str:
+    taken = [name for name in SCALARS if name not in OF_BUFFER]
+    taken = [name for name in taken if name != "LastSegment" or layout == "segments"]
     lines = [
-        f"t{name} := {types.get(name, '{}').format(f'{TABLE}[nBase + {number}]')};"
-        for number, name in enumerate(SCALARS)
+        f"t{name} := {'LREAL_TO_DINT({})' if name in WHOLE else '{}'};".format(
+            f"{TABLE}[nMotion + {SCALARS.index(name)}]"
+        )
+        for name in taken
     ]
-    step, indent = len(PER_AXIS), "    " * (axes > 1)
+    step, indent_ = len(PER_AXIS), "    " * (axes > 1)
     at, index = (f" + {step} * nAxis", "[nAxis]") if axes > 1 else ("", "")
     first = len(SCALARS) - (step if axes > 1 else 0)
     own = [
-        f"{indent}t{name}{index} := {TABLE}[nBase{at} + {first + number}]"
+        f"{indent_}t{name}{index} := {TABLE}[nMotion{at} + {first + number}]"
         f"{' > 0.5' if name in ('Mirrors', 'Shifts') else ''};"
         for number, name in enumerate(PER_AXIS)
     ]
     lines += ["FOR nAxis := 1 TO cAxes DO", *own, "END_FOR;"] if axes > 1 else own
-    loads = "\n".join(f"    {line}" for line in lines)
-    return _TEMPLATE.replace("@columns", str(len(COLUMNS[layout]))).replace("@loads", loads)
+    text = f"{_PARTS['requests']}\n"
+    parts = {
+        "loads": "\n".join(f"        {line}" for line in lines),
+        "selection": _PARTS["selection"] if library else "",
+        "place": _PARTS["place"] if library else f"    nMotion := nBase + {len(HEAD)};",
+    }
+    for name, part in parts.items():
+        text = text.replace(f"@{name}\n", f"{part}\n" if part else "")
+    return text
 
 
-def _shown_state(axes: int) -> str:
+def _shown_state(axes: int, *, library: bool) -> str:
     step = len(AXIS_STATE)
-    at, index, indent = (f" + {step} * nAxis", "[nAxis]", "    ") if axes > 1 else ("", "", "")
+    at, index, indent_ = (f" + {step} * nAxis", "[nAxis]", "    ") if axes > 1 else ("", "", "")
     first = STATE_HEAD - (step if axes > 1 else 0)
     lines = [
-        f"{indent}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(AXIS_STATE)
+        f"{indent_}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(AXIS_STATE)
     ]
     lines = ["FOR nAxis := 1 TO cAxes DO", *lines, "END_FOR;"] if axes > 1 else lines
-    return _STATE.replace("@axes", "\n".join(lines)).replace("@last", str(state_length(axes) - 1))
+    text = _STATE.replace("@axes", "\n".join(lines)).replace("@last", str(state_length(axes) - 1))
+    return text.replace("@motion", "DINT_TO_LREAL(nSelected)" if library else "0.0")

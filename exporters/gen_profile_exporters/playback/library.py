@@ -19,7 +19,14 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.buffers import is_buffered
+from gen_profile_exporters.playback.buffers import (
+    buffered,
+    constant_sources,
+    is_buffered,
+    is_library,
+    refusing,
+    without_refusal,
+)
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
     block_name,
@@ -37,8 +44,6 @@ SEGMENTS = "cFirst"
 ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
 
 SELECTION = Path(__file__).with_name("text").joinpath("selection.st").read_text("ascii") + "\n"
-REFUSAL = "    IF nProfile <> nSelected THEN nErrorId := 6; END_IF;\n"
-_LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others mean nothing without a motion
 
 OUTPUTS = ("fPosition",)  # which begins at the start
 OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *OUTPUTS)
@@ -84,11 +89,12 @@ def library_source(entries: Sequence[LibraryEntry], target: Target) -> BlockSour
     ExportError
         They differ in more than their motions, were altered, or are too much to compile.
     """
-    sources = [entry.source for entry in entries]
-    if any(map(is_buffered, sources)):
-        raise ExportError(
-            'export.plc_tables: a library holds constants; sweep with export.plc_tables = "constants".'
-        )
+    variables = any(is_buffered(entry.source) for entry in entries)
+    sources = [
+        one
+        for entry in entries
+        for one in (constant_sources(entry.source, target) if is_buffered(entry.source) else [entry.source])
+    ]
     for number, source in enumerate(sources):
         if _common(source) != _common(sources[0]):
             raise ExportError(
@@ -101,7 +107,11 @@ def library_source(entries: Sequence[LibraryEntry], target: Target) -> BlockSour
             f"The tables of all profiles have {rows} rows, and no more than {MOST_SAMPLES} were seen to "
             "compile; split them into several libraries."
         )
-    return _assembled(sources, _header(entries, target), block_name(target.name))
+    header, name = _header(entries, target), block_name(target.name)
+    if variables:
+        sources[0] = attrs.evolve(sources[0], header=header, name=name)
+        return buffered(sources, target, library=True)
+    return _assembled(sources, header, name)
 
 
 def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, ...]:
@@ -115,17 +125,27 @@ def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, 
     ExportError
         The block is no such library, or was altered.
     """
+    singles = constant_sources(library, target) if is_buffered(library) else _singles(library)
+    return tuple(read_block(single.text(), target) for single in singles)
+
+
+def constant_singles(source: BlockSource) -> list[BlockSource]:
+    """Take a block of constants apart that plays one motion, or any of several; raises as `read_library`."""
+    return _singles(source) if is_library(source) else [source]
+
+
+def _singles(library: BlockSource) -> list[BlockSource]:
+    """Take a library's motions out, and make sure that it selects them as it should."""
     arrays = {variable.name: variable.elements for variable in library.variables if variable.array}
     try:
         singles = [_single(library, arrays, number) for number in range(len(arrays[FIRST_ROW]))]
     except (KeyError, ValueError, IndexError) as error:
         raise ExportError("The block is no library of motions, or was altered; export it again.") from error
-    motions = tuple(read_block(single.text(), target) for single in singles)
     if _assembled(singles, library.header, library.name).program() != library.program():
         raise ExportError(
             "The block does not select its motions as it should: it was altered; export it again."
         )
-    return motions
+    return singles
 
 
 def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockSource:
@@ -203,13 +223,12 @@ def _selecting(body: str) -> str:
     body = _AXIS.sub(r"\1[nSelected * cAxes + nAxis - 1]", body)
     body = _TABLE.sub(rf"\1[{FIRST_ROW}[nSelected] + \2]", body)
     body = _SEGMENT.sub(rf"{SEGMENTS}[{FIRST_SEGMENT}[nSelected] + \1]", body)
-    return SELECTION + body.replace(_LAST_REFUSAL, _LAST_REFUSAL + REFUSAL)
+    return SELECTION + refusing(body)
 
 
 def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) -> BlockSource:
     """Undo all that, for one motion."""
-    body = library.body.removeprefix(SELECTION).replace(_LAST_REFUSAL + REFUSAL, _LAST_REFUSAL)
-    body = _OFFSET.sub(r"\1[\2]", body)
+    body = _OFFSET.sub(r"\1[\2]", without_refusal(library.body.removeprefix(SELECTION)))
     body = body.replace("[nSelected * cAxes + nAxis - 1]", "[nAxis]").replace("[nSelected]", "")
     axes = len(arrays["cStart"]) // len(arrays[FIRST_ROW])
     rows, first_row = int(arrays[ROWS][number]), int(arrays[FIRST_ROW][number])

@@ -96,7 +96,7 @@ class PlaybackTable:
 
     def checks(self) -> int:
         """Values that the block takes into its checksum in a cycle."""
-        return max(LEAST_CHECKS, ceil(len(self.values()) * self.cycle_time / CHECKED_WITHIN))
+        return checks_of(len(self.values()), self.cycle_time)
 
     @cached_property
     def play_on(self) -> int:
@@ -183,6 +183,11 @@ class PlaybackTable:
             coefficients=np.moveaxis(self.columns, 0, 1),
             target=self.target,
         )
+
+
+def checks_of(values: int, cycle_time: float) -> int:
+    """Tell how many of so many values are to enter a checksum in a cycle."""
+    return max(LEAST_CHECKS, ceil(values * cycle_time / CHECKED_WITHIN))
 
 
 def tabulate(profile: Profile, target: Target) -> PlaybackTable:

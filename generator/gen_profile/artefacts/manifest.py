@@ -132,7 +132,7 @@ class Manifest:
     def to_json(self) -> bytes:
         """Render, UTF-8."""
         document = {"format": FORMAT, "format_version": FORMAT_VERSION, **self.to_dict()}
-        document[SEAL] = _seal(document)
+        document[SEAL] = seal_of(document)
         return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
 
 
@@ -152,7 +152,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
     """
     try:
         document = parse_json(content.decode("utf-8"))
-        seal, computed = document.pop(SEAL, None), _seal(document)
+        seal, computed = document.pop(SEAL, None), seal_of(document)
         if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
         manifest = _from_dict(document)
@@ -168,7 +168,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
     return manifest
 
 
-def _seal(document: Mapping[str, Any]) -> str:
+def seal_of(document: Mapping[str, Any]) -> str:
     """Hash a document, whatever its order and layout."""
     return sha256(json.dumps(document, sort_keys=True, separators=(",", ":")).encode("ascii"))
 

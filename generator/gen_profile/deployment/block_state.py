@@ -11,6 +11,7 @@ from gen_profile_exporters.playback.buffers import AXIS_STATE, STATE, STATE_HEAD
 
 IDLE, WAITING, MOVING, DONE, ABORTED, FAILED = range(6)
 PHASES = ("idle", "waiting", "moving", "done", "aborted", "failed")
+WHOLE = 10  # values that are whole numbers, ahead of the others
 MOST = 2.0**52  # of whatever is counted
 
 
@@ -36,7 +37,9 @@ class BlockState:
     runs : int
         Starts since the block was loaded, those of a way that was left included.
     cycle : int
-        Along the path, and
+        Along the path of
+    motion : int
+        the one that is selected, and
     fraction : float
         of the next cycle.
     rate, slope : float
@@ -58,6 +61,7 @@ class BlockState:
     checksum: int
     runs: int
     cycle: int
+    motion: int
     fraction: float
     rate: float
     slope: float
@@ -105,7 +109,7 @@ def read_state(values: Array, axes: int) -> BlockState | None:
         )
     if values[0] != values[-1] or values[0] == 0.0:
         return None
-    whole = values[:9]
+    whole = values[:WHOLE]
     if not np.isfinite(values).all() or (whole != np.floor(whole)).any() or not _in_range(whole):
         raise DeploymentError(
             f"{STATE} holds no state of a block; let the controller show it as an array of LREAL, "
@@ -114,7 +118,7 @@ def read_state(values: Array, axes: int) -> BlockState | None:
     counts = [int(value) for value in whole.tolist()]
     of_axes = values[STATE_HEAD:-1].reshape(axes, len(AXIS_STATE)).T
     names = [field.name for field in attrs.fields(BlockState)]
-    fields = dict(zip(names, (*counts, *values[9:STATE_HEAD].tolist(), *of_axes), strict=True))
+    fields = dict(zip(names, (*counts, *values[WHOLE:STATE_HEAD].tolist(), *of_axes), strict=True))
     return BlockState(**fields | {"off_nominal": bool(fields["off_nominal"])})
 
 

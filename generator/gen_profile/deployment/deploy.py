@@ -24,7 +24,8 @@ from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
 from gen_profile.verification.check import Judgement
-from gen_profile_exporters.playback.buffers import COLUMNS, INTERFACE, LAYOUT_NAMES
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.playback.buffers import INTERFACE, LAYOUT_NAMES, is_library, kind_of
 
 CURE = "export the block with these settings and load it into the controller, or export the artefact for it"
 
@@ -65,6 +66,7 @@ class DeployedTable:
             "checksum": int(self.after.checksum),
             "checksum_before": int(self.before.checksum),
             "values": len(self.table.values),
+            "motions": len(self.table.specs),
             "check": self.judgement.check.to_dict(),
         }
 
@@ -205,13 +207,18 @@ def require_fit(table: BlockTable, status: BlockStatus) -> None:
             raise ExportError(
                 f"The block in the controller has another {what}, {there} and not {here}; {CURE}."
             )
+    library = is_library(table.source)
+    if status.kind == kind_of(target_of(table.spec), layout, library=not library):
+        plays = ("library", "single motion") if library else ("single motion", "library")
+        raise ExportError(
+            f"{table.path.name} is a {plays[0]}, and the block in the controller takes a {plays[1]}; {CURE}."
+        )
     if status.kind != table.constant("cKind"):
         raise ExportError(
             f"The block in the controller is for axes of other names, units or signs than {table.path.name}; "
             f"{CURE}."
         )
-    needed = len(table.values) + len(COLUMNS[layout])
-    if needed > status.capacity:
+    if len(table.values) > status.capacity:
         raise ExportError(
             f"The buffers in the controller hold {status.capacity} values, and {table.path.name} has "
             f"{len(table.values)}; load its own block into the controller, whose buffers are larger."

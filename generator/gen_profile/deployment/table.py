@@ -1,19 +1,25 @@
-"""The table of a written playback block, as the values of a buffer, and the block that such values make."""
+"""Tables of a written playback block, as the values of a buffer, and the blocks that such values make."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import attrs
 import numpy as np
 
-from gen_profile.artefacts.manifest import artefact_of, sha256
+from gen_profile.artefacts.manifest import SEAL, artefact_of, seal_of, sha256
 from gen_profile.artefacts.reading import read_artefact
-from gen_profile.errors import CheckFailed, ExportError
+from gen_profile.bounded_file import DOCUMENT
+from gen_profile.errors import CheckFailed, ExportError, OutputError
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import spec_from_dict
+from gen_profile.strict_json import parse_json
 from gen_profile.verification.check import (
     Judgement,
     alterations,
@@ -25,17 +31,18 @@ from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.playback.buffers import (
     CHECKSUM,
-    PER_AXIS,
-    SCALARS,
     buffer_texts,
     buffered,
+    constant_sources,
     is_buffered,
+    is_library,
     with_buffer,
 )
+from gen_profile_exporters.playback.library import constant_singles
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_exporters.playback.structured_text import read_table as read_playback
 from gen_profile_exporters.playback.table import PlaybackTable
-from gen_profile_exporters.registry import container_of, find_container
+from gen_profile_exporters.registry import container_of, find_container, formats
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -45,38 +52,43 @@ class BlockTable:
     Attributes
     ----------
     path : Path
-    spec : Spec
-        Of its manifest.
+    specs : tuple of Spec
+        Of each motion.
     source : BlockSource
         The block, its numbers being variables.
     values : (values,) array
         Of a buffer.
     hashes : mapping of str to str
-        SHA-256 of the file, its setpoints, its spec and the values.
+        SHA-256 of the file, its setpoints and its spec (of a library: of the hashes of those of its motions),
+        and of the values.
     """
 
     path: Path
-    spec: Spec
+    specs: tuple[Spec, ...]
     source: BlockSource
     values: Array
     hashes: dict[str, str]
 
     @property
+    def spec(self) -> Spec:
+        """Give the spec of the first motion: all are for the same axes and cycle."""
+        return self.specs[0]
+
+    @property
     def checksum(self) -> float:
-        """What the block works out for the table."""
+        """What the block works out for all that it holds."""
         return float(self.values[CHECKSUM])
 
     @property
     def start(self) -> Array:
         """Where the axes begin, in their units, shape (axes,)."""
-        scalars, axes = len(SCALARS), self.constant("cAxes")
-        return self.values[scalars : scalars + axes * len(PER_AXIS)].reshape(axes, -1)[
-            :, PER_AXIS.index("Start")
-        ]
+        return self.motions[0].start
 
-    def playback(self) -> PlaybackTable:
-        """Give the table as the block plays it."""
-        return read_playback(self.source.text(), target_of(self.spec))
+    @cached_property
+    def motions(self) -> tuple[PlaybackTable, ...]:
+        """Tables as the block plays them, by their number."""
+        target = target_of(self.spec)
+        return tuple(read_playback(one.text(), target) for one in constant_sources(self.source, target))
 
     def constant(self, name: str) -> int:
         """Value of one of the block's whole constants."""
@@ -85,51 +97,92 @@ class BlockTable:
     def check(self, values: Array, progress: Progress) -> Judgement:
         """Co-simulate the block with other values in its buffer, as they were read from a controller.
 
+        Returns
+        -------
+        Judgement
+            Of the motion that takes up the greatest share of its limit, and passes only if all do.
+
         Raises
         ------
         ExportError
             They are no table.
         CosimulationError
         """
-        text = with_buffer(self.source, list(map(literal, values.tolist()))).text()
+        held = with_buffer(self.source, list(map(literal, values.tolist())))
+        judgements = []
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{self.spec.name}.st"
-            path.write_text(text, encoding="ascii", newline="\n")
-            return attrs.evolve(check_artefact(path, self.spec, progress=progress), path=self.path)
+            for block, spec in zip(constant_sources(held, target_of(self.spec)), self.specs, strict=True):
+                path.write_text(block.text(), encoding="ascii", newline="\n")
+                judgements.append(check_artefact(path, spec, progress=progress))
+        worst = max(judgements, key=lambda one: one.check.demand)
+        return attrs.evolve(worst, path=self.path)
 
 
 def read_table(path: Path) -> BlockTable:
-    """Read a written block, whether its numbers are constants or variables.
+    """Read a written block, of one motion or a library, whether its numbers are constants or variables.
 
     Raises
     ------
     SpecError, OutputError, ExportError
-        It is no playback block of one motion, or there is no manifest of it.
+        It is none, or there is no manifest or index of it.
     CheckFailed
         It is not the file that was exported.
     """
-    container = find_container(container_of(path))
-    content = read_artefact(path)
-    spec, manifest = spec_and_manifest(path, content, None)
-    for fault in alterations(path, provenance(manifest, content, spec)):
-        raise CheckFailed(fault)
-    target = target_of(spec)
+    container, content = find_container(container_of(path)), read_artefact(path)
+    specs = _listed_specs(path, content)
+    if not specs:
+        spec, manifest = spec_and_manifest(path, content, None)
+        for fault in alterations(path, provenance(manifest, content, spec)):
+            raise CheckFailed(fault)
+        specs = (spec,)
+    target = target_of(specs[0])
     source = container.unwrap(content, target)
-    if any(one.name == "nProfile" or one.section == "VAR_IN_OUT" for one in source.variables):
-        raise ExportError(
-            f"{path}: is a library or a wrapper; name the file of the playback block of a single motion."
-        )
-    motion = container.replay(content, target)
+    if any(one.section == "VAR_IN_OUT" for one in source.variables):
+        raise ExportError(f"{path}: is a wrapper; name the file of the playback block.")
+    constants = constant_sources(source, target) if is_buffered(source) else constant_singles(source)
+    motions = [read_playback(one.text(), target).motion() for one in constants]
+    if len(motions) != len(specs):
+        raise ExportError(f"{path}: is a library, and nothing beside it tells its specs; make it again.")
     if not is_buffered(source):
-        source = buffered(source, target)
+        source = buffered(constants, target, library=is_library(source))
     values = np.array(list(map(float, buffer_texts(source))))
     hashes = {
         "artefact_sha256": artefact_of("", path.name, content).sha256,
-        "payload_sha256": motion.payload_hash(),
-        "spec_sha256": spec.sha256(),
+        "payload_sha256": _joint([motion.payload_hash() for motion in motions]),
+        "spec_sha256": _joint([spec.sha256() for spec in specs]),
         "table_sha256": table_hash(values),
     }
-    return BlockTable(path=path, spec=spec, source=source, values=values, hashes=hashes)
+    return BlockTable(path=path, specs=specs, source=source, values=values, hashes=hashes)
+
+
+def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:
+    """Read the specs that a library's index lists; none where there is no index."""
+    index = path.with_name(f"{path.name.removesuffix(formats()[container_of(path)].suffix)}.json")
+    document = _document(index)
+    if "profiles" not in document:
+        return ()
+    seal = document.pop(SEAL, None)
+    if seal != seal_of(document):
+        raise OutputError(
+            f"{index}: was altered, or is of an earlier version, and tells no specs; make the library again."
+        )
+    if document["sha256"] != sha256(content):
+        raise CheckFailed(f"{path.name} is not the library of {index.name}: it was altered; make it again.")
+    return tuple(spec_from_dict(one, path.parent) for one in document["specs"])
+
+
+def _document(path: Path) -> dict[str, Any]:
+    """Read a JSON document; an empty one where there is none."""
+    try:
+        document = parse_json(read_artefact(path, DOCUMENT)) if path.is_file() else {}
+    except ValueError:
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def _joint(hashes: Sequence[str]) -> str:
+    return hashes[0] if len(hashes) == 1 else sha256("\n".join(hashes).encode("ascii"))
 
 
 def table_hash(values: Array) -> str:

@@ -15,6 +15,7 @@ from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import CheckFailed, DeploymentError, GenProfileError
 from gen_profile.interrupts import interrupts_collected
 from gen_profile.motion.profile import Array
+from gen_profile_exporters.playback.table import PlaybackTable
 
 LAST_DIGITS = 1e-12  # of the greatest setpoint: what a compiler that fuses operations changes
 STANDSTILL = 2.0  # s that a block may show the same cycle, or be ahead of or behind its cycle time
@@ -82,12 +83,10 @@ class Judge:
     """
 
     def __init__(self, table: BlockTable) -> None:
-        self._motion = table.playback()
+        self._motions = table.motions
         self._name, self._checksum = table.path.name, int(table.checksum)
-        self._axes = [axis.name for axis in self._motion.axes]
-        played = self._motion.played
-        quantities = (played.position, played.velocity, played.acceleration)
-        self._greatest = np.array([np.abs(one).max(axis=0) for one in quantities if one is not None])
+        self._axes = [axis.name for axis in table.spec.axis_scales()]
+        self._greatest = [_greatest(motion) for motion in self._motions]
         self._first: tuple[BlockState, float] | None = None
         self._last: BlockState | None = None
         self.seen = Watched()
@@ -137,6 +136,10 @@ class Judge:
                 f"the checksum {state.checksum} and not {self._checksum}. Find out who switched "
                 "(deployments.json)."
             )
+        if state.motion >= len(self._motions):
+            raise CheckFailed(
+                f"The block has selected motion {state.motion}, which {self._name} does not hold."
+            )
         if state.checked == WRONG:
             raise CheckFailed(
                 "The controller finds the checksum of its table wrong: a value was altered in its memory. It "
@@ -166,7 +169,7 @@ class Judge:
         resting = np.array((np.full(len(self._axes), np.nan), *np.zeros((2, len(self._axes)))))
         if state.phase not in (MOVING, DONE, ABORTED):
             return resting
-        motion, gain = self._motion, state.gain
+        motion, gain = self._motions[state.motion], state.gain
         with np.errstate(over="ignore", invalid="ignore"):
             if state.cycle >= motion.last:
                 resting[0] = gain * motion.target + state.shift
@@ -185,7 +188,7 @@ class Judge:
         return resting
 
     def _span(self, state: BlockState) -> Array:
-        span: Array = self._greatest * np.maximum(1.0, np.abs(state.gain))
+        span: Array = self._greatest[state.motion] * np.maximum(1.0, np.abs(state.gain))
         span[0] += np.abs(state.shift)
         return span
 
@@ -208,7 +211,7 @@ class Judge:
             )
 
     def _require_cycle_time(self) -> None:
-        seen, cycle_time = self.seen, self._motion.cycle_time
+        seen, cycle_time = self.seen, self._motions[0].cycle_time
         if abs(seen.cycles * cycle_time - seen.seconds) > STANDSTILL + CLOCKS_DIFFER * seen.seconds:
             mean = 1e3 * seen.seconds / max(1, seen.cycles)
             raise CheckFailed(
@@ -223,7 +226,8 @@ class Judge:
         began = max(0, state.runs - before.runs)
         if began:
             seen.runs += began
-            words.append(f"motion {seen.runs} begins")
+            which = f", number {state.motion} of the library" if len(self._motions) > 1 else ""
+            words.append(f"motion {seen.runs} begins{which}")
         if state.off_nominal and (began or not before.off_nominal):
             seen.off_nominal += 1
             words.append("its timing is changed, so that the load swings")
@@ -232,6 +236,13 @@ class Judge:
             seen.refused += state.phase == FAILED
             words += [_phase_words(state)] if state.phase in (DONE, ABORTED, FAILED) else []
         return ", ".join(words)
+
+
+def _greatest(motion: PlaybackTable) -> Array:
+    """Give the greatest setpoints, shape (3, axes)."""
+    played = motion.played
+    quantities = (played.position, played.velocity, played.acceleration)
+    return np.array([np.abs(one).max(axis=0) for one in quantities if one is not None])
 
 
 def _phase_words(state: BlockState) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import sha256
+from gen_profile.artefacts.manifest import FILENAME, SEAL, parse_manifest, seal_of, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
@@ -94,7 +94,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
     folder, path = Path(folder), Path(path)
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
-    profiles, entries, target = _gathered(folder, stem.removeprefix("FB_"), progress)
+    profiles, specs, entries, target = _gathered(folder, stem.removeprefix("FB_"), progress)
     progress("writing the library and reading it back")
     library = library_source(entries, target)
     first, *others = container.wrap(library, target)
@@ -104,7 +104,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
         _require_same(container.unwrap(written, target), target, profiles)
         for file in others:
             staging.write(file.filename, file.content)
-        staging.write(index.name, _index(library.name, written, profiles))
+        staging.write(index.name, index_of(library.name, written, profiles, specs))
         staging.deliver()
     return Library(
         path=path,
@@ -119,8 +119,8 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
 
 def _gathered(
     folder: Path, name: str, progress: Progress
-) -> tuple[list[dict[str, Any]], list[LibraryEntry], Target]:
-    """Read the blocks of all cases that passed; also tell what each is, and give the library's target."""
+) -> tuple[list[dict[str, Any]], list[Mapping[str, Any]], list[LibraryEntry], Target]:
+    """Read the blocks of all cases that passed; tell what each is, its spec, and the library's target."""
     grid = grid_of(folder)
     passed = [row for row in swept_table(folder, grid).to_pylist() if row["status"] == PASSED]
     if not passed:
@@ -128,13 +128,14 @@ def _gathered(
             f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
         )
     target = _target(folder, passed[0], name)
-    profiles, entries = [], []
+    profiles, specs, entries = [], list[Mapping[str, Any]](), []
     for number, row in enumerate(passed):
         progress("reading profiles", number, len(passed))
         artefact = _block_of(row)
-        content = case_files(folder, row)[artefact["path"]]
+        files = case_files(folder, row)
+        specs.append(parse_manifest(files[FILENAME], f"{row['folder']}/{FILENAME}").spec)
         values = {axis.key: row[axis.key] for axis in grid.axes}
-        source = find_container(artefact["format"]).unwrap(content, target)
+        source = find_container(artefact["format"]).unwrap(files[artefact["path"]], target)
         entries.append(LibraryEntry(source=source, label="  ".join(named(values))))
         profiles.append(
             {
@@ -146,7 +147,7 @@ def _gathered(
                 "sway_residual_worst_m": row["check_worst_sway_m"],
             }
         )
-    return profiles, entries, target
+    return profiles, specs, entries, target
 
 
 def _target(folder: Path, row: Mapping[str, Any], name: str) -> Target:
@@ -173,6 +174,10 @@ def _require_same(library: BlockSource, target: Target, profiles: list[dict[str,
             )
 
 
-def _index(block: str, written: bytes, profiles: list[dict[str, Any]]) -> bytes:
-    document = {"block": block, "sha256": sha256(written), "profiles": profiles}
+def index_of(
+    block: str, written: bytes, profiles: list[dict[str, Any]], specs: list[Mapping[str, Any]]
+) -> bytes:
+    """Write the index beside a library: what each profile is, its spec, and a hash of all that."""
+    document = {"block": block, "sha256": sha256(written), "profiles": profiles, "specs": specs}
+    document[SEAL] = seal_of(document)
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")

@@ -176,3 +176,13 @@ def test_a_bus_that_goes_down_ends_the_stream(scenario):
     assert scenario.codes[0] == 6
     assert "to stop by itself" in scenario.stream["reason"]
     assert scenario.codes == (6, 6)
+
+
+def test_an_encoder_that_swings_is_logged(scenarios):
+    place = scenarios / "encoder"
+    assert json.loads((place / "codes.json").read_text()) == {"log": 0}, (place / "log.err").read_text()
+    times, angles = np.loadtxt(place / "swing.csv", delimiter=",", skiprows=1).T
+    assert times[-1] >= 2.0 and np.diff(times).min() > 0.0
+    waves = np.stack([np.sin(5.0 * times), np.cos(5.0 * times), np.ones_like(times)], axis=1)
+    found, *_ = np.linalg.lstsq(waves, angles)
+    assert np.hypot(*found[:2]) == pytest.approx(300 * 2 * np.pi / 4096, rel=0.01)

@@ -9,6 +9,7 @@ takes five seconds for that. None is killed: to a drive, a frozen streamer is a 
 import fcntl
 import gc
 import json
+import math
 import multiprocessing
 import os
 import re
@@ -29,6 +30,7 @@ from can.interfaces.socketcan import SocketcanBus
 from gen_profile.cli import main as gen_profile_command
 
 DRIVE = ("drive-sim", "--preset", "paper")
+LOGGED = ("log-swing", "can:socketcan:vcan0", "--node", "5", "--for", "2", "--out")
 PATIENCE = 60.0  # s, for what takes a second or two; a machine may be busy
 SIOCSIFFLAGS = 0x8914  # linux/sockios.h
 ATTEMPTS = 8  # for a fair trial
@@ -98,7 +100,8 @@ def _command(arguments, out, err):
 
 
 def _gen_profile(arguments, channel):
-    sys.argv = ["gen-profile", *arguments, "--json", "--interface", "socketcan", "--channel", channel]
+    where = () if arguments[0] == "log-swing" else ("--interface", "socketcan", "--channel", channel)
+    sys.argv = ["gen-profile", *arguments, "--json", *where]
     try:
         gen_profile_command()
     finally:
@@ -176,9 +179,25 @@ SCENARIOS = {
 }
 
 
+def encoder(place):
+    """Let an encoder swing, of 4096 counts a turn, about where it turns over, while it is logged."""
+    place.mkdir()
+    subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
+    logged = _begun((*LOGGED, str(place / "swing.csv")), place / "log.json", place / "log.err")
+    turn = can.Message(arbitration_id=0x585, data=b"\x43\x01\x60\x00\x00\x10\x00\x00", is_extended_id=False)
+    with SocketcanBus("vcan0") as bus:
+        while logged.is_alive():
+            if (asked := bus.recv(0.01)) is not None and asked.arbitration_id == 0x605:
+                bus.send(turn)
+            counts = round(300.0 * math.sin(5.0 * time.time())) % 4096
+            data = counts.to_bytes(4, "little")
+            bus.send(can.Message(arbitration_id=0x185, data=data, is_extended_id=False))
+    (place / "codes.json").write_text(json.dumps({"log": _ended(logged)}))
+
+
 def main(folder):
     subprocess.run(["ip", "link", "add", "vcan0", "type", "vcan"], check=True)
-    _load(DRIVE, ("stream", str(folder / "paper.log")))
+    _load(DRIVE, ("stream", str(folder / "paper.log")), (*LOGGED[:1], "can:socketcan:no-bus", *LOGGED[2:4]))
     gc.freeze()
     gc.disable()  # a collection in a forked process would copy every page, which takes a second here
     for name, (queue, disturb) in SCENARIOS.items():
@@ -187,6 +206,7 @@ def main(folder):
             if run(place, folder / "paper.log", queue, disturb):
                 break
         place.rename(folder / name)
+    encoder(folder / "encoder")
 
 
 if __name__ == "__main__":

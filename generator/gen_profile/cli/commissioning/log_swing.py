@@ -1,4 +1,4 @@
-"""The command that logs a swing: of a phone, or of a node of a controller."""
+"""The command that logs a swing: of a phone, of a node of a controller, or of an encoder on a CAN bus."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, client_options
-from gen_profile.cli.options import OutputFile, output_options
+from gen_profile.cli.options import Count, OutputFile, output_options
 from gen_profile.cli.outcome import print_outcome, print_warnings
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from gen_profile.identification.encoder import Encoder
     from gen_profile.motion.profile import Array
 
+MOST_NODE = 127
 DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and columns beside it
 
 
@@ -33,7 +35,18 @@ DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and colu
     metavar="SECONDS",
     help="Log so long, not until Ctrl-C.",
 )
-@click.option("--node", metavar="NODEID", help="Of an OPC UA server, as ns=4;s=GVL.rAngle.")
+@click.option(
+    "--node", metavar="NODEID", help="Of an OPC UA server, as ns=4;s=GVL.rAngle; on CAN the encoder's number."
+)
+@click.option(
+    "--counts", type=Count(1, 2**32), help="Of a turn of the encoder; it is asked for them by default."
+)
+@click.option(
+    "--bitrate",
+    type=Count(10_000, 1_000_000),
+    default=500_000,
+    help="Of the CAN channel in bit/s, where no system sets it; 500000 by default.",
+)
 @click.option(
     "--unit", default="rad", metavar="UNIT", help="Of its values, for the column's name; rad by default."
 )
@@ -45,13 +58,16 @@ def log_swing(
     out: Path,
     seconds: float | None,
     node: str | None,
+    counts: int | None,
+    bitrate: int,
     unit: str,
     as_json: bool,
     **security: Any,
 ) -> None:
     """Log how a load swings, for identify and learn, until Ctrl-C.
 
-    SOURCE is a phone with phyphox, by the address that its remote access shows, or an OPC UA server.
+    SOURCE is a phone with phyphox, by the address that its remote access shows, an OPC UA server, or a CAN
+    bus, as can:socketcan:can0.
     """
     from gen_profile.artefacts.writing import deliver
     from gen_profile.identification.phone import COLUMNS, Phone
@@ -65,6 +81,12 @@ def log_swing(
 
         with closing(OpcUaNode(access, node)) as link:
             table = _logged(link.tables(), seconds)
+    elif source.startswith("can:"):
+        if unit != "rad" or security["user"] or security["fingerprint"] or security["certificate"]:
+            raise SpecError(
+                "--unit, --user, --fingerprint, --certificate: mean nothing with CAN; leave them out."
+            )
+        table = _logged(_encoder(source, node, counts, bitrate).tables(), seconds)
     else:
         if node or security["user"] or security["fingerprint"] or security["certificate"]:
             raise SpecError(
@@ -77,6 +99,24 @@ def log_swing(
     lasts = float(table[-1, 0])
     document = {"path": str(out), "samples": len(table), "lasts_s": lasts, "columns": list(columns)}
     print_outcome(document, f"{len(table)} samples in {lasts:.1f} s: {out}", as_json)
+
+
+def _encoder(source: str, node: str | None, counts: int | None, bitrate: int) -> Encoder:
+    from gen_profile.plugins import require_installed
+
+    _, interface, channel = (*source.split(":", 2), "", "")[:3]
+    if not interface or not channel:
+        raise SpecError(
+            f"{source}: name interface and channel, as can:socketcan:can0 (gen-profile can list)."
+        )
+    if node is None or not node.isdecimal() or not 1 <= int(node) <= MOST_NODE:
+        raise SpecError(f"--node: name the encoder's number on the bus, from 1 to {MOST_NODE}.")
+    require_installed("CAN needs canopen", "can", "canopen")
+    from gen_profile.identification.encoder import Encoder
+    from gen_profile_exporters.can.host.port import Port
+
+    port = Port(interface=interface, channel=channel)
+    return Encoder(port=port, node=int(node), counts=counts, bitrate=bitrate)
 
 
 def _logged(tables: Iterator[Array], seconds: float | None) -> Array:

@@ -80,7 +80,7 @@ def deploy(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Put a playback block's table into a running controller.
+    """Put a playback block's table, or a library's, into a running controller.
 
     Read back and checked before the controller uses it.
     """

@@ -139,15 +139,15 @@ def _picture(table: BlockTable) -> Callable[[BlockState, float, int], Group]:
 
     from gen_profile.streaming.live_terminal import curves
 
-    axes, planned = table.spec.axis_scales(), table.playback().played.position
-    seen, runs = np.full_like(planned, np.nan), -1
+    axes, motions = table.spec.axis_scales(), [motion.played.position for motion in table.motions]
+    seen, begun = np.full_like(motions[0], np.nan), (-1, -1)
     period = table.spec.export.cycle_time
 
     def draw(state: BlockState, at: float, width: int) -> Group:
-        nonlocal runs
-        if state.runs != runs:
-            runs = state.runs
-            seen[:] = np.nan
+        nonlocal seen, begun
+        planned = motions[state.motion]
+        if (state.runs, state.motion) != begun:
+            begun, seen = (state.runs, state.motion), np.full_like(planned, np.nan)
         place = min(state.cycle, len(seen) - 1)
         if state.phase == MOVING:
             seen[place] = state.position
