@@ -75,7 +75,6 @@ def log_swing(
     if source.startswith("opc.tcp:"):
         if node is None:
             raise SpecError("--node: name the node whose value swings, as ns=4;s=GVL.rAngle.")
-
         access = Access(url=source, instance="", data_block=None, **security).opcua()
         from gen_profile.deployment.opcua import OpcUaNode
 
