@@ -8,6 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
+import sysconfig
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -132,10 +133,12 @@ def _run_commands(text: str) -> str:
     A comment ``exit code N`` says how the command on its line or on the next one is to end, if not in 0.
     """
     if not all(_is_plain(command) for command in _commands(text)):
-        own = str(PROGRAM.parent)  # last: a package there has a script named minisign, which does nothing
-        path = os.pathsep.join([*(one for one in os.environ["PATH"].split(os.pathsep) if one != own), own])
+        scripts = sysconfig.get_path("scripts")  # where a package has a minisign that does nothing
+        path = os.pathsep.join(one for one in os.environ["PATH"].split(os.pathsep) if one != scripts)
+        program = f"shopt -s expand_aliases\nalias gen-profile={shlex.quote(str(PROGRAM))}"
+        python = f'python() {{ {shlex.quote(sys.executable)} "$@"; }}'
         done = subprocess.run(
-            ["bash", "-euc", f'python() {{ {shlex.quote(sys.executable)} "$@"; }}\n{text}'],
+            ["bash", "-euc", f"{program}\n{python}\n{text}"],
             env={**os.environ, "PATH": path},
             capture_output=True,
             check=False,
