@@ -419,7 +419,7 @@ def test_a_controller_is_watched_and_what_is_not_as_proved_is_told(page, control
     assert page.run(stands)[0] == "idle"
     controller[0].memory[0] = 1
     page.wait("return document.querySelector('#stands dd').textContent === 'arrived'")
-    assert page.run(stands) == ["arrived", "1", "3.00 / 3.00 s", "1.00", "0.3 m; 0 m/s; 0 m/s²"]
+    assert page.run(stands) == ["arrived", "1", "3.00 / 3.00 s", "1.00", "0.3 m", "0 m/s", "0 m/s²"]
     assert page.run("return document.querySelectorAll('#course canvas').length") == 2
     poked(controller[0].block, read_table(controller[1][1]).values, random.Random(3))
     page.wait("return document.querySelector('#proved.failed') !== null")

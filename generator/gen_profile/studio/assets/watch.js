@@ -32,14 +32,17 @@ const watched = (() => {
       ["watch.runs", [part.runs, part.motion === null ? "" : `nProfile ${part.motion}`].filter(String).join(", ")],
       ["watch.time", `${numbers.local(part.time.toFixed(2))} / ${seconds(part.duration)}`],
       ["watch.rate", numbers.local(part.rate.toFixed(2))],
-      ...axes.map(({ name, unit }, axis) => [name, part.setpoints[axis].map((value, order) => `${numbers.short(value)} ${unit}${["", "/s", "/s²"][order]}`).join("; ")]),
-    ];
-    $("stands").replaceChildren(...rows.map(([key, value]) => element("div", {}, element("dt", {}, page.phrase(key)), element("dd", {}, value))));
-    const panels = ["position", "velocity"].flatMap((quantity, order) => axes.map(({ name, unit, planned, seen }) => ({
-      title: `${page.phrase(name)}: ${page.phrase(quantity)}`, x_label: page.phrase("drive.time"), y_label: `${unit}${order ? "/s" : ""}`, x: part.times, levels: [], bands: [],
+    ].map(([key, value]) => [page.phrase(key), value]);
+    const named = (name, order) => `${page.phrase(name)}: ${page.phrase(["position", "velocity", "acceleration"][order])}`;
+    for (const [axis, { name, unit }] of axes.entries()) {
+      part.setpoints[axis].forEach((value, order) => rows.push([named(name, order), `${numbers.short(value)} ${unit}${["", "/s", "/s²"][order]}`]));
+    }
+    $("stands").replaceChildren(...rows.map(([key, value]) => element("div", {}, element("dt", {}, key), element("dd", {}, value))));
+    const panels = [0, 1].flatMap((order) => axes.map(({ name, unit, planned, seen }) => ({
+      title: named(name, order), x_label: page.phrase("drive.time"), y_label: `${unit}${order ? "/s" : ""}`, x: part.times, levels: [], bands: [],
       curves: [
         { name: "watch.table", colour: "ghost", dash: "dash", width: 1.2, y: planned[order] },
-        { name: "watch.controller", colour: "#0072b2", dash: "solid", width: 2.4, y: seen[order] },
+        { name: "watch.controller", colour: "#0072b2", dash: "solid", width: 2.4, y: seen[order], spans: true },
       ],
     })));
     curves.draw($("course"), panels, { phrase: page.phrase, language: words.language(), alone: true });
