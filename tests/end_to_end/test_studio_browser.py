@@ -2,6 +2,7 @@
 
 import io
 import json
+import random
 import shlex
 import subprocess
 import zipfile
@@ -10,10 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import PROGRAM
+from end_to_end.simulated_controllers import serving
 from end_to_end.studios import studio
+from end_to_end.test_deploy import free_port
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
+from simulated_blocks import exported, poked
 
+from gen_profile.deployment.s7_sim import SimulatedS7Controller
+from gen_profile.deployment.table import read_table
 from gen_profile.evaluation.simulation import free_swing
 from gen_profile.problem.dynamics import parameter_column
 from gen_profile.spec.reading import preset_spec, preset_text
@@ -37,8 +43,17 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def page(browser):
-    with studio("--preset", "paper") as running:
+def controller(tmp_path_factory):
+    """One that runs a motion of this machine, and is watched."""
+    table = read_table(exported(tmp_path_factory.mktemp("watched"), "export.plc_layout=samples"))
+    simulated = SimulatedS7Controller(table, 7, free_port())
+    with serving(simulated) as url:
+        yield simulated, ("--watch", table.path, "--to", url, "--db", "7", "--security", "none")
+
+
+@pytest.fixture(scope="module")
+def page(browser, controller):
+    with studio("--preset", "paper", *controller[1]) as running:
         browser.size(1400, 900)
         running.open(browser)
         browser.wait(SETTLED.format("passed"))
@@ -58,7 +73,7 @@ def _at_a_desk(page):
     look_at(page, "design")
 
 
-VIEWS = ("design", "compare", "drive", "measure", "take")
+VIEWS = ("design", "compare", "drive", "measure", "take", "watch")
 
 
 def test_every_view_has_a_place_in_the_address_and_fits_it(page):
@@ -73,12 +88,13 @@ def test_every_view_has_a_place_in_the_address_and_fits_it(page):
         assert shown[0] == ("" if view == "design" else f"#{view}") and len(shown[1].split(" · ")) == 3
         assert page.run("return document.querySelectorAll('#places [aria-current=page]').length") == 1
     assert seen["drive"] == ["Drive it yourself"] and seen["measure"] == ["Measured on the machine"]
-    assert seen["take"] == ["Take it away"] and seen["design"][0] == "The machine"
+    assert seen["take"] == ["Take it away"] and seen["watch"] == ["The controller paper.st"]
+    assert seen["design"][0] == "The machine"
     assert seen["compare"] == ["Designs", "Robustness", "Spectrum"]
     page.run("history.back()")
-    page.wait("return document.body.dataset.show === 'measure'")
+    page.wait("return document.body.dataset.show === 'take'")
     page.run("location.reload()")
-    page.wait("return document.body.dataset?.show === 'measure'")
+    page.wait("return document.body.dataset?.show === 'take'")
     page.wait(SETTLED.format("passed"))
 
 
@@ -394,6 +410,26 @@ def test_a_planner_block_is_driven_by_hand(page):
         page.find("#leave").click()
         page.find("#undo").click()
         page.wait("return !document.querySelector('#command').textContent.includes('bay.toml')")
+
+
+def test_a_controller_is_watched_and_what_is_not_as_proved_is_told(page, controller):
+    stands = "return [...document.querySelectorAll('#stands dd')].map((one) => one.textContent)"
+    look_at(page, "watch")
+    page.wait("return document.querySelector('#proved.passed') !== null")
+    assert page.run(stands)[0] == "idle"
+    controller[0].memory[0] = 1
+    page.wait("return document.querySelector('#stands dd').textContent === 'arrived'")
+    assert page.run(stands) == ["arrived", "1", "3.00 / 3.00 s", "1.00", "0.3 m", "0 m/s", "0 m/s²"]
+    assert page.run("return document.querySelectorAll('#course canvas').length") == 2
+    poked(controller[0].block, read_table(controller[1][1]).values, random.Random(3))
+    page.wait("return document.querySelector('#proved.failed') !== null")
+    page.find("#language").click()
+    page.wait("return document.querySelector('#proved').textContent === 'Nicht wie bewiesen'")
+    told, phase = page.find("#unproved").text, page.run(stands)[0]
+    page.find("#language").click()
+    assert (
+        told.startswith("Die Steuerung findet die Prüfsumme ihrer Tabelle falsch") and phase == "angekommen"
+    )
 
 
 def test_it_speaks_german_of_what_is_shown(page):

@@ -12,7 +12,7 @@ stands. A buffer holds
         the table, column by column
 
 The first checksum is over the whole buffer, with the cycle time in its own place: a table for another cycle
-has a wrong one here. A motion's own is that of its block of constants, which can be restored from it.
+has a wrong one here. A motion's own is that of its block of constants, which follows from it.
 """
 
 from __future__ import annotations

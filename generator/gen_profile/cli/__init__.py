@@ -9,6 +9,7 @@ from gen_profile.cli import (
     report,
     robustness,
     streaming,
+    studio,
     sweep,
 )
 from gen_profile.cli.entry import main
@@ -23,5 +24,6 @@ __all__ = [
     "report",
     "robustness",
     "streaming",
+    "studio",
     "sweep",
 ]

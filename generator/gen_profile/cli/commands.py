@@ -30,7 +30,6 @@ from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
 from gen_profile.errors import CertificateError, OutputError, SpecError
-from gen_profile.plugins import require_installed
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
@@ -320,53 +319,6 @@ def _check_block(
 
             draw(judgement.spec, judgement.text, judgement.check, picture, tell)
     return judgement
-
-
-@cli.command(epilog="Example: gen-profile studio bay-3.toml")
-@spec_options
-@click.option(
-    "--port",
-    type=Count(0, 65535),
-    default=0,
-    help="Port on the loopback interface; any that is free by default.",
-)
-@click.option("--no-browser", is_flag=True, help="Open no browser; print the address and a code for one.")
-@output_options
-def studio(
-    chosen: SpecChoice,
-    port: int,
-    *,
-    no_browser: bool,
-    as_json: bool,
-) -> None:
-    """Turn every knob of a spec in the browser, and see the swing at once."""
-    require_installed("gen-profile studio needs Tornado", "studio", "tornado")
-    from gen_profile.studio.state import changed_start
-
-    text, source, folder = chosen.text()
-    words = ("--preset", source) if chosen.path is None else (source,)
-    start = changed_start(words, text, chosen.overrides, folder)
-    if not start.programs:  # else the page asks first
-        chosen.spec()
-    from gen_profile.studio.server import serve
-
-    def ready(address: str, code: str) -> None:
-        if as_json:
-            import json
-
-            click.echo(json.dumps({"address": address, "code": code}, indent=2))
-        else:
-            click.echo(
-                f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it.", err=True
-            )
-
-    def renew(code: str) -> None:
-        click.echo(f"The code was used. Another browser that asks for one: {code}", err=True)
-
-    try:
-        serve(start, port, browser=not no_browser, ready=ready, renew=renew)
-    except KeyboardInterrupt:
-        click.echo("The studio is closed.", err=True)
 
 
 @cli.command(epilog="Example: gen-profile formats")

@@ -7,7 +7,7 @@ import numpy as np
 
 from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
-from gen_profile_exporters.playback.buffers import AXIS_STATE, STATE, STATE_HEAD, state_length
+from gen_profile_exporters.playback.buffers import AXIS_STATE, STATE_HEAD, state_length
 
 IDLE, WAITING, MOVING, DONE, ABORTED, FAILED = range(6)
 PHASES = ("idle", "waiting", "moving", "done", "aborted", "failed")
@@ -104,15 +104,17 @@ def read_state(values: Array, axes: int) -> BlockState | None:
     """
     if len(values) != state_length(axes):
         raise DeploymentError(
-            f"{STATE} has {len(values)} values there in place of {state_length(axes)}: the block is of "
-            "another version, or for other axes. Export it again, and load it into the controller."
+            "aState has {found} values there in place of {due}: the block is of another version, or for "
+            "other axes. Export it again, and load it into the controller.",
+            found=len(values),
+            due=state_length(axes),
         )
     if values[0] != values[-1] or values[0] == 0.0:
         return None
     whole = values[:WHOLE]
     if not np.isfinite(values).all() or (whole != np.floor(whole)).any() or not _in_range(whole):
         raise DeploymentError(
-            f"{STATE} holds no state of a block; let the controller show it as an array of LREAL, "
+            "aState holds no state of a block; let the controller show it as an array of LREAL, "
             "written by nothing but the block."
         )
     counts = [int(value) for value in whole.tolist()]

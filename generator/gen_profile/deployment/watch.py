@@ -132,13 +132,17 @@ class Judge:
         first = state if self._first is None else self._first[0]
         if state.checksum != self._checksum or state.buffer != first.buffer:
             raise CheckFailed(
-                f"The controller no longer uses {self._name}: it has gone over to its other buffer, with "
-                f"the checksum {state.checksum} and not {self._checksum}. Find out who switched "
-                "(deployments.json)."
+                "The controller no longer uses {name}: it has gone over to its other buffer, with the "
+                "checksum {there} and not {here}. Find out who switched (deployments.json).",
+                name=self._name,
+                there=state.checksum,
+                here=self._checksum,
             )
         if state.motion >= len(self._motions):
             raise CheckFailed(
-                f"The block has selected motion {state.motion}, which {self._name} does not hold."
+                "The block has selected motion {motion}, which {name} does not hold.",
+                motion=state.motion,
+                name=self._name,
             )
         if state.checked == WRONG:
             raise CheckFailed(
@@ -157,9 +161,14 @@ class Judge:
         if not near.all():
             at = tuple(np.argwhere(~near)[0])
             raise CheckFailed(
-                f"The {QUANTITIES[at[0]]} of {self._axes[at[1]]} is {float(issued[at])!r} in cycle "
-                f"{state.place:.10g} of the motion, and {float(due[at])!r} by {self._name}: these are not "
-                "the setpoints that were proved."
+                "The {quantity} of {axis} is {found} in cycle {place:.10g} of the motion, and {due} by "
+                "{name}: these are not the setpoints that were proved.",
+                quantity=QUANTITIES[at[0]],
+                axis=self._axes[at[1]],
+                found=repr(float(issued[at])),
+                place=state.place,
+                due=repr(float(due[at])),
+                name=self._name,
             )
         self.seen.moving += follows
         self.seen.exact += follows and bool((issued == due).all())  # which for numbers are bits, zero apart
@@ -206,18 +215,21 @@ class Judge:
         least = calls * state.rate - 1e-6 if planned else -1e-6
         if not least <= advance <= calls + 1e-6:
             raise CheckFailed(
-                f"The motion went on by {advance:.6g} cycles in {calls} calls of the block at the rate "
-                f"{state.rate:.6g}: its timing is not the one that was proved."
+                "The motion went on by {advance:.6g} cycles in {calls} calls of the block at the rate "
+                "{rate:.6g}: its timing is not the one that was proved.",
+                advance=advance,
+                calls=calls,
+                rate=state.rate,
             )
 
     def _require_cycle_time(self) -> None:
         seen, cycle_time = self.seen, self._motions[0].cycle_time
         if abs(seen.cycles * cycle_time - seen.seconds) > STANDSTILL + CLOCKS_DIFFER * seen.seconds:
-            mean = 1e3 * seen.seconds / max(1, seen.cycles)
             raise CheckFailed(
-                f"The block is called every {mean:.3g} ms on average, and its table is for "
-                f"{1e3 * cycle_time:g} ms: motions take another time than was proved. Call it in a task "
-                "of that cycle."
+                "The block is called every {mean:.3g} ms on average, and its table is for {due:g} ms: "
+                "motions take another time than was proved. Call it in a task of that cycle.",
+                mean=1e3 * seen.seconds / max(1, seen.cycles),
+                due=1e3 * cycle_time,
             )
 
     def _events(self, before: BlockState, state: BlockState) -> str:
@@ -295,7 +307,9 @@ def watch(
         judge.seen.fault = error
     except LinkLostError as error:
         judge.seen.fault = DeploymentError(
-            f"The connection broke ({error}), and could not be taken up again within {LOST_FOR:g} s."
+            "The connection broke ({error}), and could not be taken up again within {seconds:g} s.",
+            error=error,
+            seconds=LOST_FOR,
         )
     return judge.seen
 
@@ -340,8 +354,9 @@ class _Course:
                 self._report(state, now - self._began, events)
         elif now - self._changed > STANDSTILL:
             raise DeploymentError(
-                f"The block is no longer called in the controller, since {now - self._changed:.1f} s: it was "
-                "stopped, or its task. What the axes do now is up to their drives."
+                "The block is no longer called in the controller, since {seconds:.1f} s: it was stopped, or "
+                "its task. What the axes do now is up to their drives.",
+                seconds=now - self._changed,
             )
         self._pause(max(self._cycle, LEAST_INTERVAL))
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import tornado.netutil
@@ -19,6 +19,7 @@ import tornado.web
 import tornado.websocket
 
 from gen_profile.errors import GenProfileError, OutputError, SpecError
+from gen_profile.phrase import plain
 from gen_profile.spec.reading import presets
 from gen_profile.strict_json import parse_json
 from gen_profile.studio.entrance import PATIENCE, BoundedServer, Entering, Entrance, Guarded, started_browser
@@ -27,6 +28,9 @@ from gen_profile.studio.session import Session
 from gen_profile.studio.state import StudioState, WrittenSpec, opened_start, preset_start
 from gen_profile.studio.workers import Message, Part, Workers, failure
 from gen_profile_exporters.registry import find_exporter, formats
+
+if TYPE_CHECKING:
+    from gen_profile.studio.watching import Watching
 
 LOOPBACK = "127.0.0.1"
 MOST_MESSAGE = 65_536  # bytes of what a page may say at once
@@ -64,6 +68,8 @@ class Studio:
         Specs that were dropped on a page, by the name that its state holds.
     first : Session or None
         Where the first page's question is answered before that page is there.
+    watching : Watching or None
+        A controller that is watched meanwhile.
     """
 
     start: WrittenSpec
@@ -71,6 +77,7 @@ class Studio:
     agreed: dict[Path, str] = attrs.field(factory=dict)
     opened: dict[str, WrittenSpec] = attrs.field(factory=dict)
     first: Session | None = None
+    watching: Watching | None = None
 
     def question(self, state: StudioState) -> Question:
         """Say what a page asks for.
@@ -187,6 +194,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
                 "opened": list(self._studio.opened),
                 "most_upload": MOST_UPLOAD - MOST_MESSAGE,
                 "start": " ".join(self._studio.start.words),
+                "watching": self._studio.watching is not None,
                 "formats": {name: form.summary for name, form in formats().items()},
             }
         )
@@ -211,6 +219,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
                 "forget": lambda _: self._forget(),
                 "drive": self._drive,
                 "park": lambda _: self._session.stop("drive"),
+                "watch": lambda _: self._watch(),
             }
             act[said["say"]](said)
         except GenProfileError as error:
@@ -323,6 +332,11 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         )
         self._session.ask("drive", int(said["number"]), asked)
 
+    def _watch(self) -> None:
+        """Tell how the controller stands that is watched."""
+        if self._studio.watching is not None:
+            self._tell(plain(self._studio.watching.part()))
+
     def _forget(self) -> None:
         """Read no log any more."""
         self._dropped = None
@@ -358,6 +372,7 @@ def serve(
     browser: bool,
     ready: Callable[[str, str], None],
     renew: Callable[[str], None],
+    watching: Watching | None = None,
 ) -> None:
     """Serve pages until interrupted.
 
@@ -372,13 +387,15 @@ def serve(
         Takes the address, and the code for another browser.
     renew : str → None
         Takes another code when one was used.
+    watching : Watching, optional
+        A controller that is watched meanwhile.
 
     Raises
     ------
     OutputError
         The port is taken.
     """
-    asyncio.run(_serve(start, port, browser, ready, renew))
+    asyncio.run(_serve(start, port, browser, ready, renew, watching=watching))
 
 
 async def _serve(
@@ -387,11 +404,13 @@ async def _serve(
     browser: bool,
     ready: Callable[[str, str], None],
     renew: Callable[[str], None],
+    *,
+    watching: Watching | None,
 ) -> None:
     with ExitStack() as stack:
         workers = Workers()
         stack.callback(workers.close)
-        studio = Studio(start=start, workers=workers)
+        studio = Studio(start=start, workers=workers, watching=watching)
         if not start.programs:  # the first picture is on its way before the browser is
             studio.first = Session(workers, asyncio.get_running_loop())
             studio.first.show(0, studio.question(StudioState()))

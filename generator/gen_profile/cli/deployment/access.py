@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import click
 
-from gen_profile.cli.options import PathType
+from gen_profile.cli.options import Count, PathType
 from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
 
@@ -56,6 +56,34 @@ def client_options(command: Callable[..., Any]) -> Callable[..., Any]:
         help="Of the connection; sign-and-encrypt by default.",
     )
     return fingerprint(access_options(security(command)))
+
+
+def controller_options(*, required: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Take which controller, which block in it, and how it is reached, as `Access` has them."""
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in (
+            click.option(
+                "--instance", default="", metavar="PATH", help="Which block, where the server shows several."
+            ),
+            click.option(
+                "--db",
+                "data_block",
+                type=Count(1, MOST_BLOCKS),
+                help="Data block of the block's arrays, for S7.",
+            ),
+            click.option(
+                "--to",
+                "url",
+                metavar="URL",
+                required=required,
+                help="Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
+            ),
+        ):
+            command = option(command)
+        return command
+
+    return lambda command: decorate(client_options(command))
 
 
 @attrs.frozen(kw_only=True)

@@ -13,7 +13,7 @@ from gen_profile.cli.deployment.access import (
     MOST_PORT,
     Access,
     access_options,
-    client_options,
+    controller_options,
     password,
     require_ads,
     require_opcua,
@@ -38,18 +38,7 @@ if TYPE_CHECKING:
     epilog="Example: gen-profile deploy deploy/bay-3.st --to opc.tcp://10.0.0.5:4840 --certificate me.pem"
 )
 @click.argument("artefact", type=PathType())
-@click.option(
-    "--to",
-    "url",
-    metavar="URL",
-    required=True,
-    help="Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
-)
-@click.option(
-    "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
-)
-@click.option("--instance", default="", metavar="PATH", help="Which block, where the server shows several.")
-@client_options
+@controller_options(required=True)
 @click.option("--verify", is_flag=True, help="Only tell whether the controller uses this table.")
 @click.option("--watch", is_flag=True, help="Verify, then hold every setpoint to the table until Ctrl-C.")
 @click.option("--for", "seconds", type=click.FloatRange(min=0.1), metavar="SECONDS", help="Watch so long.")
@@ -130,16 +119,16 @@ def _verify(artefact: Path, access: Access, as_json: bool) -> None:
     from gen_profile.deployment.record import recorded
 
     with ExitStack() as stack, progress() as tell:
-        table, link = _verified(artefact, access, stack, tell)
+        table, link = verified(artefact, access, stack, tell)
         entry = recorded(artefact.parent, table.hashes["table_sha256"], link.server)
         document = {"action": "verified", "controller": link.server, **table.hashes, "record": entry}
     print_outcome(document, _words(artefact, document), as_json)
 
 
-def _verified(
+def verified(
     artefact: Path, access: Access, stack: ExitStack, tell: Progress
 ) -> tuple[BlockTable, ControllerLink]:
-    """Connect to a controller that uses the table."""
+    """Connect to a controller that uses a file's table."""
     from gen_profile.deployment.deploy import verify
     from gen_profile.deployment.mailbox import Mailbox
     from gen_profile.deployment.table import read_table
@@ -160,7 +149,7 @@ def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | No
 
     with ExitStack() as stack:
         with progress() as tell:
-            table, link = _verified(artefact, access, stack, tell)
+            table, link = verified(artefact, access, stack, tell)
         if seconds is None:
             click.echo(f"{link.server['instance']} is watched. Ctrl-C ends it.", err=True)
         with reporting(table, log) as report:

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from gen_profile.deployment.block_state import MOVING, PHASES, BlockState
+from gen_profile.deployment.run_so_far import RunSoFar
 from gen_profile.deployment.watch import Watched
 from gen_profile.errors import OutputError
 
@@ -139,18 +139,11 @@ def _picture(table: BlockTable) -> Callable[[BlockState, float, int], Group]:
 
     from gen_profile.streaming.live_terminal import curves
 
-    axes, motions = table.spec.axis_scales(), [motion.played.position for motion in table.motions]
-    seen, begun = np.full_like(motions[0], np.nan), (-1, -1)
-    period = table.spec.export.cycle_time
+    axes, run, period = table.spec.axis_scales(), RunSoFar(table), table.spec.export.cycle_time
 
     def draw(state: BlockState, at: float, width: int) -> Group:
-        nonlocal seen, begun
-        planned = motions[state.motion]
-        if (state.runs, state.motion) != begun:
-            begun, seen = (state.runs, state.motion), np.full_like(planned, np.nan)
-        place = min(state.cycle, len(seen) - 1)
-        if state.phase == MOVING:
-            seen[place] = state.position
+        place = run.take(state)
+        planned, seen = run.planned[0], run.seen[0]
         head = f"{at:.1f} s  {PHASES[state.phase]}, {place * period:.2f} of {(len(seen) - 1) * period:.2f} s"
         head += f", rate {state.rate:.3g}" * (state.phase == MOVING)
         head += f", error {state.error}" * bool(state.error) + ", timing changed" * state.off_nominal

@@ -119,7 +119,7 @@ const curves = (() => {
     const timed = /^time/.test(panel.x_label) && !options.alone;
     const series = [...panel.curves, ...holder.ghosts].map((curve) => ({
       label: options.phrase(curve.name), stroke: curve.colour === "ghost" ? () => colour("--quiet") : curve.colour, width: curve.width,
-      dash: LINE[curve.dash] ?? [], points: { show: false },
+      dash: LINE[curve.dash] ?? [], points: { show: false }, spanGaps: curve.spans ?? false,
       value: (_, value) => (value === null ? "" : short(value)),
     }));
     const chart = new uPlot({

@@ -31,6 +31,7 @@
     player = null;
     logs.speak();
     driving.speak();
+    watched.speak();
     for (const part of Object.values(latest)) if (!ONCE.has(part.part)) take(part);
   }
 
@@ -182,7 +183,8 @@
   });
 
   const parts = {
-    hello({ presets, opened, start, formats }) {
+    hello({ presets, opened, start, formats, watching }) {
+      watched.begin(watching);
       $("preset").replaceChildren(started("", start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
       opened.forEach(offer);
       const boxes = Object.entries(formats).map(([name, about]) => element("label", { title: about }, element("input", { type: "checkbox", value: name, checked: name === "csv" }), name));
@@ -414,7 +416,7 @@
 
   function hear(part) {
     const lost = part.part === "failure";
-    const elsewhere = { log: logs.show, drive: driving.show, files: lost && unmade, depth: lost && (() => {}) }[part.of];
+    const elsewhere = { log: logs.show, drive: driving.show, watch: watched.show, files: lost && unmade, depth: lost && (() => {}) }[part.of];
     if (elsewhere) {
       elsewhere(part);
       return;
@@ -482,6 +484,7 @@
     curves.fit();
   });
   driving.lend({ phrase, filled, placed, say, edit, begin, knob: at, state: () => state });
+  watched.lend({ phrase, say });
   logs.begin({
     phrase, filled, notice, edit, drawing, say, send, state: () => state,
     mostUpload: () => latest.hello.most_upload,

@@ -1,0 +1,93 @@
+"""The command that opens the studio."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.deployment.access import Access, controller_options
+from gen_profile.cli.options import Count, PathType, output_options, spec_options
+from gen_profile.cli.progress import progress
+from gen_profile.errors import SpecError
+from gen_profile.plugins import require_installed
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gen_profile.cli.options import SpecChoice
+    from gen_profile.studio.watching import Watching
+
+
+@cli.command(epilog="Example: gen-profile studio bay-3.toml")
+@spec_options
+@click.option(
+    "--port",
+    type=Count(0, 65535),
+    default=0,
+    help="Port on the loopback interface; any that is free by default.",
+)
+@click.option("--no-browser", is_flag=True, help="Open no browser; print the address and a code for one.")
+@click.option(
+    "--watch",
+    "artefact",
+    type=PathType(),
+    metavar="FILE",
+    help="Watch the controller --to, which uses this file's table, as deploy --watch does.",
+)
+@controller_options(required=False)
+@output_options
+def studio(
+    chosen: SpecChoice,
+    port: int,
+    *,
+    no_browser: bool,
+    artefact: Path | None,
+    as_json: bool,
+    **controller: Any,
+) -> None:
+    """Turn every knob of a spec in the browser, and see the swing at once."""
+    require_installed("gen-profile studio needs Tornado", "studio", "tornado")
+    from gen_profile.studio.state import changed_start
+
+    if (artefact is None) != (controller["url"] is None):
+        raise SpecError("--watch, --to: go together: name the file, and the controller that uses its table.")
+    access = None if artefact is None else Access(**controller)
+    text, source, folder = chosen.text()
+    words = ("--preset", source) if chosen.path is None else (source,)
+    start = changed_start(words, text, chosen.overrides, folder)
+    if not start.programs:  # else the page asks first
+        chosen.spec()
+    from gen_profile.studio.server import serve
+
+    def ready(address: str, code: str) -> None:
+        if as_json:
+            import json
+
+            click.echo(json.dumps({"address": address, "code": code}, indent=2))
+        else:
+            click.echo(
+                f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it.", err=True
+            )
+
+    def renew(code: str) -> None:
+        click.echo(f"The code was used. Another browser that asks for one: {code}", err=True)
+
+    with ExitStack() as stack:
+        watching = None if artefact is None or access is None else _watching(artefact, access, stack)
+        try:
+            serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
+        except KeyboardInterrupt:
+            click.echo("The studio is closed.", err=True)
+
+
+def _watching(artefact: Path, access: Access, stack: ExitStack) -> Watching:
+    """Watch a controller until the context ends."""
+    from gen_profile.cli.deployment.commands import verified
+    from gen_profile.studio.watching import Watching
+
+    with progress() as tell:
+        table, link = verified(artefact, access, stack, tell)
+    return stack.enter_context(Watching(table, link))
