@@ -130,7 +130,7 @@ def test_an_axis_that_turned_round_goes_its_way_at_full_speed(text, rope, load):
 
 
 def test_the_time_to_a_farther_target_counts_the_way_that_is_committed_already(text):
-    """Not only that beyond it, as if pulses added to it at once: 22.8 s were told of 42.9."""
+    """Not only that beyond it, as if pulses added to it at once: it said 22.8 s of 42.9."""
     driver = Driver(text, fL1=6.0, fm2=1005.0, fActPosition=39.4).hold(2.0)
     driver.hold(0.144, bExecute=1, fTarget=16.0).hold(CYCLE, bExecute=0)
     out = driver.hold(60.0, bExecute=1, fTarget=1.7).outputs

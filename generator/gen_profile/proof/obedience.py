@@ -144,7 +144,7 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if (end - begin) * followed.cycle < FROM_REST * followed.period:
             continue  # it was replaced before
         if followed.gives_up(end):
-            continue  # as is told in its place
+            continue  # that is a fault of its own
         place, before = motion.position[:, begin], motion.velocity[:, begin]
         own = slice(begin, end)
         match order.kind:
