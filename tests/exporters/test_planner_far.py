@@ -127,3 +127,13 @@ def test_an_axis_that_turned_round_goes_its_way_at_full_speed(text, rope, load):
     assert (out["bDone"][-1], out["fPosition"][-1]) == (1.0, 39.5)
     assert np.argmax(out["bDone"][reversal:]) * CYCLE < 1.02 * (stop + way)
     require_limits(out)
+
+
+def test_the_time_to_a_farther_target_counts_the_way_that_is_committed_already(text):
+    """Not only that beyond it, as if pulses added to it at once: it said 22.8 s of 42.9."""
+    driver = Driver(text, fL1=6.0, fm2=1005.0, fActPosition=39.4).hold(2.0)
+    driver.hold(0.144, bExecute=1, fTarget=16.0).hold(CYCLE, bExecute=0)
+    out = driver.hold(60.0, bExecute=1, fTarget=1.7).outputs
+    done, begun = np.argmax(out["bDone"]), round(8.0 / CYCLE)
+    left = (done - np.arange(begun, done)) * CYCLE
+    assert (np.abs(out["fTimeToGo"][begun:done] - left) < 0.25 * left + 0.5).all()

@@ -235,6 +235,21 @@ def test_a_block_with_altered_constants_fails(spec, text):
 
 
 @pytest.mark.slow
+def test_a_block_that_gives_commands_up_fails_and_one_that_stands_for_ever_too():
+    allowed = ["check.residual_sway=0.001", "check.uncertain={L1=0.1}", "limits.travel=[0.0, 90.0]"]
+    spec = parse_spec(BAY, allowed)
+    text = planner_block(spec).text
+    (given_up,) = [one for one in prove(spec, text, histories=8).reasons() if "error 9" in one]
+    assert given_up.endswith("narrow check.uncertain, allow more (check.residual_sway), or accelerate less.")
+    patient, early = (re.sub(r"(cGivesUp : LREAL := )[^;]*", rf"\g<1>{time}", text) for time in (1e9, 5.0))
+    stands = prove(spec, patient, histories=8).reasons()
+    assert any("does not come to rest" in one for one in stands)
+    assert not any("error 9" in one for one in stands)
+    unstated = early.replace("cGivesUp", "cGaveUp")
+    assert any("nErrorId" in one for one in prove(spec, unstated, histories=8).reasons())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("written", "live"), [(PAPER, "L1"), (HOIST, "hoist")])
 def test_other_machines_are_proved(written, live):
     """Also one whose rope the hoist tells, and whose errors are none."""

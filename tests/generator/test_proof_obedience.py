@@ -153,6 +153,13 @@ def disabled(**changes):
     return followed
 
 
+def idle(error=0.0):
+    """Standing though a stick is deflected, until it moves or reports an error."""
+    followed = with_orders(REST, attrs.evolve(MOVE, end=2000), attrs.evolve(STICKS, begin=2000), STOPS)
+    followed.issued["nErrorId"][2521] = error
+    return followed
+
+
 def test_a_block_that_obeys_has_no_fault():
     assert kinds(obedient()) == set()
     assert len(list(measured(obedient(), REACTIONS))) > 10
@@ -166,12 +173,8 @@ FAULTS = {
     STOP: with_orders(REST, attrs.evolve(MOVE, end=150), order(150, CYCLES, STOP), period=1.0),
     "left": with_output("fPosition", slice(1500, 1600), 5.01),
     "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
-    "idle": with_orders(
-        REST,
-        attrs.evolve(MOVE, end=STICK - 500),
-        attrs.evolve(STICKS, begin=STICK - 500, edge=STICK - 500),
-        STOPS,
-    ),
+    "idle": idle(),
+    "given up": idle(error=9.0),
     "ends": with_output("fStopHigh", STOPPED, obedient().issued["fPosition"][-1] - 0.01),
     "loose": with_output("fStopHigh", STOPPED, 100.0),
     "fast": with_orders(

@@ -28,8 +28,8 @@ on the way, and likewise what is for zones and events where there are none.
   so is its slope. A pulse of the kernel's shape that ends where it begins takes both away.
 - ``variations.st``, ``left.st``, ``between.st``: what the committed future leaves on machines of other
   frequencies is a state, what is long past a bound. ``slope_bounds.st`` bounds what past and plan leave.
-- ``sensor.st`` estimates what sways, and ``damping.st`` damps the slowest mode by pulses of another kernel.
-- ``events.st`` tells what is other than in the cycle before.
+- ``sensor.st`` estimates what sways, ``damping.st`` damps the slowest mode by pulses of another kernel, and
+  ``events.st`` tells what is other than in the cycle before.
 - ``formulas/``: modes at the live parameters, complex powers, columns that a row fills, slow zones near.
 """
 
@@ -102,10 +102,8 @@ class PlannerConstants:
         s.
     live : mapping of str to (float, float)
         Ranges of the live parameters.
-    units : tuple of str
-        In which they are given.
-    nominal : tuple of float
-        Their values where the controller gives none.
+    units, nominal : tuple of str, tuple of float
+        In which they are given, and their values where the controller gives none.
     drift : tuple of float
         By how much each may change before it is taken over anew.
     rates : mapping of str to float
@@ -263,6 +261,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "live_rates": " faster than stated" if c.rates else "",
         "hold": f"{HOLD:g}",
         "reaction": f"{_reaction(c):.3g}",
+        "gives_up": f"{_real_constants(c)['cGivesUp']:.3g}",
         "live_lines": "\n    ".join(ranges) or "No live parameters.",
         "live_inputs": "\n".join(inputs),
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(lives)),
@@ -306,8 +305,9 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
 
 
 def _constants(c: PlannerConstants) -> str:
-    follows = "TRUE" if c.rates else "FALSE"
-    lines = [f"    cFollows : BOOL := {follows}; (* how live parameters change on the way *)"]
+    lines = [
+        f"    cFollows : BOOL := {str(bool(c.rates)).upper()}; (* how live parameters change on the way *)"
+    ]
     lines += [f"    {name} : DINT := {value};" for name, value in _whole_constants(c).items()]
     lines += [f"    {name} : LREAL := {literal(value)};" for name, value in _real_constants(c).items()]
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in _arrays(c).items()]
@@ -443,6 +443,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
     return {
         "cCycle": c.cycle,
         "cReaction": _reaction(c),
+        "cGivesUp": _reaction(c) + of_search.GIVES_UP * max(c.periods),
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cRate": min(axis.acceleration / axis.velocity for axis in c.axes),
         "cCurve": min(axis.jerk / axis.velocity for axis in c.axes),

@@ -17,6 +17,7 @@ RAMP_BACK = 0.6  # of a stop's slots, that a plan takes longer which leads back
 ACROSS = 0.2  # of the square of the slope that plans may leave: of the part that is mostly less
 SLOPE_LEAST = 0.25  # of that slope, which they may leave where the past leaves no room
 REFUSED = 0.25  # by which that declines with each plan that would leave too much
+GIVES_UP = 4.0  # slow periods beyond the time to react, in which no motion is found for a command (3)
 
 
 def whole() -> dict[str, int]:

@@ -37,6 +37,7 @@ WORDS = {  # {:g} is the event's value
     56: "error 6: a target was given while a stick was followed",
     57: "error 7: the axis was too far from its setpoint, at {:g}",
     58: "error 8: a blocked interval lies in the way",
+    59: "error 9: no motion was found that leaves as little sway as is allowed",
     60: "the load will not sway",
     61: "the load may sway: a live parameter changed on the way",
     62: "the load may sway: after a quick stop or a take-over it is unknown how it swings",

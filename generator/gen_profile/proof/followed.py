@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.orders import DISABLED, POSITION, Ends, Flags, ReceivedOrders, TimedOrder
+from gen_profile.proof.orders import DISABLED, NO_MOTION, POSITION, Ends, Flags, ReceivedOrders, TimedOrder
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
@@ -155,6 +155,10 @@ class Followed:
     def cycles(self) -> int:
         """How many there were."""
         return len(self.issued["bBusy"])
+
+    def gives_up(self, cycle: int) -> bool:
+        """Tell whether no motion was found for a command that ends in a cycle."""
+        return cycle < self.cycles and bool(self.issued["nErrorId"][cycle] == NO_MOTION)
 
     def after(self, seconds: float) -> int:
         """Cycles that so much time takes at most."""

@@ -40,6 +40,7 @@ from gen_profile.proof.statements import (
     truths,
     velocities,
 )
+from gen_profile.proof.verdict import GIVEN_UP
 
 MORE = (
     0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
@@ -57,6 +58,7 @@ WORDS = {
     "beyond": "a velocity is above the stick's by {over:.3g} m/s",
     "against": "an axis moves against its command longer than allowed by {over:.3g} s",
     "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
+    "given up": GIVEN_UP,
     "reaction": "a command is obeyed later than stated by {over:.3g} s",
     "ends": "a stop leaves its stated ends by {over:.3g} m",
     "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",
@@ -141,6 +143,8 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         begin, end = order.begin, order.end
         if (end - begin) * followed.cycle < FROM_REST * followed.period:
             continue  # it was replaced before
+        if followed.gives_up(end):
+            continue  # that is a fault of its own
         place, before = motion.position[:, begin], motion.velocity[:, begin]
         own = slice(begin, end)
         match order.kind:
@@ -226,7 +230,10 @@ def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]
         yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in runs_of(wants & motion.stands):
         allowed = followed.reaction + ENABLED + calmed(followed) * followed.period
-        yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
+        if followed.gives_up(end):
+            yield Allowance("given up", begin, 1.0, 0.0)
+        else:
+            yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
 
 
 def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

@@ -19,7 +19,9 @@ from gen_profile.planner.interface import BlockAxis
 
 POSITION, VELOCITY, STOP = "position", "velocity", "stop"
 QUICK_STOP, DISABLED = "quick-stop", "disabled"
-MISTIMED, LIVE, REFUSED, NO_NUMBER, LIMITS, CONTRADICTORY, FOLLOWING, BLOCKED = range(1, 9)  # errors
+MISTIMED, LIVE, REFUSED, NO_NUMBER, LIMITS, CONTRADICTORY, FOLLOWING, BLOCKED, NO_MOTION = range(
+    1, 10
+)  # errors
 OF_COMMANDS = (REFUSED, CONTRADICTORY, BLOCKED)  # which go with them
 REPLACED, ABORTED_POSITION, ABORTED_VELOCITY = 3, 1, 2  # why bCommandAborted is set
 ZONES = 8  # intervals of each kind
@@ -84,6 +86,8 @@ class Inputs:
         Cycles in which wrong values of them, of override and of velocity limit do not count.
     cycle : float
         s, of the task.
+    patience : int
+        Cycles after which a command is given up that no motion is found for.
     """
 
     names: Sequence[str]
@@ -92,6 +96,7 @@ class Inputs:
     live: Mapping[str, Interval]
     held: int
     cycle: float
+    patience: int = 10**9
 
 
 @attrs.frozen(kw_only=True)
@@ -178,7 +183,7 @@ def read_orders(
 
 def _events(start_cycles: Sequence[int], facts: Facts) -> list[int]:
     """Cycles in which something may change though no input does."""
-    flags = np.stack([facts.done, facts.stands, facts.errors == BLOCKED])
+    flags = np.stack([facts.done, facts.stands, facts.errors == BLOCKED, facts.errors == NO_MOTION])
     changes = np.flatnonzero(np.diff(flags, prepend=False).any(axis=0)).tolist()
     return [begin + 1 for begin in start_cycles] + [at + k for at in changes for k in (0, 1)]
 
@@ -288,7 +293,7 @@ class _Reader:
         self.due = min((at for at in counts if at > cycle), default=None)
         if row.get("bReset"):
             self.error, self._latched = 0, False
-        fault = MISTIMED * self._mistimed(row)
+        fault = MISTIMED * self._mistimed(row) or NO_MOTION * self._gives_up(cycle)
         fault = max((error for at, error in counts.items() if at <= cycle), default=fault)
         if self._is_in_the_way(cycle, row) and not self._latched:
             fault = BLOCKED
@@ -300,6 +305,13 @@ class _Reader:
         elif not self._latched and not (self.error in OF_COMMANDS and (row["bExecute"] or row["bVelocity"])):
             self.error = 0
         return fault
+
+    def _gives_up(self, cycle: int) -> bool:
+        """Whether the block does, where it may: the axes have stood for so long though they are to move."""
+        facts, begin = self._facts, cycle - self._inputs.patience
+        if facts is None or facts.errors[cycle] != NO_MOTION or self.command == STOP or begin < 0:
+            return False
+        return bool(facts.stands[begin:cycle].all()) and min(self._tops) > 0.0
 
     def _strays(self, row: Mapping[str, float]) -> bool:
         """Whether an axis is farther from its setpoint than its limit allows."""

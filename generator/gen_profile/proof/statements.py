@@ -28,6 +28,7 @@ from gen_profile.proof.followed import (
 from gen_profile.proof.orders import (
     BLOCKED,
     DISABLED,
+    NO_MOTION,
     POSITION,
     QUICK_STOP,
     STOP,
@@ -53,7 +54,7 @@ UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as gi
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
-SHOWN = (10, 20, 21, 22, *range(50, 59), *range(60, 67), 70)  # codes of events that other outputs show, too
+SHOWN = (10, 20, 21, 22, *range(50, 60), *range(60, 67), 70)  # codes of events that other outputs show, too
 COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
 PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
 
@@ -220,7 +221,8 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
             moving |= bool(motion.velocity[:, at - 1 : at].any())
             moved = followed.moved(order.begin, at) > 0.0
             begun = bool(followed.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
-            may_be[at:] |= moving or moved or begun
+            refused = bool((followed.issued["nErrorId"][: order.begin] == NO_MOTION).any())
+            may_be[at:] |= moving or moved or begun or refused
             must_be[at:] |= (moving or followed.moved(order.begin, at) > FAR_MOVED) and not followed.reserve
         elif order.kind == QUICK_STOP:
             may_be[at:] |= moving or bool(followed.issued["bBusy"][max(0, at - 1)])

@@ -25,6 +25,8 @@ QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 LISTED = 10  # of the worst histories
 TAKEN_BACK = "the block takes its promise back"
+GIVEN_UP = "the block gives a command up (error 9), as any motion might leave more sway than allowed"
+LESS_SWAY = "narrow check.uncertain, allow more (check.residual_sway), or accelerate less"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -165,7 +167,8 @@ class Proof(Summarised, Examination):
         for kind, those in by_kind.items():
             first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
-            sentences.append(f"In history {those[0].number} {first}{others}.")
+            cure = f": {LESS_SWAY}" if kind == GIVEN_UP else ""
+            sentences.append(f"In history {those[0].number} {first}{others}{cure}.")
         if not self.apart <= AGREEMENT:
             sentences.append(
                 f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "

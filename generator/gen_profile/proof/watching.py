@@ -45,6 +45,7 @@ MEDIAN = 3  # cycles, of which the median of a live parameter counts
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
 _STATED = re.compile(r"\bcReaction\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
+_GIVES_UP = re.compile(r"\bcGivesUp\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
 _HELD = re.compile(r"\bcHoldCycles\s*:\s*DINT\s*:=\s*(\d+)\s*;")
 _PLAY = CFUNCTYPE(c_int, c_void_p, POINTER(c_double), c_long, POINTER(c_double))
 
@@ -77,7 +78,7 @@ class BlockWatch:
     @classmethod
     def of(cls, text: str, block: BlockInstance, histories: Histories) -> BlockWatch:
         """Look at a block's text."""
-        stated, held = _STATED.search(text), _HELD.search(text)
+        stated, held, gives_up = (known.search(text) for known in (_STATED, _HELD, _GIVES_UP))
         usual = LEAST_REACTION + REACTION * histories.period
         return cls(
             histories=histories,
@@ -91,6 +92,7 @@ class BlockWatch:
                 live=histories.spec.planner.live,
                 held=int(held[1]) if held else 0,
                 cycle=block.inputs["fCycleTime"],
+                **({"patience": int(float(gives_up[1]) / block.inputs["fCycleTime"])} if gives_up else {}),
             ),
             reaction=float(stated[1]) if stated else usual,
         )
