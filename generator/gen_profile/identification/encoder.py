@@ -101,6 +101,6 @@ class Encoder:
         if counts := int.from_bytes(answer, "little"):
             return counts
         raise OutputError(
-            f"Node {self.node} on {self.port.channel} does not tell the counts of a turn (6001h){why}: name "
-            "them by --counts, or compare node id and bit rate."
+            f"Node {self.node} on {self.port.channel} does not tell the counts of a turn (6001h){why}: state "
+            "them, or compare node id and bit rate."
         )
