@@ -140,7 +140,7 @@ def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
 
     names = ["cPosition"] if layout != "segments" else [f"cPower{power}" for power in range(6)]
     if "aTable" in bare:  # a buffer: its size, what holds for all, what holds for each axis, and its columns
-        table = constant("aTable")
+        table = constant("aTable")[3:]  # of which length and checks of the whole come first
         size, first, last, target = int(table[0]), 8 + 8 * m, table[3], table[12 : 8 + 8 * m : 8]
         *columns, starts = (table[first + n * size :][:size] for n in range(len(names) + 1))
         starts = starts[::m]
