@@ -28,6 +28,8 @@ FORMER = {  # machine: how many are drawn, seed, number
     "hoisted": [
         (300, 5, 172),  # 15 mm beyond them
         (300, 5, 192),  # at a fifth of full speed, as calming broke the pulses' rise off
+        (150, 1, 43),  # a plan by the rope of 60 s ago, as a stick had held the axis at its end
+        (150, 1, 93),  # a stop 6 s late: plans to a stick's velocity left no time to learn of the rope
     ],
 }
 
