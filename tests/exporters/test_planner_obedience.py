@@ -10,6 +10,7 @@ from generator.planned_machines import swing
 import gen_profile as gp
 from gen_profile.errors import SpecError
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
 
 pytestmark = pytest.mark.slow
@@ -148,6 +149,13 @@ def test_what_an_axis_does_by_hand_is_followed_and_calmed(hoisting, seconds, sca
     sway = swing(times, out["fAcceleration"], 350.0, 2000.0, 6.0, 1.5)
     assert sway.max() > 0.5
     assert (sway[:, -2500:].max() < 5e-3) == promise
+
+
+def test_a_rope_that_is_no_number_at_power_up_divides_nothing_by_zero(hoisting):
+    block = BlockInstance(hoisting)  # whose calls fail where the text divides by zero
+    given = block.inputs | {"bEnable": 1.0, "fL1": NAN}
+    errors = block.call(np.tile([*given.values()], (100, 1)))[:, block.outputs.index("nErrorId")]
+    assert np.unique(errors).tolist() == [0.0, 2.0]
 
 
 def test_the_same_target_again_and_again_changes_nothing(text):

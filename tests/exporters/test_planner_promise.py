@@ -105,3 +105,15 @@ def test_a_block_that_forgets_what_was_left_breaks_it(text):
         driver.hold(3.125, fVelocityCommand=VELOCITY * (-1.0) ** number)
     out = driver.hold(40.0, fVelocityCommand=0.0).outputs
     assert worst(out["fVelocity"], 9.0, 2000.0) > 1.2 * LIMIT
+
+
+def test_a_rope_that_changes_while_a_stick_holds_the_axis_at_its_end_keeps_the_promise(text):
+    """The axis stands there: pulses of a rounding error kept it moving."""
+    driver = standing(text, 6.0, 1000.0, place=39.0).hold(15.0, bVelocity=1, fVelocityCommand=VELOCITY)
+    assert not driver.outputs["bBusy"][-1]
+    driver.hold(2.0, fL1=3.5)
+    begin = len(driver.outputs["fVelocity"])
+    out = driver.hold(4.0, fVelocityCommand=-0.5).hold(15.0, fVelocityCommand=0.0).outputs
+    assert out["fVelocity"].min() < -0.4
+    assert out["nPromise"][-1] == 0
+    assert left(out["fVelocity"][begin:], 3.5, 1000.0) < 1e-9

@@ -20,6 +20,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
         (300, 8, 58),  # 15 cm beyond the stated ends, as a pulse was weighed where the override became 0
         (300, 5, 39),  # fTimeToGo half of what it took pulses to turn round
+        (225, 5, 64),  # a rope that came with a command, as that of before was being taken over: 7 mm left
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
@@ -28,6 +29,8 @@ FORMER = {  # machine: how many are drawn, seed, number
     "hoisted": [
         (300, 5, 172),  # 15 mm beyond them
         (300, 5, 192),  # at a fifth of full speed, as calming broke the pulses' rise off
+        (150, 1, 43),  # a plan by the rope of 60 s ago, as a stick had held the axis at its end
+        (150, 1, 93),  # a stop 6 s late: plans to a stick's velocity left no time to learn of the rope
     ],
 }
 
