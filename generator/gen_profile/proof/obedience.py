@@ -163,10 +163,12 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 continue
         latest = begin + followed.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
-        if first < end:
-            yield Allowance(order.kind, begin, (first - begin) * followed.cycle, allowed)
-        elif end > latest:
-            yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
+        since = begin
+        if order.kind == POSITION:  # it counts from when the way was last damped
+            until = min(first, latest + followed.after(followed.settle))
+            since += int(np.flatnonzero(followed.sensed("bDamping")[begin:until]).max(initial=0))
+        if first < end or end > latest:
+            yield Allowance(order.kind, begin, (first - since) * followed.cycle, allowed)
         if first < end and order.kind == POSITION:
             yield from _left(followed, motion, (first, end), allowed)
 
