@@ -88,6 +88,7 @@ WORDS = {
     "lost": "nPromise tells a reason that is none",
     "kept": "bPromise is set though it cannot be known",
 }
+LATE = POSITION, VELOCITY, STOP, "idle", "reaction"  # of these: what a plan that takes many cycles makes
 
 
 def faults(measurements: Iterable[Allowance], cycle: float) -> Iterator[str]:

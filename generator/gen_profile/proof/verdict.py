@@ -11,6 +11,7 @@ import numpy as np
 
 from gen_profile.proof.histories import History
 from gen_profile.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
+from gen_profile.proof.obedience import LATE, WORDS
 from gen_profile.summary import Summarised
 from gen_profile.verification.verdict import Examination
 
@@ -165,7 +166,8 @@ class Proof(Summarised, Examination):
         for kind, those in by_kind.items():
             first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
-            sentences.append(f"In history {those[0].number} {first}{others}.")
+            cure = CURES.get(kind, "")
+            sentences.append(f"In history {those[0].number} {first}{others}{cure}.")
         if not self.apart <= AGREEMENT:
             sentences.append(
                 f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
@@ -229,3 +231,10 @@ class Proof(Summarised, Examination):
 def kind_of(fault: str) -> str:
     """Leave out the numbers of a fault."""
     return re.split(" by |, at ", fault, maxsplit=1)[0]
+
+
+CURES = {
+    kind_of(WORDS[what]): "; where the controller can do more in a cycle, raise planner.operations, as plans "
+    "then come sooner"
+    for what in LATE
+}
