@@ -5,6 +5,7 @@ from itertools import pairwise
 import attrs
 import numpy as np
 import pytest
+from generator.test_proof_obedience import CYCLES, MOVE, REST, STICKS, STOPS, kinds, with_orders
 
 from gen_profile.charts.proof import damping_figures, worst_damped
 from gen_profile.errors import SpecError
@@ -15,8 +16,11 @@ from gen_profile.planner.sensor_log import read_sensor_log
 from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
+from gen_profile.proof.obedience import WORDS
+from gen_profile.proof.orders import POSITION
 from gen_profile.proof.prove import prove
 from gen_profile.proof.sensing import FAULTS, JUMP, Gust, sensor_faults
+from gen_profile.proof.verdict import kind_of
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.running.block_run import BlockRun
 
@@ -72,7 +76,8 @@ def test_a_gust_pushes_as_its_acceleration_says(spec):
 def followed(sway, *, damping=0.0, fault=0.0, stands=0):
     """A run of 20 s that arrives at once, and its outputs."""
     cycles = 5000
-    columns = {"bDamping": damping, "bBusy": 0.0, "nSensorFault": fault, "hook": 0.0, "payload": sway}
+    columns = {"bDamping": damping, "bBusy": 0.0, "nSensorFault": fault, "fPosition": 0.0}
+    columns |= {"hook": 0.0, "payload": sway}
     trace = np.column_stack([np.broadcast_to(value, cycles) for value in columns.values()])
     run = BlockRun(
         axes=(),
@@ -85,7 +90,7 @@ def followed(sway, *, damping=0.0, fault=0.0, stands=0):
         fault=0,
         trace=trace,
     )
-    return run, list(columns)[:3]
+    return run, list(columns)[:4]
 
 
 def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
@@ -114,6 +119,15 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     assert "neither noticed nor harmless" in faults(scaled, attrs.evolve(run, promise=False), outputs)[0]
     swings, _ = followed(2.0 * (times > 5.0), fault=7.0 * (times > 6.0))
     assert "makes the load swing by 2 m" in faults(scaled, swings, outputs)[0]
+
+
+@pytest.mark.parametrize("settle", [0.0, 12.0])
+def test_damping_on_the_way_may_put_off_an_arrival_for_so_long_and_no_longer(settle):
+    orders = REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS  # to where it never comes
+    way = attrs.evolve(with_orders(*orders), period=0.5, settle=settle)
+    assert kind_of(WORDS[POSITION]) in kinds(way)
+    way.issued["bDamping"] = np.ones(CYCLES)
+    assert (kind_of(WORDS[POSITION]) in kinds(way)) == (settle == 0.0)
 
 
 @pytest.mark.parametrize("jump", [0.05, 0.055, 0.06])

@@ -11,7 +11,7 @@ from gen_profile.errors import GenProfileError, Suggestion
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.limits import rounded_down, rounded_up
 from gen_profile.proof.obedience import WORDS
-from gen_profile.proof.verdict import GIVEN_UP, TAKEN_BACK, Proof, kind_of
+from gen_profile.proof.verdict import TAKEN_BACK, Proof, kind_of
 from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
 from gen_profile.units import RATES
@@ -21,7 +21,7 @@ FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 UNKNOWN = 1.25  # times the limit: at least so much a block counts that shows one of the next
 OF_SWAY = {
     TAKEN_BACK,
-    GIVEN_UP,
+    WORDS["given up"],
     kind_of(WORDS["idle"]),
 }  # it waits, too, where a plan would break its promise
 

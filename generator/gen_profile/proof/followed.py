@@ -64,6 +64,8 @@ class Followed:
         Share of the limits for calming while live parameters change, else 0.
     wander : float
         m, that calming may lead away from a target.
+    settle : float
+        s, by which damping may put off an arrival.
     sway_limit : float
         m, for all that stated errors may leave.
     rest_reports : sequence of int
@@ -91,6 +93,7 @@ class Followed:
     issued: Mapping[str, Array]
     reserve: float = 0.0
     wander: float = 0.0
+    settle: float = 0.0
     sway_limit: float = inf
     rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()

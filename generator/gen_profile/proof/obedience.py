@@ -40,7 +40,6 @@ from gen_profile.proof.statements import (
     truths,
     velocities,
 )
-from gen_profile.proof.verdict import GIVEN_UP
 
 MORE = (
     0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
@@ -58,7 +57,7 @@ WORDS = {
     "beyond": "a velocity is above the stick's by {over:.3g} m/s",
     "against": "an axis moves against its command longer than allowed by {over:.3g} s",
     "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
-    "given up": GIVEN_UP,
+    "given up": "the block gives a command up (error 9), as any motion might leave more sway than allowed",
     "reaction": "a command is obeyed later than stated by {over:.3g} s",
     "ends": "a stop leaves its stated ends by {over:.3g} m",
     "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",
@@ -90,6 +89,7 @@ WORDS = {
     "lost": "nPromise tells a reason that is none",
     "kept": "bPromise is set though it cannot be known",
 }
+LATE = POSITION, VELOCITY, STOP, "idle", "reaction"  # of these: what a plan that takes many cycles makes
 
 
 def faults(measurements: Iterable[Allowance], cycle: float) -> Iterator[str]:
@@ -167,10 +167,12 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 continue
         latest = begin + followed.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
-        if first < end:
-            yield Allowance(order.kind, begin, (first - begin) * followed.cycle, allowed)
-        elif end > latest:
-            yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
+        since = begin
+        if order.kind == POSITION:  # it counts from when the way was last damped
+            until = min(first, latest + followed.after(followed.settle))
+            since += int(np.flatnonzero(followed.sensed("bDamping")[begin:until]).max(initial=0))
+        if first < end or end > latest:
+            yield Allowance(order.kind, begin, (first - since) * followed.cycle, allowed)
         if first < end and order.kind == POSITION:
             yield from _left(followed, motion, (first, end), allowed)
 

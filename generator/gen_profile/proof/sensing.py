@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.machine import planned_axes
-from gen_profile.planner.sensor import largest_innovation
+from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
@@ -237,7 +237,8 @@ def sensor_faults(
         )
     if run.stands < 0:
         return
-    rests = (issued["bDamping"] != 0.0) | (issued["bBusy"] == 0.0)
+    near = np.abs(issued["fPosition"] - issued["fPosition"][-1]) <= damping_room(spec)
+    rests = (issued["bBusy"] == 0.0) | (near & (issued["bDamping"] != 0.0))  # not damped on the way
     first = min(round(last / cycle) + TAKEN_UP, len(rests) - 1)
     arrived = first + int(np.argmax(rests[first:]))
     _, disturbance = _stated(spec)

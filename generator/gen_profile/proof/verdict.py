@@ -11,6 +11,7 @@ import numpy as np
 
 from gen_profile.proof.histories import History
 from gen_profile.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
+from gen_profile.proof.obedience import LATE, WORDS
 from gen_profile.summary import Summarised
 from gen_profile.verification.verdict import Examination
 
@@ -25,8 +26,6 @@ QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 LISTED = 10  # of the worst histories
 TAKEN_BACK = "the block takes its promise back"
-GIVEN_UP = "the block gives a command up (error 9), as any motion might leave more sway than allowed"
-LESS_SWAY = "narrow check.uncertain, allow more (check.residual_sway), or accelerate less"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -167,7 +166,7 @@ class Proof(Summarised, Examination):
         for kind, those in by_kind.items():
             first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
-            cure = f": {LESS_SWAY}" if kind == GIVEN_UP else ""
+            cure = CURES.get(kind, "")
             sentences.append(f"In history {those[0].number} {first}{others}{cure}.")
         if not self.apart <= AGREEMENT:
             sentences.append(
@@ -232,3 +231,10 @@ class Proof(Summarised, Examination):
 def kind_of(fault: str) -> str:
     """Leave out the numbers of a fault."""
     return re.split(" by |, at ", fault, maxsplit=1)[0]
+
+
+CURES = {
+    kind_of(WORDS[what]): "; where the controller can do more in a cycle, raise planner.operations, as plans "
+    "then come sooner"
+    for what in LATE
+} | {WORDS["given up"]: ": narrow check.uncertain, allow more (check.residual_sway), or accelerate less"}

@@ -193,6 +193,7 @@ class BlockWatch:
             issued=issued,
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
+            settle=self.spec.planner.disturbance.settle if self.spec.planner.disturbance else 0.0,
             sway_limit=min(self.spec.check.residual_sway.values()),
             rest_reports=self._rest_reports(script, run.cycles),
             zones=list(self._zones(start_cycles, rows, run.cycles)),
