@@ -39,7 +39,7 @@ from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
 from gen_profile.proof.numbering import Numbering
-from gen_profile.proof.verdict import JudgedHistory, kind_of
+from gen_profile.proof.verdict import JudgedHistory, kind_of, late_on_average
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.planner import block
@@ -279,14 +279,17 @@ def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str | None, str]:
     for one in machines:
         if not changes(one, mutant):
             continue
-        text = mutated(one, mutant)
+        text, found_all = mutated(one, mutant), list[JudgedHistory]()
         try:
             for number, found in judged(one.spec, text, one.histories, one.drawn):
                 sound = one.shown[number]
+                found_all.append(found)
                 if new := kinds_of(one.spec, found) - kinds_of(one.spec, sound):
                     return f"{one.name} {number}: {'; '.join(sorted(new))}", ""
                 otherwise += found.on_the_way != sound.on_the_way or found.residual != sound.residual
                 later.append((found.rests_after or 0.0) - (sound.rests_after or 0.0))
+            if new := next(late_on_average(found_all), ""):
+                return f"{one.name}: {new}", ""
         except GenProfileError as error:
             return f"{one.name}: no block: {str(error)[:80]}", ""
     return (
@@ -356,6 +359,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100, help="mutants that are not listed")
     parser.add_argument("--seed", default="mutants")
     parser.add_argument("--histories", type=int, default=64)
+    parser.add_argument("--machines", nargs="*", choices=MACHINES, help="just these")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", type=int, nargs="*", help="just those of these numbers")
     arguments = parser.parse_args()
@@ -363,7 +367,9 @@ def main() -> None:
         os.environ["GEN_PROFILE_CACHE"] = cache  # compiled mutants are of no use later
         quick = quick_compiler()
         execution.find_compiler = lambda: quick
-        machines = [machine(name, spec, arguments.histories) for name, spec in MACHINES.items()]
+        machines = [
+            machine(name, MACHINES[name], arguments.histories) for name in arguments.machines or MACHINES
+        ]
         for one in machines:
             sound = Counter(kind for history in one.shown for kind in kinds_of(one.spec, history))
             print(f"{one.name}, sound: {dict(sound)}", flush=True)

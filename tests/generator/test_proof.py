@@ -25,7 +25,7 @@ from gen_profile.proof.judging import WatchedRun, judge_run
 from gen_profile.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH, Numbering
 from gen_profile.proof.on_cluster import ProofRecipe, judge_part
 from gen_profile.proof.prove import prove, replay
-from gen_profile.proof.verdict import Proof
+from gen_profile.proof.verdict import Proof, late_on_average
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
@@ -205,11 +205,11 @@ def test_a_worker_that_fails_is_told(spec, text, monkeypatch):
 
 def test_the_ends_of_every_choice_make_a_history(spec):
     histories = Histories.of(spec)
-    for end, rope, load, place in ((0.0, 0.95 * 3.0, 1e-6, 0.0), (1.0, 1.05 * 9.0, 2000.0, 40.0)):
+    for end, rope, load, place in ((0.0, 0.95 * 3.0, 1e-6, -1.2), (1.0, 1.05 * 9.0, 2000.0, 41.2)):
         history = histories.history(np.full(histories.choices, end))
         assert history.parameters["L1"] == pytest.approx(rope)
         assert history.parameters["m2"] == pytest.approx(load, abs=1.0)
-        assert history.places == (place,)
+        assert history.places == pytest.approx((place,))  # beyond the travel, from 0 to 40 m
         assert history.commands
         assert [one.time for one in history.commands] == sorted(one.time for one in history.commands)
 
@@ -499,3 +499,14 @@ def test_an_altered_file_is_told(deployed, tmp_path):
     assert altered.code == 4
     assert altered.document["artefact"]["manifest"] == "differs"
     assert "altered after its export" in altered.err
+
+
+def test_what_comes_late_on_average_is_a_fault():
+    def late(group, count, mean):
+        one = SimpleNamespace(group=group, later={"stop": mean + np.array([-0.3, 0.3])})
+        return [*late_on_average([one] * (count // 2))]
+
+    assert late(DRAWS, 40, 0.2) == ["Stops end later than allowed on average, by 0.11 slow periods or more."]
+    assert not late(DRAWS, 40, 0.05)  # which may be chance
+    assert not late(DRAWS, 10, 0.9)
+    assert not late(SEARCH, 40, 0.9)

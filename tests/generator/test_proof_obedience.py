@@ -12,10 +12,10 @@ from generator.planned_machines import BAY
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.followed import Followed, Zone
+from gen_profile.proof.followed import ON_AVERAGE, Followed, Zone
 from gen_profile.proof.habits import GENTLE, ROUGH
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.obedience import WORDS, faults, measured
+from gen_profile.proof.obedience import LATER, WORDS, faults, measured
 from gen_profile.proof.orders import (
     BLOCKED,
     DISABLED,
@@ -162,7 +162,10 @@ def idle(error=0.0):
 
 def test_a_block_that_obeys_has_no_fault():
     assert kinds(obedient()) == set()
-    assert len(list(measured(obedient(), REACTIONS))) > 10
+    met = {one.what: one.needed for one in measured(obedient(), REACTIONS)}
+    assert len(met) > 10
+    assert met[LATER[POSITION]] == pytest.approx((7.2 - 1.1 * 5.0 - 2.0 - 0.1) / 2.0 - ON_AVERAGE[POSITION])
+    assert met[LATER[STOP]] == pytest.approx((2.2 - 1.6 - 0.1) / 2.0 - ON_AVERAGE[STOP])
 
 
 REST, MOVE, STICKS, STOPS = obedient().orders

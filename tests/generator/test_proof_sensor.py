@@ -73,11 +73,12 @@ def test_a_gust_pushes_as_its_acceleration_says(spec):
     assert np.abs(pushed - due).max() < 2e-3
 
 
-def followed(sway, *, damping=0.0, fault=0.0, stands=0):
+def followed(sway, *, damping=0.0, fault=0.0, stands=0, **outputs):
     """A run of 20 s that arrives at once, and its outputs."""
     cycles = 5000
-    columns = {"bDamping": damping, "bBusy": 0.0, "nSensorFault": fault, "fPosition": 0.0}
-    columns |= {"hook": 0.0, "payload": sway}
+    columns = {"bDamping": damping, "bBusy": 0.0, "nSensorFault": fault, "bSensorUsed": 1.0}
+    columns |= {"fSwayEstimated": sway, "fSwayUncertainty": 0.0, "fSensorScale": 1.0, "fAcceleration": 0.0}
+    columns |= {"fPosition": 0.0} | outputs | {"hook": 0.0, "payload": sway}
     trace = np.column_stack([np.broadcast_to(value, cycles) for value in columns.values()])
     run = BlockRun(
         axes=(),
@@ -90,7 +91,7 @@ def followed(sway, *, damping=0.0, fault=0.0, stands=0):
         fault=0,
         trace=trace,
     )
-    return run, list(columns)[:4]
+    return run, list(columns)[:-2]
 
 
 def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
@@ -100,7 +101,7 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     times = np.arange(5000) * CYCLE
 
     def faults(one, run, outputs):
-        return [*sensor_faults(spec, one, run, outputs, cycle=CYCLE, last=1.0)]
+        return [*sensor_faults(spec, one, run, outputs, cycle=CYCLE, period=3.0, last=1.0)]
 
     assert not faults(sound, *followed(0.2 * (times < 12.9)))
     (late,) = faults(sound, *followed(0.2 * (times < 14.0)))
@@ -128,6 +129,30 @@ def test_damping_on_the_way_may_put_off_an_arrival_for_so_long_and_no_longer(set
     assert kind_of(WORDS[POSITION]) in kinds(way)
     way.issued["bDamping"] = np.ones(CYCLES)
     assert (kind_of(WORDS[POSITION]) in kinds(way)) == (settle == 0.0)
+
+
+def test_what_a_block_tells_of_its_sensor_is_judged(spec):
+    drawn = (
+        one.sensed for one in map(Histories.of(spec).history, Numbering.of(Histories.of(spec), 60, 0).drawn)
+    )
+    sound = attrs.evolve(next(one for one in drawn if one is not None and not one.fault), gusts=())
+    dead = attrs.evolve(sound, fault="dead", fails=1.0)
+    swings = 0.3 * np.sin(2.0 * np.pi / 3.0 * np.arange(5000) * CYCLE)
+
+    def faults(one, resets=(), **given):
+        known = {"cycle": CYCLE, "period": 3.0, "last": 1.0, "resets": resets}
+        return [*sensor_faults(spec, one, *followed(0.0, **given), **known)]
+
+    assert not faults(sound, fSensorScale=1.3, fAcceleration=swings)
+    assert "fSensorScale is wrong by 0.5" in faults(sound, fSensorScale=1.5, fAcceleration=swings)[0]
+    assert not faults(sound, fSensorScale=1.5, fAcceleration=0.1 * swings)  # too little to tell
+    assert not faults(sound, range(1, 20, 5), fSensorScale=1.5, fAcceleration=swings)  # forgotten by resets
+    assert not faults(dead, fSensorScale=0.3, fAcceleration=swings)
+    assert "fSensorScale is wrong by 1" in faults(dead, fAcceleration=swings)[0]
+    assert not faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.06)
+    (off,) = faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.04)
+    assert off.startswith("fSwayUncertainty is too small by 0.16 m")
+    assert not faults(sound, fSwayEstimated=0.2, bSensorUsed=0.0)
 
 
 @pytest.mark.parametrize("jump", [0.05, 0.055, 0.06])

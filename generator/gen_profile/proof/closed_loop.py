@@ -154,9 +154,11 @@ class ClosedLoop:
         run = self._followed(history, block, script, rows=orders[-1].end, marks=marks)
         if run.fault:
             return WatchedRun(run=run)
-        faults, left = self._watch.faults((period, modes, last), script, orders, block, run)
-        faults = (*faults, *self._sensor_faults(history, run))
-        return WatchedRun(run=attrs.evolve(run, trace=None, copies=None), faults=faults, left=left)
+        faults, left, later = self._watch.faults((period, modes, last), script, orders, block, run)
+        faults = (*faults, *self._sensor_faults(history, period, run))
+        return WatchedRun(
+            run=attrs.evolve(run, trace=None, copies=None), faults=faults, left=left, later=later
+        )
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.
@@ -281,13 +283,20 @@ class ClosedLoop:
             return start_cycles, inputs
         return [*start_cycles, ends], np.vstack([inputs, inputs[-1]])
 
-    def _sensor_faults(self, history: History, run: BlockRun) -> Iterator[str]:
+    def _sensor_faults(self, history: History, period: float, run: BlockRun) -> Iterator[str]:
         """Judge how the block used its sensor; after a quick stop at the end it does not."""
-        if history.sensed is not None and not history.brakes:
+        if history.sensed is not None and history.commands[-1].command != "quick-stop":
             changed = [one.time + one.lasts for one in history.changes if math.isfinite(one.lasts)]
             last = max(history.commands[-1].time, *changed, 0.0)
             yield from sensor_faults(
-                self._spec, history.sensed, run, self.outputs, cycle=self.cycle, last=last
+                self._spec,
+                history.sensed,
+                run,
+                self.outputs,
+                cycle=self.cycle,
+                period=period,
+                last=last,
+                resets=[one.time for one in history.changes if "bReset" in one.inputs],
             )
 
     def _crossing(self, axis: int) -> float:

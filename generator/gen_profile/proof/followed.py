@@ -11,7 +11,16 @@ import numpy as np
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.orders import DISABLED, NO_MOTION, POSITION, Ends, Flags, ReceivedOrders, TimedOrder
+from gen_profile.proof.orders import (
+    DISABLED,
+    NO_MOTION,
+    POSITION,
+    STOP,
+    Ends,
+    Flags,
+    ReceivedOrders,
+    TimedOrder,
+)
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
@@ -23,11 +32,12 @@ ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (4.0
 TO_STICK = 3.4  # to its velocity, as a motion to a target is stopped first (3.2)
 AHEAD = 1.5  # before an end of the way, or a slow interval, in which a stick's velocity need not be reached
 MORE_AXES = 1.7  # for each further axis, as they are planned one after the other (1.5)
-TO_STOP = 2.8  # (2.4)
+TO_STOP = 2.6  # (2.4)
 TO_SLOW = 2.2  # below a new velocity limit: a new target is planned, or a motion stopped, first (1.5)
 TO_TURN = 1.9  # (1.6)
 RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
 CALMED = 3.0  # more where live parameters change on the way (2.1)
+ON_AVERAGE = {POSITION: 0.8, STOP: 1.0}  # targets from rest, and stops (0.72, 0.92)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
 ENABLED = 2.2  # s, which a block takes more to get ready (2.1, of a damped crane at 4 ms)
 IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached

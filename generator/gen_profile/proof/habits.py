@@ -88,8 +88,8 @@ class Surroundings:
         Whether they change on the way.
     zones : bool
         Whether the block knows of any.
-    rough : bool
-        Whether the load may be left swinging.
+    rough : int
+        How many of the habits may be taken that leave the load swinging.
     """
 
     cycle: float
@@ -100,7 +100,7 @@ class Surroundings:
     live: Mapping[str, tuple[float, float]]
     hoists: bool
     zones: bool
-    rough: bool
+    rough: int
 
     def zone(self, axis: int, place: float, width: float, number: int, *, slow: bool) -> dict[str, float]:
         """Choose an interval of an axis that is blocked, or slow."""
@@ -149,7 +149,7 @@ def habit(command: Command, which: float, how: float, around: Surroundings) -> M
     """
     if which < 0.5:
         return Manner(commands=(command,))
-    habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *ROUGH * around.rough * OFTEN]
+    habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *ROUGH[: around.rough] * OFTEN]
     return habits[min(int(2.0 * len(habits) * (which - 0.5)), len(habits) - 1)](command, how, around)
 
 
@@ -272,9 +272,12 @@ def _patient(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _held(command: Command, how: float, around: Surroundings) -> Manner:
-    """Hold by an override of 0, and go on."""
-    held = _change(command, around.part(how, 3), around.brief(how, 3.0), {"rOverride": 0.0})
-    return Manner(commands=(command,), changes=(held,))
+    """Hold by an override of 0, tap the stick then or not, and go on."""
+    later, lasts = around.part(how, 3), around.brief(how, 3.0)
+    tap = _followed(_stick(command, how, around), later + 0.2 * lasts)
+    taps = (tap, _followed(tap, 0.6 * lasts, values=around.neutral)) if _fraction(how, 4) > 0.5 else ()
+    held = _change(command, later, lasts, {"rOverride": 0.0})
+    return Manner(commands=(command, *taps), changes=(held,))
 
 
 def _wild(command: Command, how: float, around: Surroundings) -> Manner:
@@ -359,11 +362,13 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _braked(command: Command, how: float, around: Surroundings) -> Manner:
-    """Brake at once, and say that the load hangs still, true or not."""
+    """Brake at once, or as a stop is planned; and say that the load hangs still, true or not."""
     first, wait = _towards(command, how, around), around.period * (0.3 + _fraction(how, 3))
     rest_report = _change(first, 2.5 * wait, 0.0, {"bLoadAtRest": 1.0})
+    before = _log(around.cycle, min(SOON * around.cycle, wait), _fraction(how, 4))
+    stop = [_stopped(first, wait - before)] * (how < 0.5)
     return Manner(
-        commands=(first, _stopped(first, wait, "quick-stop"), _stopped(first, 3.0 * wait)),
+        commands=(first, *stop, _stopped(first, wait, "quick-stop"), _stopped(first, 3.0 * wait)),
         changes=() if around.hoists else (rest_report,),  # one that calms by a model believes that
     )
 
@@ -420,12 +425,17 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
     """Tell another live parameter on the way, faster than may be, and later that of before, or not."""
-    inputs = {f"f{name}": _between(ends, _fraction(how, 5)) for name, ends in around.live.items()}
     later, lasts = around.part(how, 3), _log(0.1, around.period, _fraction(how, 4))
     if how > 0.3:  # for good; some together with the command
         later, lasts = later * (how < 0.6), inf
-    change = _change(command, later, lasts, inputs)
-    return Manner(commands=(command,), changes=(change,) if inputs and not around.hoists else ())
+    times = [later]
+    if how > 0.85:  # again and again
+        lasts = 0.05 * around.period
+        times = [k * lasts for k in range(CREEPING)]
+    shares = [_fraction(how, 5) * (1.0 - k / CREEPING) for k in range(len(times))]
+    given = [{f"f{name}": _between(ends, share) for name, ends in around.live.items()} for share in shares]
+    changes = [_change(command, time, lasts, inputs) for time, inputs in zip(times, given, strict=True)]
+    return Manner(commands=(command,), changes=tuple(changes) if around.live and not around.hoists else ())
 
 
 Habit = Callable[[Command, float, Surroundings], Manner]
@@ -450,6 +460,7 @@ GENTLE: tuple[Habit, ...] = (
     _contradicted,
 )
 ROUGH: tuple[Habit, ...] = (_strayed, _braked, _disabled, _respooled)  # the load swings then
+BRAKING = 2  # the first of these
 
 
 def rhythm(choices: Array, around: Surroundings, lasts: float) -> Manner:

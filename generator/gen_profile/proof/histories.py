@@ -25,7 +25,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
-from gen_profile.proof.habits import HELD, Change, Manner, Surroundings, habit, rhythm
+from gen_profile.proof.habits import BRAKING, HELD, ROUGH, Change, Manner, Surroundings, habit, rhythm
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
 
@@ -38,7 +38,8 @@ MOST_COMMANDS = 16
 MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
 MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
 SLOWEST = 0.3  # override, and velocity limit as a share of the machine's
-ROUGH = 0.35  # share of the histories in which the load may be left swinging
+OUTSIDE = 0.03  # share of the histories that begin before the travel, or behind it, by as much of it at most
+ROUGH_SHARE = 0.35  # share of the histories in which the load may be left swinging
 ALONE = 0.1  # half the share of stick commands that leave one of several axes alone
 LEGS = 8  # of one speed each, in which a live parameter changes on the way
 HOISTED_ON = 2.0  # periods after the last command in which it still may
@@ -309,13 +310,15 @@ class Histories:
         for number, start in zip(self.axes, starts, strict=True):
             travel = self.spec.limits.of(number).travel
             assert travel is not None
-            places[number] = _between(travel, _widened(start))
+            beyond = max(start - 1.0 + OUTSIDE, 0.0) - max(OUTSIDE - start, 0.0)
+            places[number] = _between(travel, _widened(start)) + beyond * (travel[1] - travel[0])
         rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
         sensor = choices[self._first_sensed :].tolist()
         is_sensed = not lasts and sensed(self.spec, sensor)
-        rough = not (is_sensed or lasts) and manner * len(MANNERS) % 1.0 < ROUGH
+        swings = not lasts and manner * len(MANNERS) % 1.0 < ROUGH_SHARE
+        rough = swings * (BRAKING if is_sensed else len(ROUGH))
         if 0.0 < lasts < SHIFT:
-            manners = [rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=False), lasts)]
+            manners = [rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)]
         else:
             rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
             manners = [*self._manners(rows, first, manner, ending, rough=rough, lasts=lasts)]
@@ -360,7 +363,7 @@ class Histories:
         return _machine(self.spec, history.live, errors)[0]
 
     def _manners(
-        self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: bool, lasts: float
+        self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: int, lasts: float
     ) -> Iterator[Manner]:
         """Follow the rows until their time is over, then come to rest."""
         within, longest = lasts or max(COMMANDED, PERIODS * self.period), PAUSE if lasts else LONGEST
@@ -386,7 +389,7 @@ class Histories:
 
     def _zones(self, starts: Sequence[float], *shares: float) -> Iterator[Change]:
         """Block intervals beyond where the axes start, and make others slow."""
-        around = self._surroundings(rough=False)
+        around = self._surroundings(rough=0)
         if not self.spec.planner.zones:
             return
         for k, start in enumerate(starts):
@@ -397,7 +400,7 @@ class Histories:
             zone |= around.zone(k, 0.2 + 0.5 * width, place, 1, slow=True)
             yield Change(time=0.0, lasts=inf, inputs=zone)
 
-    def _surroundings(self, *, rough: bool) -> Surroundings:
+    def _surroundings(self, *, rough: int) -> Surroundings:
         speeds = tuple(self._velocity(number) for number in self.axes)
         return Surroundings(
             cycle=self.spec.export.cycle_time,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import attrs
 
@@ -32,11 +32,14 @@ class WatchedRun:
         What the block did other than commanded, in words that end a sentence.
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
+    later : mapping of str to sequence of float
+        Slow periods, by which commands of a kind are carried out later than allowed on average.
     """
 
     run: BlockRun
     faults: tuple[str, ...] = ()
     left: float = 0.0
+    later: Mapping[str, Sequence[float]] = attrs.field(factory=dict)
 
 
 def judge_run(
@@ -70,6 +73,7 @@ def judge_run(
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
         left=watched.left,
+        later=watched.later,
         faults=(*_faults(history, run, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
     )
 
@@ -81,12 +85,14 @@ def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
         own = spec.limits.of(number)
         assert own.velocity and own.acceleration and own.jerk and own.travel
         acceleration, jerk = quick_limits(spec, number) if history.brakes else (own.acceleration, own.jerk)
-        low, high = own.travel
+        start, (low, high) = history.places[number], own.travel
         shares |= {
             f"{named.prefix}velocity": axis.velocity / own.velocity,
             f"{named.prefix}acceleration": axis.acceleration / acceleration,
             f"{named.prefix}jerk": axis.jerk / jerk,
-            f"{named.prefix}beyond_travel_{named.unit}": max(low - axis.lowest, axis.highest - high, 0.0),
+            f"{named.prefix}beyond_travel_{named.unit}": max(
+                min(low, start) - axis.lowest, axis.highest - max(high, start), 0.0
+            ),
         }
     return shares
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.proof.followed import (
     AHEAD,
     ENABLED,
     EXACT,
     FROM_REST,
     IN_VELOCITY,
+    ON_AVERAGE,
     RUN_OUT,
     TO_SLOW,
     TO_STOP,
@@ -45,6 +48,7 @@ MORE = (
     0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
 )
 BACK = 0.03  # likewise, at which an axis may go back (0.013)
+LATER = {kind: f"{kind}, on average" for kind in ON_AVERAGE}  # what is measured but not judged by one
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 WORDS = {
@@ -171,10 +175,22 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if order.kind == POSITION:  # it counts from when the way was last damped
             until = min(first, latest + followed.after(followed.settle))
             since += int(np.flatnonzero(followed.sensed("bDamping")[begin:until]).max(initial=0))
+        lasts = (first - since) * followed.cycle
         if first < end or end > latest:
-            yield Allowance(order.kind, begin, (first - since) * followed.cycle, allowed)
+            yield Allowance(order.kind, begin, lasts, allowed)
+        if first < end:
+            yield from _lateness(followed, order, lasts - allowed, before)
         if first < end and order.kind == POSITION:
             yield from _left(followed, motion, (first, end), allowed)
+
+
+def _lateness(followed: Followed, order: TimedOrder, late: float, before: Array) -> Iterator[Allowance]:
+    """Measure by how many periods a target from rest is reached, or a stop ends, later than on average."""
+    if order.kind == STOP and before.any() and not followed.reserve:
+        yield Allowance(LATER[STOP], order.begin, late / followed.period + TO_STOP - ON_AVERAGE[STOP], inf)
+    if order.kind == POSITION and not before.any() and not followed.reserve:
+        late = (late + followed.reaction) / followed.period + FROM_REST - ON_AVERAGE[POSITION]
+        yield Allowance(LATER[POSITION], order.begin, late, inf)
 
 
 def _left(

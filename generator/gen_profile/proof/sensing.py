@@ -7,6 +7,7 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
+from scipy.signal import cont2discrete, lfilter
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.machine import planned_axes
@@ -39,6 +40,11 @@ NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
 JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
+OFF = 0.3  # of the stated swing, by which an estimate may be off beside: by gusts, and a wrong rope (0.26)
+SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
+STRONG = 1.5  # own motions by gusts, root mean square of a period, at which that is known
+KNOWN_TO = 0.4  # (0.35)
+LEAKY = 0.3  # damping ratio by which what is shown of them is forgotten
 ONCE, AS_OFTEN = 1, 3  # that an axis moves on at rest, where a load seems to swing by just too much
 TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
 
@@ -209,7 +215,15 @@ def sensed(spec: Spec, choices: Sequence[float]) -> bool:
 
 
 def sensor_faults(
-    spec: Spec, one: SensedHistory, run: BlockRun, outputs: Sequence[str], *, cycle: float, last: float
+    spec: Spec,
+    one: SensedHistory,
+    run: BlockRun,
+    outputs: Sequence[str],
+    *,
+    cycle: float,
+    period: float,
+    last: float,
+    resets: Sequence[float] = (),
 ) -> Iterator[str]:
     """Say what is wrong with how a block used its sensor, each in words that end a sentence.
 
@@ -220,11 +234,14 @@ def sensor_faults(
     run : BlockRun
         With its trace, which has these outputs, then the loads' sway.
     outputs : sequence of str
-    cycle, last : float
-        s: a cycle, and when the last command came, or an input last changed.
+    cycle, period, last : float
+        s: a cycle, the slowest swing, and when the last command came, or an input last changed.
+    resets : sequence of float
+        s, when bReset was set.
     """
     assert run.trace is not None
     issued = dict(zip(outputs, run.trace.T, strict=False))
+    yield from _misstated(spec, one, run.trace, issued, (cycle, period, resets))
     noticed = issued["nSensorFault"]
     at = int(np.argmax(noticed != 0.0)) * cycle
     if one.fault:
@@ -251,6 +268,40 @@ def sensor_faults(
                 f"the {load} is damped to check.residual_sway later than allowed by {late:.3g} s, at "
                 f"{settled * cycle:.2f} s"
             )
+
+
+def _misstated(
+    spec: Spec,
+    one: SensedHistory,
+    trace: Array,
+    issued: Mapping[str, Array],
+    times: tuple[float, float, Sequence[float]],
+) -> Iterator[str]:
+    """Say whether what it estimates, or finds the sensor to show of the axis's own motions, is wrong."""
+    cycle, period, resets = times
+    plant, (_, disturbance) = spec.machine(), _stated(spec)
+    used = issued["bSensorUsed"] != 0.0
+    if not one.fault:
+        sway = trace[:, trace.shape[1] - len(plant.loads) + plant.end_load.start]
+        apart = (np.abs(issued["fSwayEstimated"] - sway) - issued["fSwayUncertainty"]) * used
+        at = int(np.argmax(apart))
+        if apart[at] > OFF * min(disturbance.swing.values()):
+            yield f"fSwayUncertainty is too small by {apart[at]:.3g} m, at {at * cycle:.2f} s"
+    if one.fault not in SHOWS or disturbance.gust is None:
+        return
+    cycles = np.arange(len(used))
+    used[[min(round(time / cycle), len(used) - 1) for time in resets]] = False  # it forgets
+    first = one.fails if one.fault else 0.0
+    rate, since = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
+    swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
+    own = lfilter(swings.ravel(), fades, issued["fAcceleration"] * (cycles * cycle > first))
+    share = cycle / period
+    strength = rate**2 * np.sqrt(lfilter([share], [1.0, share - 1.0], own**2)) / disturbance.gust.acceleration
+    strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
+    at = int(np.argmax(strength))
+    wrong = abs(issued["fSensorScale"][at] - SHOWS[one.fault])
+    if strength[at] > STRONG and wrong > KNOWN_TO:
+        yield f"fSensorScale is wrong by {wrong:.3g}, at {at * cycle:.2f} s"
 
 
 def _faults_of_a_faulty_one(

@@ -213,7 +213,8 @@ def _shown(followed: Followed) -> Iterator[tuple[int, int]]:
 
 def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
     """Tell when it may, and when it must be unknown how the load swings."""
-    may_be, must_be = np.cumsum(followed.sensed("nSensorFault")) > 0, np.zeros(followed.cycles, dtype=bool)
+    may_be, must_be = np.zeros((2, followed.cycles), dtype=bool)
+    sees = followed.sensed("bSensorUsed") & motion.stands
     for order in followed.orders:
         moving, at = not motion.stands[max(0, order.begin - 1)], order.begin
         if order.kind == DISABLED:
@@ -232,7 +233,9 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
             if motion.stands[at]:
                 must_be[at:] = False
                 may_be[at:] &= followed.issued["bBusy"][at - 1] != 0.0
-    return may_be, must_be
+        if sees[order.begin : order.end].any():
+            must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
+    return may_be | (np.cumsum(followed.sensed("nSensorFault")) > 0), must_be
 
 
 def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -24,6 +24,7 @@ GROUPS = {
 }
 QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
+FEWEST, SURE = 20, 2.0  # commands of a kind; and standard deviations of their mean
 LISTED = 10  # of the worst histories
 TAKEN_BACK = "the block takes its promise back"
 
@@ -52,6 +53,8 @@ class JudgedHistory:
         What else is wrong, in words that end a sentence.
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
+    later : mapping of str to sequence of float
+        Slow periods, by which commands of a kind are carried out later than allowed on average.
     """
 
     number: int
@@ -65,6 +68,7 @@ class JudgedHistory:
     limits: Mapping[str, float]
     faults: tuple[str, ...]
     left: float = 0.0
+    later: Mapping[str, Sequence[float]] = attrs.field(factory=dict)
 
     def fraction(self, limit: Mapping[str, float], error_bound: float) -> float:
         """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""
@@ -168,6 +172,7 @@ class Proof(Summarised, Examination):
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             cure = CURES.get(kind, "")
             sentences.append(f"In history {those[0].number} {first}{others}{cure}.")
+        sentences += late_on_average(self.judged)
         if not self.apart <= AGREEMENT:
             sentences.append(
                 f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
@@ -226,6 +231,15 @@ class Proof(Summarised, Examination):
             "worst_share": max(shares),
             "quantiles": {f"{part:g}": float(q) for part, q in zip(QUANTILES, quantiles, strict=True)},
         }
+
+
+def late_on_average(judged: Sequence[JudgedHistory]) -> Iterator[str]:
+    """Say which commands of what is drawn are carried out later on average than allowed, beyond doubt."""
+    drawn = [one.later for one in judged if one.group in (CORNERS, DRAWS)]
+    for kind, words in (("position", "Targets from rest are reached"), ("stop", "Stops end")):
+        late = [value for later in drawn for value in later.get(kind, ())]
+        if len(late) >= FEWEST and (least := np.mean(late) - SURE * np.std(late) / len(late) ** 0.5) > 0.0:
+            yield f"{words} later than allowed on average, by {least:.2g} slow periods or more."
 
 
 def kind_of(fault: str) -> str:

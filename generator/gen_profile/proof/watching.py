@@ -18,7 +18,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.obedience import faults, measured
+from gen_profile.proof.obedience import LATER, faults, measured
 from gen_profile.proof.orders import (
     DISABLED,
     QUICK_STOP,
@@ -137,8 +137,8 @@ class BlockWatch:
         expected: Sequence[TimedOrder],
         block: CalledBlock,
         run: BlockRun,
-    ) -> tuple[tuple[str, ...], float]:
-        """Say what is wrong, each in words that end a sentence, and how much errors leave at most.
+    ) -> tuple[tuple[str, ...], float, dict[str, list[float]]]:
+        """Say what is wrong, each in words that end a sentence; how much errors leave at most; and lateness.
 
         Parameters
         ----------
@@ -156,7 +156,8 @@ class BlockWatch:
         followed = attrs.evolve(followed, modes=given[1], last_modes=given[2])
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
-        return (*faults(met, followed.cycle), *self._understated(run, followed)), left
+        later = {kind: [one.needed for one in met if one.what == what] for kind, what in LATER.items()}
+        return (*faults(met, followed.cycle), *self._understated(run, followed)), left, later
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""
