@@ -5,7 +5,6 @@ import pickle
 import re
 from html import unescape
 from time import sleep
-from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -25,7 +24,6 @@ from gen_profile.proof.judging import WatchedRun, judge_run
 from gen_profile.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH, Numbering
 from gen_profile.proof.on_cluster import ProofRecipe, judge_part
 from gen_profile.proof.prove import prove, replay
-from gen_profile.proof.verdict import Proof, late_on_average
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
@@ -221,23 +219,6 @@ def scaled(text, name, factor, part=slice(None)):
     numbers = [float(number) for number in found[group].split(",")]
     numbers[part] = [factor * number for number in numbers[part]]
     return text[: found.start(group)] + ", ".join(map(repr, numbers)) + text[found.end(group) :]
-
-
-def test_of_what_comes_late_the_key_that_helps_is_named():
-    faults = ("a stop ends later than allowed by 0.02 s, at 8.6 s", "a target is left again by 0.1 m, at 9 s")
-    one = SimpleNamespace(number=3, faults=faults, fraction=lambda *_: 0.0, residual={"payload": 0.0})
-    few = {
-        "limit": {"payload": 0.05},
-        "error_bound": 0.0,
-        "seed": 0,
-        "count": 1,
-        "parents": (),
-        "by_fmpy": (),
-    }
-    late, left = Proof(**few, judged=(one, one), apart=0.0).reasons()
-    assert "at 8.6 s, and likewise in 1 others; " in late
-    assert "planner.operations" in late
-    assert "planner.operations" not in left
 
 
 @pytest.mark.slow
@@ -499,14 +480,3 @@ def test_an_altered_file_is_told(deployed, tmp_path):
     assert altered.code == 4
     assert altered.document["artefact"]["manifest"] == "differs"
     assert "altered after its export" in altered.err
-
-
-def test_what_comes_late_on_average_is_a_fault():
-    def late(group, count, mean):
-        one = SimpleNamespace(group=group, later={"stop": mean + np.array([-0.3, 0.3])})
-        return [*late_on_average([one] * (count // 2))]
-
-    assert late(DRAWS, 40, 0.2) == ["Stops end later than allowed on average, by 0.11 slow periods or more."]
-    assert not late(DRAWS, 40, 0.05)  # which may be chance
-    assert not late(DRAWS, 10, 0.9)
-    assert not late(SEARCH, 40, 0.9)

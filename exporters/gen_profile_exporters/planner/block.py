@@ -305,9 +305,8 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
 
 
 def _constants(c: PlannerConstants) -> str:
-    lines = [
-        f"    cFollows : BOOL := {str(bool(c.rates)).upper()}; (* how live parameters change on the way *)"
-    ]
+    follows = str(bool(c.rates)).upper()
+    lines = [f"    cFollows : BOOL := {follows}; (* how live parameters change on the way *)"]
     lines += [f"    {name} : DINT := {value};" for name, value in _whole_constants(c).items()]
     lines += [f"    {name} : LREAL := {literal(value)};" for name, value in _real_constants(c).items()]
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in _arrays(c).items()]

@@ -145,10 +145,8 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge targets, velocities and stops at their latest times, of the orders that hold so long."""
     for order in followed.orders:
         begin, end = order.begin, order.end
-        if (end - begin) * followed.cycle < FROM_REST * followed.period:
-            continue  # it was replaced before
-        if followed.gives_up(end):
-            continue  # that is a fault of its own
+        if (end - begin) * followed.cycle < FROM_REST * followed.period or followed.gives_up(end):
+            continue  # it was replaced before, or that is a fault of its own
         place, before = motion.position[:, begin], motion.velocity[:, begin]
         own = slice(begin, end)
         match order.kind:
@@ -178,9 +176,10 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         lasts = (first - since) * followed.cycle
         if first < end or end > latest:
             yield Allowance(order.kind, begin, lasts, allowed)
-        if first < end:
-            yield from _lateness(followed, order, lasts - allowed, before)
-        if first < end and order.kind == POSITION:
+        if first == end:
+            continue
+        yield from _lateness(followed, order, lasts - allowed, before)
+        if order.kind == POSITION:
             yield from _left(followed, motion, (first, end), allowed)
 
 
