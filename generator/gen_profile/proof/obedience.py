@@ -65,6 +65,7 @@ WORDS = {
     "reaction": "a command is obeyed later than stated by {over:.3g} s",
     "ends": "a stop leaves its stated ends by {over:.3g} m",
     "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",
+    "outside": "an axis leaves the range of its targets by {needed:.3g} m",
     "fast": "a velocity is above override or velocity limit by {over:.3g} m/s",
     "done": "bDone is set away from the target or before the axis stands",
     "not done": "bDone is set later than the axis stands at its target by {needed:.3g} s",

@@ -251,6 +251,10 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("loose", apart, widest)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
+        if (
+            order.kind in (POSITION, VELOCITY) and not followed.reserve
+        ):  # else it may brake or be calmed beyond
+            yield from _within_travel(followed, motion, slice(order.begin, order.end))
         begin = max(
             0, order.begin - (order.kind == STOP)
         )  # the ends that an interlock saw as it stopped the axis
@@ -282,6 +286,20 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
+
+
+def _within_travel(followed: Followed, motion: IssuedMotion, own: slice) -> Iterator[Allowance]:
+    """Measure how far stated ends of a stop lie beyond the travel, and axes beyond the targets' range."""
+    low, high = followed.of("fStopLow")[:, own], followed.of("fStopHigh")[:, own]
+    for k, limits in enumerate(followed.limits):
+        first, last = limits.targets[0] - limits.margin, limits.targets[1] + limits.margin
+        place = motion.position[k, own]
+        beyond = np.maximum(first - low[k], high[k] - last) * ((place >= first) & (place <= last))
+        yield from greatest("loose", beyond, EXACT, own.start)
+        first, last = limits.targets
+        damps = followed.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
+        if first <= place[0] <= last and motion.stands[own.start - 1] and not damps:
+            yield from greatest("outside", np.maximum(first - place, place - last), EXACT, own.start)
 
 
 def _turning(followed: Followed, motion: IssuedMotion) -> Array:
