@@ -3,8 +3,11 @@
 import json
 from pathlib import Path
 
+from gen_profile.artefacts.manifest import Manifest, artefact_of
 from gen_profile.deployment.mailbox import Mailbox
 from gen_profile.designs.design import design
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.forms import block_files
 from gen_profile.spec.reading import preset_spec
 from gen_profile.sweep.library import index_of
 from gen_profile_exporters.block_source import parse_function_block
@@ -34,6 +37,25 @@ def exported_library(folder, distances, *changes):
     path.write_text(library.text(), "ascii")
     path.with_suffix(".json").write_bytes(index_of(library.name, path.read_bytes(), [], specs))
     return path
+
+
+def exported_planner(folder, *changes):
+    """A planner block, and a manifest that asks for few histories; it is proved when it is deployed."""
+    spec = preset_spec("bay-crane", ["export.plc_tables=variables", *changes])
+    (file, *_) = block_files(planner_block(spec), spec, ["plc"])
+    artefact = artefact_of("planner", file.filename, file.content)
+    manifest = Manifest(
+        name=spec.name,
+        spec=spec.to_dict(),
+        spec_sha256=spec.sha256(),
+        profile_sha256="",
+        versions={},
+        artefacts=(artefact,),
+        check={"histories": 8},
+    )
+    (folder / file.filename).write_bytes(file.content)
+    (folder / "manifest.json").write_bytes(manifest.to_json())
+    return folder / file.filename
 
 
 class DirectLink:

@@ -175,6 +175,16 @@ def test_sizes_that_lead_out_of_the_buffer_are_never_used(place, value):
     assert column(play(fb, started(fb)), "position")[-1] == ONE.target
 
 
+def test_numbers_that_were_taken_from_the_buffer_are_taken_again_after_each_round():
+    fb = checked(text_of(ONE))
+    before = {name: fb[name] for name in ("tRows", "tLast", "tSlope", "tTarget", "nLength", "nTable")}
+    for name, value in before.items():
+        fb.alter(name, None, value + 1)
+    for _ in range(2 * len(values_of(text_of(ONE)))):
+        fb.call()
+    assert {name: fb[name] for name in before} == before and fb["bIntact"]
+
+
 def test_another_table_than_was_asked_for_is_not_switched_to():
     fb = checked(text_of(ONE))
     client, values = Client(fb), values_of(text_of(OTHER))

@@ -6,12 +6,20 @@ import struct
 import attrs
 import numpy as np
 import pytest
-from simulated_blocks import VARIABLES, DirectLink, box_of, exported, exported_library, poked
+from simulated_blocks import (
+    VARIABLES,
+    DirectLink,
+    box_of,
+    exported,
+    exported_library,
+    exported_planner,
+    poked,
+)
 
 from gen_profile.deployment.deploy import deploy, require_fit, verify
 from gen_profile.deployment.mailbox import IN_USE, RIGHT, LinkLostError
 from gen_profile.deployment.simulated_block import SimulatedBlock
-from gen_profile.deployment.table import BlockTable, read_table
+from gen_profile.deployment.table import BlockTable, PlannerTable, read_table
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError, OutputError
 from gen_profile.spec.reading import preset_spec
 
@@ -35,6 +43,16 @@ def libraries(tmp_path_factory):
     return {
         name: read_table(exported_library(tmp_path_factory.mktemp(name), distances))
         for name, distances in moves.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def planners(tmp_path_factory):
+    """Numbers of three planner blocks."""
+    changes = {"old": "limits.velocity=1.1", "new": "limits.velocity=0.9", "other": "plant.m1=2500"}
+    return {
+        name: read_table(exported_planner(tmp_path_factory.mktemp(name), change))
+        for name, change in changes.items()
     }
 
 
@@ -100,7 +118,8 @@ def unchecked(tables, monkeypatch):
         checked.append(values)
         return judgement
 
-    monkeypatch.setattr(BlockTable, "check", note)
+    for kind in (BlockTable, PlannerTable):
+        monkeypatch.setattr(kind, "check", note)
     return checked
 
 
@@ -125,7 +144,8 @@ def swapped(request):
 
 
 def started(block):
-    block.set("bExecute", np.array([1.0]))
+    for name in {"bExecute", "bEnable"} & block.inputs.keys():
+        block.set(name, np.array([1.0]))
     block.run(1)
 
 
@@ -158,7 +178,8 @@ def faults(tables, block, choices):
 
 def used(block, tables):
     """Tell which table a block uses, once it has settled; by a link without faults."""
-    block.set("bExecute", np.array([0.0]))
+    for name in {"bExecute", "bEnable"} & block.inputs.keys():
+        block.set(name, np.array([0.0]))
     block.run(400)
     link = DirectLink(block)
     for name, table in tables.items():
@@ -171,13 +192,15 @@ def used(block, tables):
 
 
 @pytest.mark.slow
-def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(tables, libraries, unchecked):
+def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(
+    tables, libraries, planners, unchecked
+):
     choices, ends = random.Random(31), []
-    kinds = [(kind, DirectLink(fresh(kind))) for kind in (tables, libraries)]
+    kinds = [(kind, DirectLink(fresh(kind))) for kind in (tables, libraries, planners)]
     for kind, count in kinds:
         deploy(kind["new"], box_of(count))
     for number in range(FAULTS):
-        tables, count = kinds[number % 2]
+        tables, count = kinds[(0, 1, 0, 1, 2)[number % 5]]
         block, times = fresh(tables), choices.choice([1, 1, 1, 2, 3, 20, 1000])
         fault = faults(tables, block, choices)
         link = FaultyLink(block, choices.randint(1, count.operations), times, **fault)
@@ -262,6 +285,41 @@ def test_a_library_is_deployed_and_any_motion_of_it_that_sways_too_much_stops_th
     assert used(block, libraries) == "new"  # whatever is selected
     assert deploy(old, box_of(DirectLink(block)), rollback=True).action == "rolled back"
     assert used(block, libraries) == "old"
+
+
+@pytest.mark.slow
+def test_a_planner_is_proved_by_what_was_read_back_and_never_switched_while_enabled(planners):
+    block, new = fresh(planners), planners["new"]
+    block.set("bEnable", np.array([1.0]))
+    block.run(10)
+    with pytest.raises(DeploymentError, match="The block moves"):
+        deploy(new, box_of(DirectLink(block)))
+    assert used(block, planners) == "old"
+    done = deploy(new, box_of(DirectLink(block)))
+    assert done.to_dict()["check"]["histories"] == 8 and done.judgement.check.passed
+    assert used(block, planners) == "new"
+    block.set("bEnable", np.array([1.0]))
+    block.run(500)
+    block.set("fTarget", np.array([12.0]))
+    block.set("bExecute", np.array([1.0]))
+    velocities = []
+    while not block.outputs["bDone"][0]:
+        block.run(20)
+        velocities.append(block.outputs["fVelocity"][0])
+    assert 0.85 < max(velocities) <= 0.9 and block.outputs["fPosition"] == pytest.approx(12.0, abs=1e-6)
+    assert block.outputs["aState"][[2, 3, 14]].tolist() == [0.0, 0.0, block.outputs["fPosition"][0]]
+    assert used(block, planners) == "new"
+    with pytest.raises(ExportError, match="plays no table"):
+        assert new.motions
+
+
+def test_a_planner_that_is_built_otherwise_is_refused(planners, tmp_path):
+    table = read_table(exported_planner(tmp_path, "planner.zones=true"))
+    status = attrs.evolve(
+        box_of(DirectLink(fresh(planners))).status(), cycle_time=table.spec.export.cycle_time
+    )
+    with pytest.raises(ExportError, match=r"is built otherwise than that of bay-crane\.st"):
+        require_fit(table, status)
 
 
 def test_libraries_and_single_motions_are_told_apart(tables, libraries, block):

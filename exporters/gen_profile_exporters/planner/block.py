@@ -190,7 +190,7 @@ def block_text(constants: PlannerConstants) -> str:
     text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
     values = _values(constants)
     text = re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
-    return _narrow(_with_while_loops(_without_loops(text) if len(constants.axes) == 1 else text))
+    return narrow(with_while_loops(_without_loops(text) if len(constants.axes) == 1 else text))
 
 
 @cache
@@ -218,7 +218,7 @@ def _without_loops(text: str) -> str:
     return AXIS_LOOP.sub(once, text)
 
 
-def _with_while_loops(text: str) -> str:
+def with_while_loops(text: str) -> str:
     """Write FOR loops as WHILE loops: since 2024 matiec leaves out those of a single pass."""
     lines, counters = list[str](), list[str]()
     for line in text.split("\n"):
@@ -235,7 +235,7 @@ def _with_while_loops(text: str) -> str:
     return "\n".join(lines)
 
 
-def _narrow(text: str) -> str:
+def narrow(text: str) -> str:
     """Indent by tabs, which keeps the text short."""
     return re.sub("(?m)^ +", lambda margin: "\t" * (len(margin[0]) // 4), text)
 

@@ -19,7 +19,7 @@ import attrs
 from gen_profile.errors import ExportError
 from gen_profile_exporters.playback.layouts import LAYOUTS
 
-_TEMPLATE = (Path(__file__).with_name("text") / "template.st").read_text("ascii")
+TEMPLATE = (Path(__file__).with_name("text") / "template.st").read_text("ascii")
 _CHECKED = {  # how the value of a constant enters the checksum
     "DINT": "fValue := DINT_TO_LREAL({});",
     "LREAL": "fValue := {};",
@@ -134,7 +134,7 @@ def _program(layout: str, axes: int) -> str:
         "per_axis": "{} / cAxes" if axes > 1 else "{}",
         "whole_numbers": f"{array}DINT",
     }
-    text = _LINES.sub(lambda lines: parts[lines[1]], _TEMPLATE)
+    text = _LINES.sub(lambda lines: parts[lines[1]], TEMPLATE)
     text = _PART.sub(lambda part: parts[part[1]].format(part[2]), text)
     lines = text.replace("~", "[nAxis]" if axes > 1 else "").splitlines(keepends=True)
     return "".join(line.replace("%", "", 1) for line in lines if axes > 1 or not line.startswith("%"))

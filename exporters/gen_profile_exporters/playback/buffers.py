@@ -54,13 +54,15 @@ SCALARS = ("Rows", "Checks", "LastSegment", "Last", "PlayOn", "Checksum", "Slope
 PER_AXIS = ("Room", "Inverse", "StopJerk", "Start", "Target", "LeastScale", "Mirrors", "Shifts")
 OF_BUFFER = ("Checks", "Checksum")  # not the motion's own: that of the whole buffer counts
 WHOLE = SCALARS[:6]
-LAYOUT_NAMES = tuple(LAYOUTS)
+PLANNER = "planner"
+LAYOUT_NAMES = (*LAYOUTS, PLANNER)
 SAMPLED = ("Position", "Velocity", "Acceleration")
 COLUMNS = {
     "segments": (*(f"Power{power}" for power in range(6)), "First"),
     "samples": SAMPLED,
     "counts": SAMPLED,
 }
+MOVES = "((nState = cWaiting) OR (nState = cMoving))"
 LIBRARY = "nProfile"  # the input that a library has
 _REFUSAL = "    IF nProfile <> nSelected THEN nErrorId := 6; END_IF;\n"
 _LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others mean nothing without a motion
@@ -85,7 +87,7 @@ VARIABLES = {
         "nQuiet",
         "nRuns",
     ),
-    "BOOL": ("bLoaded", "bLoad", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
+    "BOOL": ("bLoaded", "bLoad", "bAgain", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
 }
 NOTE = """\
     Its numbers are variables, in two buffers, which gen-profile deploy writes through aRequest and reads
@@ -401,12 +403,22 @@ def _prelude(layout: str, axes: int, *, library: bool) -> str:
         for number, name in enumerate(PER_AXIS)
     ]
     lines += ["FOR nAxis := 1 TO cAxes DO", *own, "END_FOR;"] if axes > 1 else own
-    text = f"{_PARTS['requests']}\n"
-    parts = {
-        "loads": "\n".join(f"        {line}" for line in lines),
-        "selection": _PARTS["selection"] if library else "",
-        "place": _PARTS["place"] if library else f"    nMotion := nBase + {len(HEAD)};",
-    }
+    place = _PARTS["place"] if library else f"    nMotion := nBase + {len(HEAD)};"
+    taken_over = "\n".join(f"        {line}" for line in lines)
+    return (
+        filled(
+            f"{_PARTS['requests']}\n",
+            selection=_PARTS["selection"] if library else "",
+            forgotten="    bLeft := FALSE;",
+            loads=filled(f"{_PARTS['motion']}\n", place=place, taken=taken_over).removesuffix("\n"),
+        )
+        .replace("@moves", MOVES)
+        .replace("@plays", MOVES)
+    )
+
+
+def filled(text: str, **parts: str) -> str:
+    """Put parts in that are whole lines."""
     for name, part in parts.items():
         text = text.replace(f"@{name}\n", f"{part}\n" if part else "")
     return text

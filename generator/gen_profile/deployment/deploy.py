@@ -23,9 +23,10 @@ from gen_profile.deployment.table import BlockTable, table_hash
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
+from gen_profile.proof.check import BlockJudgement
 from gen_profile.verification.check import Judgement
 from gen_profile_exporters.exporter import target_of
-from gen_profile_exporters.playback.buffers import INTERFACE, LAYOUT_NAMES, is_library, kind_of
+from gen_profile_exporters.playback.buffers import INTERFACE, LAYOUT_NAMES, PLANNER, is_library, kind_of
 
 CURE = "export the block with these settings and load it into the controller, or export the artefact for it"
 
@@ -54,7 +55,7 @@ class DeployedTable:
     before: BlockStatus
     after: BlockStatus
     held_sha256: str
-    judgement: Judgement
+    judgement: Judgement | BlockJudgement
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -124,7 +125,9 @@ def deploy(
     )
 
 
-def _proved(table: BlockTable, box: Mailbox, buffer: int, held: bool, progress: Progress) -> Judgement:
+def _proved(
+    table: BlockTable, box: Mailbox, buffer: int, held: bool, progress: Progress
+) -> Judgement | BlockJudgement:
     """Write a table to a buffer if it is not held there, read it back twice, and check it in between."""
     if not held:
         progress("writing the table")
@@ -199,7 +202,7 @@ def require_fit(table: BlockTable, status: BlockStatus) -> None:
     due = {
         "version": (status.interface, INTERFACE),
         "table's layout": (shown, layout),
-        "number of axes": (status.axes, len(table.spec.axis_scales())),
+        "number of axes": (status.axes, table.constant("cAxes")),
         "cycle time in s": (status.cycle_time, cycle),
     }
     for what, (there, here) in due.items():
@@ -207,6 +210,11 @@ def require_fit(table: BlockTable, status: BlockStatus) -> None:
             raise ExportError(
                 f"The block in the controller has another {what}, {there} and not {here}; {CURE}."
             )
+    if status.kind != table.constant("cKind") and layout == PLANNER:
+        raise ExportError(
+            f"The planner block in the controller is built otherwise than that of {table.path.name} (inputs, "
+            f"live parameters, modes or slots), so that its numbers would not make it that one; {CURE}."
+        )
     library = is_library(table.source)
     if status.kind == kind_of(target_of(table.spec), layout, library=not library):
         plays = ("library", "single motion") if library else ("single motion", "library")

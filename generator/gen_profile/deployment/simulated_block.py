@@ -14,7 +14,8 @@ from gen_profile.planner.execution import BlockInstance
 
 LOOPBACK = "127.0.0.1"  # of the servers that it runs behind
 LONGEST = 0.02  # s between two looks at what their clients wrote
-GUIDING = ("bBusy", "bDone", "bAborted")  # while one of them is set, the axes follow
+FOLLOWED = ("fActPosition", "fActVelocity")  # inputs that tell where an axis is
+GUIDING = ("bBusy", "bDone", "bAborted", "bEnabled")  # while one of them is set, the axes follow
 
 
 class SimulatedBlock:
@@ -37,12 +38,15 @@ class SimulatedBlock:
         self._row = np.array(list(self._instance.inputs.values()))
         self.outputs = {name: np.zeros(len(places)) for name, places in self._places.items()}
         self.set("fCycleTime", np.array([table.spec.export.cycle_time]))
-        self.set("fActPosition", table.start)
+        self._followed = [name for name in self.inputs if name.startswith(FOLLOWED)]
+        places = [name for name in self._followed if name.startswith(FOLLOWED[0])]
+        for name, at in zip(places, np.split(table.start, len(places)), strict=True):
+            self.set(name, at)
 
     @property
     def names(self) -> list[str]:
         """Inputs that a user sets."""
-        return [name for name in self.inputs if name not in {"fCycleTime", "fActPosition"}]
+        return [name for name in self.inputs if name not in {"fCycleTime", *self._followed}]
 
     def get(self, name: str) -> Array:
         """Give an input's elements."""
@@ -56,8 +60,9 @@ class SimulatedBlock:
         """Call the block so often; the axes follow from cycle to cycle."""
         issued = self._instance.call(np.tile(self._row, (cycles, 1)))[-1]
         self.outputs = {name: issued[places] for name, places in self._places.items()}
-        if any(self.outputs[name][0] for name in GUIDING):
-            self.set("fActPosition", self.outputs["fPosition"])
+        if any(self.outputs[name][0] for name in GUIDING if name in self.outputs):
+            for name in self._followed:
+                self.set(name, self.outputs[name.replace("Act", "", 1)])
 
     def play(self, turn: Callable[[int], None], cycle: float, ended: Event) -> None:
         """Until an event is set, take a turn of so many cycles as the time that has passed asks for."""

@@ -12,11 +12,15 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import SEAL, artefact_of, seal_of, sha256
-from gen_profile.artefacts.reading import read_artefact
+from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import CheckFailed, ExportError, OutputError
 from gen_profile.motion.profile import Array
+from gen_profile.planner.forms import block_in
+from gen_profile.planner.machine import planned_axes
 from gen_profile.progress import Progress
+from gen_profile.proof.check import BlockJudgement, is_planner_block
+from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.strict_json import parse_json
@@ -27,8 +31,9 @@ from gen_profile.verification.check import (
     provenance,
     spec_and_manifest,
 )
-from gen_profile_exporters.block_source import BlockSource
+from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.planner.parameters import buffered_planner, constant_planner
 from gen_profile_exporters.playback.buffers import (
     CHECKSUM,
     buffer_texts,
@@ -94,7 +99,7 @@ class BlockTable:
         """Value of one of the block's whole constants."""
         return next(int(one.initial) for one in self.source.variables if one.name == name)
 
-    def check(self, values: Array, progress: Progress) -> Judgement:
+    def check(self, values: Array, progress: Progress) -> Judgement | BlockJudgement:
         """Co-simulate the block with other values in its buffer, as they were read from a controller.
 
         Returns
@@ -119,8 +124,49 @@ class BlockTable:
         return attrs.evolve(worst, path=self.path)
 
 
+class PlannerTable(BlockTable):
+    """What a controller is to hold of a planner block: the numbers that it plans by."""
+
+    @property
+    def start(self) -> Array:
+        """Where the axes begin that it plans, in m (or rad), shape (axes,)."""
+        return np.array(self.spec.move.start)[list(planned_axes(self.spec))]
+
+    @property
+    def motions(self) -> tuple[PlaybackTable, ...]:
+        """Give none: raises ExportError."""
+        raise ExportError(
+            f"{self.path}: a planner block plays no table that its setpoints could be held to; read bPromise "
+            "and nErrorId in the controller."
+        )
+
+    def check(self, values: Array, progress: Progress) -> BlockJudgement:
+        """Prove the block with other numbers, on as many histories as its manifest tells of."""
+        text = constant_planner(with_buffer(self.source, list(map(literal, values.tolist())))).text()
+        record = manifest_beside(self.path, read_artefact(self.path), planner=True).check or {}
+        histories = int(record.get("histories", HISTORIES))
+        proof = prove(self.spec, text, histories=histories, progress=progress)
+        return BlockJudgement(path=self.path, text=text, spec=self.spec, check=proof, manifest="none")
+
+
+def _planner(path: Path, content: bytes) -> PlannerTable:
+    """Read a planner block, whether its numbers are constants or variables; raises as `read_table`."""
+    spec, manifest = spec_and_manifest(path, content, None, planner=True)
+    for fault in alterations(path, provenance(manifest, content, spec)):
+        raise CheckFailed(fault)
+    source = buffered_planner(parse_function_block(block_in(path, content)))
+    values = np.array(list(map(float, buffer_texts(source))))
+    hashes = {
+        "artefact_sha256": artefact_of("", path.name, content).sha256,
+        "payload_sha256": "",
+        "spec_sha256": spec.sha256(),
+        "table_sha256": table_hash(values),
+    }
+    return PlannerTable(path=path, specs=(spec,), source=source, values=values, hashes=hashes)
+
+
 def read_table(path: Path) -> BlockTable:
-    """Read a written block, of one motion or a library, whether its numbers are constants or variables.
+    """Read a written block: of a motion, a library or a planner; its numbers are constants or variables.
 
     Raises
     ------
@@ -130,6 +176,8 @@ def read_table(path: Path) -> BlockTable:
         It is not the file that was exported.
     """
     container, content = find_container(container_of(path)), read_artefact(path)
+    if is_planner_block(path):
+        return _planner(path, content)
     specs = _listed_specs(path, content)
     if not specs:
         spec, manifest = spec_and_manifest(path, content, None)

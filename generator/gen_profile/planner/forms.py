@@ -21,6 +21,8 @@ from gen_profile_exporters.planner.axis_wrapper import planner_wrappers
 from gen_profile_exporters.planner.c_source import c_files
 from gen_profile_exporters.planner.linux.host import linux_files
 from gen_profile_exporters.planner.openplc import OPENPLC, openplc_files
+from gen_profile_exporters.planner.parameters import buffered_planner, constant_planner
+from gen_profile_exporters.playback.buffers import TABLE, is_buffered
 from gen_profile_exporters.registry import container_of, containers, find_container, format_named
 
 PORTABLE = "plc"
@@ -102,14 +104,16 @@ def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
         return PROGRAMS[format_](block.text, spec.name)
     container, target = find_container(format_), target_of(spec)
     units = {axis.suffix: target.axes[number].factor for number, axis in planned_axes(spec).items()}
-    source = parse_function_block(block.text)
+    source = given = parse_function_block(block.text)
+    if spec.export.plc_tables == "variables":
+        given = buffered_planner(source)
     files = list[File]()
-    for ending, part in {"": source, **planner_wrappers(source, units, format_)}.items():
+    for ending, part in {"": given, **planner_wrappers(source, units, format_)}.items():
         written = container.wrap(part, attrs.evolve(target, name=f"{target.name}{ending}"))
         if container.unwrap(written[0].content, target).program() != part.program():
             raise ExportError(f"{format_}: what was written reads back as another block; export {PORTABLE}.")
         files += written
-    if format_ == PORTABLE:  # with its comments
+    if format_ == PORTABLE and given is source:  # with its comments
         files[0] = File(filename=block.filename, content=block.text.encode("ascii"))
     return tuple(files)
 
@@ -147,7 +151,17 @@ def read_block(path: Path) -> str:
 
 
 def block_in(path: Path, content: bytes) -> str:
-    """Read a function block's text out of what a file holds; raises as `read_block` does."""
+    """Read a function block's text out of what a file holds; raises as `read_block` does.
+
+    A planner block whose numbers are variables is given with constants, as it plans by these.
+    """
+    text = _text_in(path, content)
+    if TABLE in text and is_planner(text) and is_buffered(source := parse_function_block(text)):
+        return constant_planner(source).text()
+    return text
+
+
+def _text_in(path: Path, content: bytes) -> str:
     try:
         format_ = container_of(path)
     except SpecError:

@@ -69,7 +69,7 @@ def deploy(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Put a playback block's table, or a library's, into a running controller.
+    """Put a playback block's table, a library's, or a planner's numbers into a controller.
 
     Read back and checked before the controller uses it.
     """

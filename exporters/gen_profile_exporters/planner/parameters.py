@@ -1,0 +1,254 @@
+"""A planner block whose numbers are variables in two buffers, of which one is in use, as in a playback block.
+
+What a spec decides by its structure stands in the block's text: how many modes and axes there are, how long
+its arrays are, what inputs it has. What it decides by numbers are constants. So another spec's numbers fit a
+block if all else is the same, to the letter.
+
+The numbers become variables of the same names, which take the buffer's values over while the block is
+disabled, and only once the checksum over the buffer was found right; the statements that plan stay as they
+are. A switch makes the block forget all that it knows, as a cold start does.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Callable, Iterator
+from math import ceil
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import ExportError
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
+from gen_profile_exporters.planner.block import narrow, with_while_loops
+from gen_profile_exporters.playback.block import TEMPLATE
+from gen_profile_exporters.playback.buffers import (
+    ALTERED,
+    HEAD,
+    INTERFACE,
+    LAYOUT_NAMES,
+    LENGTH,
+    PATIENCE,
+    PLANNER,
+    REPLY,
+    REQUEST,
+    RESULTS,
+    STATE,
+    TABLE,
+    TRIALS,
+    VARIABLES,
+    buffer_texts,
+    filled,
+    state_length,
+)
+from gen_profile_exporters.playback.table import checks_of
+from gen_profile_exporters.playback.table_checksum import checksum
+from gen_profile_exporters.text_parts import text_parts
+
+OURS = "OfBuffer"  # behind names that the block has already
+_WORD = re.compile(r"\w+")
+_ENABLE = re.compile(r"\bbEnable\b")
+_SHARED = text_parts("playback/text/buffers.st")
+_FRACTION = re.compile(r" *\(\* A double as whole numbers.*?(?= *nCheckRow := nCheckRow \+ 1;)", re.DOTALL)
+_ROUND = "        nCheckRow := nCheckRow + 1;"
+_NUMBER = re.compile(r"c[A-Z]\w*")
+_MEMBERS = {
+    "DINT": (*VARIABLES["DINT"], "nCheck", "nCheckRow", "nHead", "nUpper", "nWord"),
+    "LREAL": (*VARIABLES["LREAL"], "fValue", "fMantissa", "fWord", "fSum"),
+    "BOOL": (*VARIABLES["BOOL"], "bChecked", "bIntact", "bForget", "bMayEnable"),
+}
+_NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
+
+
+def buffered_planner(source: BlockSource) -> BlockSource:
+    """Put variables in place of a planner block's numbers."""
+    numbers = [one for one in source.variables if _is_number(one)]
+    own, distinct = _own(source, numbers, _texts(numbers))
+    taken = {one.name for one in numbers}
+    variables = [attrs.evolve(one, section="VAR") if one.name in taken else one for one in source.variables]
+    before, behind = _around(source, numbers, distinct)
+    return attrs.evolve(
+        source,
+        variables=(*variables, *own),
+        body=before + _ENABLE.sub("bMayEnable", source.body) + behind,
+    )
+
+
+def constant_planner(source: BlockSource) -> BlockSource:
+    """Undo `buffered_planner`: give the block of constants that holds the first buffer's numbers.
+
+    Raises
+    ------
+    ExportError
+        The block is none that `buffered_planner` gives.
+    """
+    texts = iter(buffer_texts(source)[len(HEAD) :])
+    there = {one.name for one in source.variables}
+    ours = {f"{name}{OURS}" if f"{name}{OURS}" in there else name for name in _names()}
+    try:
+        variables = [
+            _constant(one, [next(texts) for _ in _elements(one)])
+            if one.section == "VAR" and _NUMBER.fullmatch(one.name)
+            else one
+            for one in source.variables
+            if one.name not in ours
+        ]
+        back = attrs.evolve(source, variables=tuple(variables))
+        numbers = [one for one in variables if _is_number(one)]
+        before, behind = _around(back, numbers, _own(back, numbers, [])[1])
+        body = source.body
+        if not body.startswith(before):  # out of a format that has white space of its own
+            body, before, behind = (" ".join(text.split()) for text in (body, before, behind))
+        body = body.removeprefix(before).removesuffix(behind)
+        back = attrs.evolve(back, body=body.replace("bMayEnable", "bEnable"))
+        same = buffered_planner(back).program() == source.program()
+    except (StopIteration, ValueError, KeyError) as error:
+        raise ExportError(ALTERED) from error
+    if not same:
+        raise ExportError(
+            "The block does not take its numbers from its buffers as it should: it was altered; export it "
+            "again."
+        )
+    return back
+
+
+def _is_number(variable: BlockVariable) -> bool:
+    return variable.section == "VAR CONSTANT" and _type(variable) != "BOOL"
+
+
+def _type(variable: BlockVariable) -> str:
+    return variable.array[2] if variable.array else variable.type
+
+
+def _elements(variable: BlockVariable) -> list[str]:
+    return variable.elements if variable.array else [variable.initial]
+
+
+def _initial(numbers: list[BlockVariable], name: str) -> str:
+    return {one.name: one.initial for one in numbers}[name]
+
+
+def _constant(variable: BlockVariable, texts: list[str]) -> BlockVariable:
+    if _type(variable) == "DINT":
+        texts = [text.removesuffix(".0") for text in texts]
+    initial = initialiser(texts) if variable.array else texts[0]
+    return attrs.evolve(variable, section="VAR CONSTANT", initial=initial)
+
+
+def _texts(numbers: list[BlockVariable]) -> list[str]:
+    """List the values of a buffer, as literals of LREAL."""
+    cycle = float(_initial(numbers, "cCycle"))
+    content = [text if "." in text else f"{text}.0" for one in numbers for text in _elements(one)]
+    length = len(HEAD) + len(content)
+    checks = checks_of(length, cycle)
+    total = checksum(np.array([length, cycle, checks, *map(float, content)]))
+    return [*(f"{number}.0" for number in (length, total, checks)), *content]
+
+
+def _names() -> list[str]:
+    """List what is declared beside what a block of constants has."""
+    members = [name for names in _MEMBERS.values() for name in names]
+    constants = ("cInterface", "cKind", "cLayout", "cCapacity", "cPatience")
+    return [REQUEST, REPLY, STATE, TABLE, *members, *constants, *RESULTS, *TRIALS]
+
+
+def _own(
+    source: BlockSource, numbers: list[BlockVariable], texts: list[str]
+) -> tuple[list[BlockVariable], Callable[[str], str]]:
+    """Declare what is added, and give what renames it in statements where the block has such names."""
+    taken = {one.name.lower() for one in source.variables}
+    renamed = {name: f"{name}{OURS}" for name in _names() if name.lower() in taken}
+
+    def distinct(text: str) -> str:
+        return _WORD.sub(lambda word: renamed.get(word[0], word[0]), text)
+
+    window, length = f"ARRAY [0..{LENGTH - 1}] OF LREAL", state_length(int(_initial(numbers, "cAxes")))
+    constants = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)} | {
+        "cInterface": INTERFACE,
+        "cKind": _kind(source, numbers),
+        "cLayout": LAYOUT_NAMES.index(PLANNER),
+        "cCapacity": len(texts),
+        "cPatience": ceil(PATIENCE / float(_initial(numbers, "cCycle"))),
+    }
+    declared = [
+        BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
+        BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
+        BlockVariable(section="VAR_OUTPUT", name=STATE, type=f"ARRAY [0..{length - 1}] OF LREAL"),
+        BlockVariable(
+            section="VAR",
+            name=TABLE,
+            type=f"ARRAY [0..{2 * len(texts) - 1}] OF LREAL",
+            initial=initialiser([*texts, *["0.0"] * len(texts)]),
+        ),
+        *(BlockVariable(section="VAR", name=name, type=kind) for kind, of in _MEMBERS.items() for name in of),
+        *(
+            BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(number))
+            for name, number in constants.items()
+        ),
+    ]
+    return [attrs.evolve(one, name=distinct(one.name)) for one in declared], distinct
+
+
+def _kind(source: BlockSource, numbers: list[BlockVariable]) -> int:
+    """Hash all of a block but its numbers, which is what two must have in common."""
+    names = {one.name for one in numbers}
+    declared = sorted(
+        (one.section, one.name, one.type, "" if one.name in names else "".join(one.initial.split()))
+        for one in source.variables
+    )
+    return zlib.crc32(repr((declared, source.body.split())).encode()) >> 1
+
+
+def _around(
+    source: BlockSource, numbers: list[BlockVariable], distinct: Callable[[str], str]
+) -> tuple[str, str]:
+    """Write what stands ahead of the statements that plan, and behind them."""
+    axes = int(_initial(numbers, "cAxes"))
+    moving = "".join(f" OR (ABS(aVelocity[{axis}]) > cStill[{axis}])" for axis in range(axes))
+    check = "\n".join(
+        (_SHARED["checked_value"], _FRACTION.findall(TEMPLATE)[0].rstrip(), _ROUND, _SHARED["checked_end"])
+    )
+    text = filled(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
+    text = distinct(text + filled(f"{_SHARED['planner_check']}\n", checked=check))
+    text = filled(
+        text.replace("@moves", f"(bEnable OR (nState <> cDisabled){moving})")
+        .replace("@plays", "(nState <> cDisabled)")
+        .replace("cCycleTime", "cCycle"),
+        taken="\n".join(f"        {line}" for line in _taken(numbers, *map(distinct, ("nBase", "nCheck")))),
+        begun="\n".join(f"            {line}" for line in _begun(source, distinct("nCheck"))),
+    )
+    state = distinct(_SHARED["planner_state"]).replace("@last", str(state_length(axes) - 1))
+    return narrow(with_while_loops(text)), narrow(with_while_loops(f"{state}\n"))
+
+
+def _taken(numbers: list[BlockVariable], base: str, counter: str) -> Iterator[str]:
+    """Take the numbers over from the buffer in use."""
+    place = len(HEAD)
+    for one in numbers:
+        convert = "LREAL_TO_DINT({})" if _type(one) == "DINT" else "{}"
+        count = len(_elements(one))
+        if one.array:
+            value = convert.format(f"{TABLE}[{base} + {counter} + {place}]")
+            yield from _loop(counter, count, f"{one.name}[{counter}] := {value};")
+        else:
+            yield f"{one.name} := {convert.format(f'{TABLE}[{base} + {place}]')};"
+        place += count
+
+
+def _begun(source: BlockSource, counter: str) -> Iterator[str]:
+    """Set all that the block knows to what it is after a cold start."""
+    for one in source.variables:
+        if one.section not in ("VAR", "VAR_OUTPUT"):
+            continue
+        nothing = _NOTHING[_type(one)]
+        if not one.array:
+            yield f"{one.name} := {one.initial or nothing};"
+        elif one.initial:
+            yield from (f"{one.name}[{k}] := {text};" for k, text in enumerate(one.elements))
+        else:
+            yield from _loop(counter, int(one.array[1]) + 1, f"{one.name}[{counter}] := {nothing};")
+
+
+def _loop(counter: str, count: int, statement: str) -> tuple[str, str, str]:
+    return f"FOR {counter} := 0 TO {count - 1} DO", f"    {statement}", "END_FOR;"
