@@ -16,7 +16,7 @@ def serving(controller):
     thread = threading.Thread(target=controller.serve, args=(tell,))
     thread.start()
     try:
-        assert ready.wait(60)
+        assert ready.wait(600)
         yield addresses[0]
     finally:
         controller.ended.set()

@@ -63,7 +63,7 @@ def in_thread(main):
     thread = threading.Thread(target=asyncio.run, args=(running(),))
     thread.start()
     try:
-        assert ready.wait(60)
+        assert ready.wait(600)
         yield
     finally:
         loop, end = loops[0]

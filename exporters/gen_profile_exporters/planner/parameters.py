@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator
 from math import ceil
 
 import attrs
-import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
@@ -26,24 +25,17 @@ from gen_profile_exporters.playback.block import TEMPLATE
 from gen_profile_exporters.playback.buffers import (
     ALTERED,
     HEAD,
-    INTERFACE,
     LAYOUT_NAMES,
-    LENGTH,
     PATIENCE,
     PLANNER,
-    REPLY,
-    REQUEST,
-    RESULTS,
-    STATE,
     TABLE,
-    TRIALS,
     VARIABLES,
     buffer_texts,
+    declared,
     filled,
     state_length,
+    with_head,
 )
-from gen_profile_exporters.playback.table import checks_of
-from gen_profile_exporters.playback.table_checksum import checksum
 from gen_profile_exporters.text_parts import text_parts
 
 OURS = "OfBuffer"  # behind names that the block has already
@@ -64,7 +56,7 @@ _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 def buffered_planner(source: BlockSource) -> BlockSource:
     """Put variables in place of a planner block's numbers."""
     numbers = [one for one in source.variables if _is_number(one)]
-    own, distinct = _own(source, numbers, _texts(numbers))
+    own, distinct = _own(source, numbers)
     taken = {one.name for one in numbers}
     variables = [attrs.evolve(one, section="VAR") if one.name in taken else one for one in source.variables]
     before, behind = _around(source, numbers, distinct)
@@ -85,7 +77,8 @@ def constant_planner(source: BlockSource) -> BlockSource:
     """
     texts = iter(buffer_texts(source)[len(HEAD) :])
     there = {one.name for one in source.variables}
-    ours = {f"{name}{OURS}" if f"{name}{OURS}" in there else name for name in _names()}
+    names = [one.name for one in declared([], 0, 1, _MEMBERS, cKind=0, cLayout=0, cPatience=0)]
+    ours = {f"{name}{OURS}" if f"{name}{OURS}" in there else name for name in names}
     try:
         variables = [
             _constant(one, [next(texts) for _ in _elements(one)])
@@ -96,7 +89,7 @@ def constant_planner(source: BlockSource) -> BlockSource:
         ]
         back = attrs.evolve(source, variables=tuple(variables))
         numbers = [one for one in variables if _is_number(one)]
-        before, behind = _around(back, numbers, _own(back, numbers, [])[1])
+        before, behind = _around(back, numbers, _own(back, numbers)[1])
         body = source.body
         if not body.startswith(before):  # out of a format that has white space of its own
             body, before, behind = (" ".join(text.split()) for text in (body, before, behind))
@@ -136,68 +129,39 @@ def _constant(variable: BlockVariable, texts: list[str]) -> BlockVariable:
     return attrs.evolve(variable, section="VAR CONSTANT", initial=initial)
 
 
-def _texts(numbers: list[BlockVariable]) -> list[str]:
-    """List the values of a buffer, as literals of LREAL."""
-    cycle = float(_initial(numbers, "cCycle"))
-    content = [text if "." in text else f"{text}.0" for one in numbers for text in _elements(one)]
-    length = len(HEAD) + len(content)
-    checks = checks_of(length, cycle)
-    total = checksum(np.array([length, cycle, checks, *map(float, content)]))
-    return [*(f"{number}.0" for number in (length, total, checks)), *content]
-
-
-def _names() -> list[str]:
-    """List what is declared beside what a block of constants has."""
-    members = [name for names in _MEMBERS.values() for name in names]
-    constants = ("cInterface", "cKind", "cLayout", "cCapacity", "cPatience")
-    return [REQUEST, REPLY, STATE, TABLE, *members, *constants, *RESULTS, *TRIALS]
-
-
 def _own(
-    source: BlockSource, numbers: list[BlockVariable], texts: list[str]
+    source: BlockSource, numbers: list[BlockVariable]
 ) -> tuple[list[BlockVariable], Callable[[str], str]]:
     """Declare what is added, and give what renames it in statements where the block has such names."""
+    cycle = float(_initial(numbers, "cCycle"))
+    content = [text if "." in text else f"{text}.0" for one in numbers for text in _elements(one)]
+    texts = with_head(content, cycle)
+    own = declared(
+        texts,
+        len(texts),
+        int(_initial(numbers, "cAxes")),
+        _MEMBERS,
+        cKind=_kind(source, numbers),
+        cLayout=LAYOUT_NAMES.index(PLANNER),
+        cPatience=ceil(PATIENCE / cycle),
+    )
     taken = {one.name.lower() for one in source.variables}
-    renamed = {name: f"{name}{OURS}" for name in _names() if name.lower() in taken}
+    renamed = {one.name: f"{one.name}{OURS}" for one in own if one.name.lower() in taken}
 
     def distinct(text: str) -> str:
         return _WORD.sub(lambda word: renamed.get(word[0], word[0]), text)
 
-    window, length = f"ARRAY [0..{LENGTH - 1}] OF LREAL", state_length(int(_initial(numbers, "cAxes")))
-    constants = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)} | {
-        "cInterface": INTERFACE,
-        "cKind": _kind(source, numbers),
-        "cLayout": LAYOUT_NAMES.index(PLANNER),
-        "cCapacity": len(texts),
-        "cPatience": ceil(PATIENCE / float(_initial(numbers, "cCycle"))),
-    }
-    declared = [
-        BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
-        BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
-        BlockVariable(section="VAR_OUTPUT", name=STATE, type=f"ARRAY [0..{length - 1}] OF LREAL"),
-        BlockVariable(
-            section="VAR",
-            name=TABLE,
-            type=f"ARRAY [0..{2 * len(texts) - 1}] OF LREAL",
-            initial=initialiser([*texts, *["0.0"] * len(texts)]),
-        ),
-        *(BlockVariable(section="VAR", name=name, type=kind) for kind, of in _MEMBERS.items() for name in of),
-        *(
-            BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(number))
-            for name, number in constants.items()
-        ),
-    ]
-    return [attrs.evolve(one, name=distinct(one.name)) for one in declared], distinct
+    return [attrs.evolve(one, name=distinct(one.name)) for one in own], distinct
 
 
 def _kind(source: BlockSource, numbers: list[BlockVariable]) -> int:
     """Hash all of a block but its numbers, which is what two must have in common."""
     names = {one.name for one in numbers}
-    declared = sorted(
+    variables = sorted(
         (one.section, one.name, one.type, "" if one.name in names else "".join(one.initial.split()))
         for one in source.variables
     )
-    return zlib.crc32(repr((declared, source.body.split())).encode()) >> 1
+    return zlib.crc32(repr((variables, source.body.split())).encode()) >> 1
 
 
 def _around(

@@ -20,7 +20,7 @@ from __future__ import annotations
 import re
 import zlib
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate, chain
 from math import ceil
 from pathlib import Path
@@ -89,6 +89,10 @@ VARIABLES = {
     ),
     "BOOL": ("bLoaded", "bLoad", "bAgain", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
 }
+SELECTION = (
+    BlockVariable(section="VAR_INPUT", name=LIBRARY, type="DINT", comment="which motion, from 0 on"),
+    BlockVariable(section="VAR", name="nSelected", type="DINT", comment="it, once nothing moved"),
+)
 NOTE = """\
     Its numbers are variables, in two buffers, which gen-profile deploy writes through aRequest and reads
     through aReply; so the peaks above are those of the motion that it was exported with. A cold start brings
@@ -143,9 +147,9 @@ def buffered(sources: Sequence[BlockSource], target: Target, *, library: bool = 
 def _buffered(
     sources: Sequence[BlockSource], target: Target, capacity: int | None, *, library: bool
 ) -> BlockSource:
-    declared = {variable.name: variable for variable in sources[0].variables}
-    layout, axes = _layout(declared), len(_split(declared["cStart"]))
-    cycle = float(declared["cCycleTime"].initial)
+    constants = {variable.name: variable for variable in sources[0].variables}
+    layout, axes = _layout(constants), len(_split(constants["cStart"]))
+    cycle = float(constants["cCycleTime"].initial)
     texts = _texts([_motion_texts(source, layout, axes) for source in sources], cycle, library=library)
     if capacity is None:
         capacity = max(LEAST_CAPACITY, 1 << len(texts).bit_length())
@@ -154,15 +158,16 @@ def _buffered(
             f"export.plc_tables: {len(texts)} values do not fit a buffer of {min(capacity, MOST_CAPACITY)}; "
             'take export.plc_layout = "segments", a longer export.cycle_time, or plc_tables = "constants".'
         )
-    constants = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)}
-    constants |= {
-        "cInterface": INTERFACE,
-        "cKind": kind_of(target, layout, library=library),
-        "cLayout": LAYOUT_NAMES.index(layout),
-        "cCapacity": capacity,
-        "cOwn": len(SCALARS) + axes * len(PER_AXIS),
-        "cPatience": ceil(PATIENCE / cycle),
-    }
+    added = declared(
+        texts,
+        capacity,
+        axes,
+        VARIABLES,
+        cKind=kind_of(target, layout, library=library),
+        cLayout=LAYOUT_NAMES.index(layout),
+        cPatience=ceil(PATIENCE / cycle),
+        cOwn=len(SCALARS) + axes * len(PER_AXIS),
+    )
     of_constants = {*(f"c{name}" for name in (*COLUMNS[layout], *OF_BUFFER)), *DROPPED}
     taken = (_taken(one) for one in sources[0].variables if one.name not in of_constants)
     wait = f"{-(-len(texts) // int(float(texts[HEAD.index('checks')])))} cycles after power-up"
@@ -171,40 +176,44 @@ def _buffered(
             wait, sources[0].header.replace("    nErrorId: 0 none", f"{NOTE}    nErrorId: 0 none")
         ),
         name=sources[0].name,
-        variables=(*taken, *_added(texts, capacity, axes, constants, library=library)),
+        variables=(*taken, *added, *(SELECTION if library else ())),
         body=_prelude(layout, axes, library=library)
         + _from_buffer(refusing(sources[0].body) if library else sources[0].body, layout)
         + _shown_state(axes, library=library),
     )
 
 
-def _added(
-    texts: list[str], capacity: int, axes: int, constants: dict[str, int], *, library: bool
+def declared(
+    texts: Sequence[str], capacity: int, axes: int, members: Mapping[str, Sequence[str]], **constants: int
 ) -> list[BlockVariable]:
-    """Declare the requests, the buffers, and what belongs to them."""
+    """Declare requests, buffers, and what belongs to them.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Of the first buffer.
+    capacity, axes : int
+    members : mapping of str to sequence of str
+        Names of variables by their type.
+    constants : int
+        Further ones.
+    """
     window, both = f"ARRAY [0..{LENGTH - 1}] OF LREAL", f"ARRAY [0..{2 * capacity - 1}] OF LREAL"
     whole = [*texts, *["0.0"] * (2 * capacity - len(texts))]
     state = f"ARRAY [0..{state_length(axes) - 1}] OF LREAL"
-    variables = [
+    numbered = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)}
+    numbered |= {"cInterface": INTERFACE, "cCapacity": capacity, **constants}
+    return [
         BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
         BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
         BlockVariable(section="VAR_OUTPUT", name=STATE, type=state),
         BlockVariable(section="VAR", name=TABLE, type=both, initial=initialiser(whole)),
+        *(BlockVariable(section="VAR", name=name, type=kind) for kind, of in members.items() for name in of),
+        *(
+            BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(value))
+            for name, value in numbered.items()
+        ),
     ]
-    variables += [
-        BlockVariable(section="VAR", name=name, type=kind) for kind, of in VARIABLES.items() for name in of
-    ]
-    if library:
-        comment = "which motion, from 0 on"
-        variables += [
-            BlockVariable(section="VAR_INPUT", name=LIBRARY, type="DINT", comment=comment),
-            BlockVariable(section="VAR", name="nSelected", type="DINT", comment="it, once nothing moved"),
-        ]
-    variables += [
-        BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(value))
-        for name, value in constants.items()
-    ]
-    return variables
 
 
 def state_length(axes: int) -> int:
@@ -299,7 +308,11 @@ def _texts(motions: Sequence[list[str]], cycle: float, *, library: bool) -> list
     if library:
         begin = len(HEAD) + 1 + len(motions)
         starts = [len(motions), *accumulate(map(len, motions[:-1]), initial=begin)]
-    content = [*(f"{number}.0" for number in starts), *chain.from_iterable(motions)]
+    return with_head([*(f"{number}.0" for number in starts), *chain.from_iterable(motions)], cycle)
+
+
+def with_head(content: list[str], cycle: float) -> list[str]:
+    """Put length, checksum and checks before what a buffer holds, for a cycle time in s."""
     length = len(HEAD) + len(content)
     checks = checks_of(length, cycle)
     counted = np.array([length, cycle, checks, *map(float, content)])
