@@ -109,7 +109,9 @@ class Block:
         """Give outputs while it is enabled, goes to targets and follows a stick."""
         steps = [
             {"fActPosition": 0.0, "fActVelocity": 0.0, "fL1": 5.0, "bEnable": 0.0, "bExecute": 0.0},
+            {"bLoadAtRest": 0.0},
             {"bEnable": 1.0},
+            {"bLoadAtRest": 1.0},
             {"bExecute": 1.0, "fTarget": 6.0},
             {"bExecute": 0.0, "bVelocity": 1.0, "fVelocityCommand": 0.5},
             {"fVelocityCommand": -0.4},
@@ -122,7 +124,7 @@ class Block:
 
 @pytest.mark.slow
 def test_after_a_switch_it_plans_as_a_block_that_was_just_loaded(sources):
-    """To the last bit; it takes nothing over while it is enabled, or what has a wrong checksum."""
+    """To the last bit, once the load was seen at rest; while enabled, or by a wrong checksum, it takes nothing."""
     usual, changed = sources
     due, block = Block(usual), Block(buffered_planner(changed))
     names = list(due.places)
@@ -147,4 +149,7 @@ def test_after_a_switch_it_plans_as_a_block_that_was_just_loaded(sources):
     assert block.ask(2.0, checksum=other[1]) == 0.0
     block.call(300)
     assert (block.state(4), block.state(5), block.state(6)) == (1.0, 1.0, other[1])
-    np.testing.assert_array_equal(block.journey(names)[800:], due.journey(names)[800:])
+    after, new = block.journey(names), due.journey(names)
+    promise = names.index("bPromise")
+    assert (after[2300, promise], new[2300, promise], after[2800, promise]) == (0.0, 1.0, 1.0)
+    np.testing.assert_array_equal(after[2500:], new[2500:])

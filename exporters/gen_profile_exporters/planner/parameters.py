@@ -6,7 +6,8 @@ block if all else is the same, to the letter.
 
 The numbers become variables of the same names, which take the buffer's values over while the block is
 disabled, and only once the checksum over the buffer was found right; the statements that plan stay as they
-are. A switch makes the block forget all that it knows, as a cold start does.
+are. A switch makes the block forget all that it knows: it begins as after a cold start, but promises nothing
+before the load was seen to hang still.
 """
 
 from __future__ import annotations
