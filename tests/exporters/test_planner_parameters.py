@@ -124,7 +124,7 @@ class Block:
 
 @pytest.mark.slow
 def test_after_a_switch_it_plans_as_a_block_that_was_just_loaded(sources):
-    """To the last bit, once the load was seen at rest; while enabled, or by a wrong checksum, it takes nothing."""
+    """To the last bit, once the load was seen at rest; enabled, or by a wrong checksum, it takes nothing."""
     usual, changed = sources
     due, block = Block(usual), Block(buffered_planner(changed))
     names = list(due.places)
