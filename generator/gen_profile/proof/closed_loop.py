@@ -284,8 +284,8 @@ class ClosedLoop:
         return [*start_cycles, ends], np.vstack([inputs, inputs[-1]])
 
     def _sensor_faults(self, history: History, period: float, run: BlockRun) -> Iterator[str]:
-        """Judge how the block used its sensor; after a quick stop at the end it does not."""
-        if history.sensed is not None and history.commands[-1].command != "quick-stop":
+        """Judge how the block used its sensor; after a quick stop more may swing than is stated."""
+        if history.sensed is not None and not history.brakes:
             changed = [one.time + one.lasts for one in history.changes if math.isfinite(one.lasts)]
             last = max(history.commands[-1].time, *changed, 0.0)
             yield from sensor_faults(

@@ -294,7 +294,7 @@ def _within_travel(followed: Followed, motion: IssuedMotion, own: slice) -> Iter
     for k, limits in enumerate(followed.limits):
         first, last = limits.targets[0] - limits.margin, limits.targets[1] + limits.margin
         place = motion.position[k, own]
-        beyond = np.maximum(first - low[k], high[k] - last) * ((place >= first) & (place <= last))
+        beyond = np.maximum(first - low[k], high[k] - last) * (first <= place[0] <= last)
         yield from greatest("loose", beyond, EXACT, own.start)
         first, last = limits.targets
         damps = followed.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
