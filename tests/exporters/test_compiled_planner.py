@@ -10,18 +10,26 @@ import sys
 import numpy as np
 from test_compiled_block import HARNESS, compile_text
 from test_planner_forms import SPEC, planner_commands
+from test_planner_parameters import CHANGES, Block, source_of
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files
+from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.planner.parameters import buffered_planner
+from gen_profile_exporters.playback.buffers import buffer_texts
 
 
 def played(text, inputs, outputs, rows, folder):
     """Outputs of a block that matiec compiled, cycle by cycle."""
     library = compile_text(text, folder)
-    read = "".join(f'scanf("%lf", &value); fb.{name.upper()}.value = value;\n' for name in inputs)
-    written = "".join(f'printf("%a ", (double) fb.{name.upper()}.value);\n' for name in outputs)
-    source = HARNESS.replace("FB_BAY_3", "FB_BAY_3_PLANNER").replace("__GET_VAR(fb.NERRORID,)", "0")
+    places = {name: f"fb.{name.upper()}.value".replace("].value", "]") for name in (*inputs, *outputs)}
+    places = {name: place.replace("[", ".value.table[") for name, place in places.items()}
+    read = "".join(f'scanf("%lf", &value); {places[name]} = value;\n' for name in inputs)
+    written = "".join(f'printf("%a ", (double) {places[name]});\n' for name in outputs)
+    source = HARNESS.replace("FB_BAY_3", parse_function_block(text).name.upper()).replace(
+        "__GET_VAR(fb.NERRORID,)", "0"
+    )
     for name, part in {"SWITCHES": "", "REALS": read, "OUTPUTS": written}.items():
         source = source.replace(f"        {name}\n", part)
     (folder / "main.c").write_text(source, encoding="ascii")
@@ -37,6 +45,34 @@ def test_matiec_s_planner_issues_the_same_bits(tmp_path):
     oracle = BlockInstance(text)
     rows = np.concatenate(list(planner_commands(oracle.inputs)))
     assert played(text, oracle.inputs, oracle.outputs, rows, tmp_path) == oracle.call(rows).tolist()
+
+
+class Recorded(Block):
+    """One that keeps what it was given and issued."""
+
+    def __init__(self, source):
+        super().__init__(source)
+        self.rows, self.issued = [], []
+
+    def call(self, cycles, **inputs):
+        self.issued.append(super().call(cycles, **inputs))
+        self.rows.append(np.tile([*self.given.values()], (cycles, 1)))
+        return self.issued[-1]
+
+
+def test_matiec_s_planner_takes_other_numbers_and_issues_the_same_bits(tmp_path):
+    changed, usual = (buffered_planner(source_of(*changes)) for changes in (CHANGES, ()))
+    numbers = np.array(list(map(float, buffer_texts(usual))))
+    block = Recorded(changed)
+    block.journey([])
+    block.call(10, bEnable=0.0, fActVelocity=0.0)
+    block.write(numbers)
+    assert block.ask(2.0, checksum=numbers[1]) == 0.0
+    block.call(300)
+    assert block.state(6) == numbers[1]
+    block.journey([])
+    rows, issued = (np.concatenate(parts) for parts in (block.rows, block.issued))
+    assert played(changed.text(), block.given, block.places, rows, tmp_path) == issued.tolist()
 
 
 # As a runtime does: what has an address is set and read, and the configuration is run once in every cycle.
