@@ -275,7 +275,7 @@ class TestSiemens:
 
     def test_a_table_larger_than_a_data_block_is_refused(self):
         move = quintic((0, 1), duration=3.0)
-        with pytest.raises(ExportError, match=r"the table takes 72\.5 kB, a data block holds 64 kB"):
+        with pytest.raises(ExportError, match=r"numbers take 72\.5 kB, a data block holds 64 kB"):
             siemens_scl.encode(move, goal_of(move, "samples", cycle_time=0.001))
         assert siemens_scl.encode(move, goal_of(move, "counts", cycle_time=0.001))
 

@@ -60,14 +60,15 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     Raises
     ------
     ExportError
-        The tables are larger than a data block.
+        Its numbers are larger than a data block.
     """
     size = sum(_bytes(variable) for variable in source.variables)
     if size > MOST_BYTES:
+        smaller = 'export.plc_layout = "segments", a longer export.cycle_time, or fewer motions in a library'
+        cure = 'export.plc_tables = "constants"' if is_buffered(source) else smaller
         raise ExportError(
-            f"export.plc_layout: the table takes {size / 1000:.1f} kB, a data block holds "
-            f"{MOST_BYTES / 1000:g} kB; "
-            'take "segments", a longer export.cycle_time, or fewer motions in a library.'
+            f"siemens-scl: the block's numbers take {size / 1000:.1f} kB, a data block holds "
+            f"{MOST_BYTES / 1000:g} kB; take {cure}."
         )
     wrappers = axis_wrappers(source, len(target.axes), SIEMENS)
     parts = [source, *wrappers]
