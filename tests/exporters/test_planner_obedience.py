@@ -277,6 +277,17 @@ def test_a_stick_at_zero_takes_the_axis_from_its_way_to_a_target(text):
     assert last(driver, "fPosition") - begin < 4.0
 
 
+@pytest.mark.parametrize(("begin", "end"), [(40.0, 40.0), (38.0, 40.0), (0.0, 0.0)])
+def test_a_stick_turns_a_motion_that_has_just_begun_near_the_end_of_the_travel(text, begin, end):
+    """It went on for 20 to 25 s and 7 m, as no plan to the stick's velocity ends within the travel."""
+    way = np.sign(end - 20.0)
+    driver = standing(text, begin).hold(0.35, bExecute=1, fTarget=20.0)
+    out = driver.hold(25.0, bExecute=0, bVelocity=1, fVelocityCommand=way).parts[-1]
+    assert 0.0 < CYCLE * np.count_nonzero(way * out["fVelocity"] < 0.0) < 7.0
+    assert out["fPosition"][-1] == pytest.approx(end, abs=0.01)
+    require_limits(driver.outputs, limits=LIMITS)
+
+
 def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text):
     ends = []
     for phase in np.arange(0.0, 0.3, 0.05):

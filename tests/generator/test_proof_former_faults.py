@@ -21,6 +21,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (300, 8, 58),  # 15 cm beyond the stated ends, as a pulse was weighed where the override became 0
         (300, 5, 39),  # fTimeToGo half of what it took pulses to turn round
         (225, 5, 64),  # a rope that came with a command, as that of before was being taken over: 7 mm left
+        (225, 5, 125),  # 2.6 s late, as from rest a plan for the target before led away from the new one
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
