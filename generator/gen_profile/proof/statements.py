@@ -299,7 +299,8 @@ def _within_travel(followed: Followed, motion: IssuedMotion, own: slice) -> Iter
         first, last = limits.targets
         damps = followed.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
         if first <= place[0] <= last and motion.stands[own.start - 1] and not damps:
-            yield from greatest("outside", np.maximum(first - place, place - last), EXACT, own.start)
+            beyond = np.maximum(first - place, place - last)
+            yield from greatest("outside", beyond, limits.margin + EXACT, own.start)  # room to damp in
 
 
 def _turning(followed: Followed, motion: IssuedMotion) -> Array:
