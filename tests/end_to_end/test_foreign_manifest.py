@@ -5,8 +5,11 @@ import re
 import pytest
 from command_line import run_here
 
-from gen_profile.artefacts.manifest import Artefact, Manifest
+from gen_profile.artefacts.manifest import Artefact, Manifest, sha256
+from gen_profile.deployment.table import read_table
+from gen_profile.errors import OutputError
 from gen_profile.planner.design import planner_block
+from gen_profile.progress import no_progress
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 BAY = """
@@ -19,7 +22,7 @@ export = { cycle_time = 0.004 }
 """
 
 
-def manifest(spec, path, format_, sha256="0" * 64):
+def manifest(spec, path, format_, sha256="0" * 64, **written):
     return Manifest(
         name=spec.name,
         spec=spec.to_dict(),
@@ -27,7 +30,7 @@ def manifest(spec, path, format_, sha256="0" * 64):
         profile_sha256="",
         versions={},
         artefacts=(Artefact(format=format_, path=path, sha256=sha256, bytes=1),),
-        check={"passed": True},
+        check={"passed": True, **written},
     ).to_json()
 
 
@@ -115,3 +118,16 @@ def test_a_spec_of_something_else_is_refused(folder, changes, words):
     refused = run_here("check", "bay.st", "other.toml")
     assert (refused.code, len(refused.errors)) == (2, 1)
     assert re.search(words, refused.err)
+
+
+@pytest.mark.parametrize("count", ["many", 0, -5, None, 1.5, True])
+def test_a_number_of_histories_that_means_nothing_is_refused(tmp_path, count):
+    (tmp_path / "bay.st").write_text(BLOCK)
+    written = manifest(parse_spec(BAY), "bay.st", "planner", sha256(BLOCK.encode()), histories=count)
+    (tmp_path / "manifest.json").write_bytes(written)
+    outcome = run_here("check", tmp_path / "bay.st")
+    assert outcome.code == 2
+    assert f"check.histories must be a whole number from 1 on, found {count!r}" in outcome.err
+    table = read_table(tmp_path / "bay.st")
+    with pytest.raises(OutputError, match="whole number from 1 on"):
+        table.check(table.values, no_progress)

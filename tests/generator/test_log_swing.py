@@ -260,6 +260,7 @@ def test_an_encoder_on_a_can_bus_is_logged(tmp_path, size, more):
 @pytest.mark.parametrize(
     ("source", "more", "code", "sentence"),
     [
+        ("http://127.0.0.1:1", ("--counts", "9"), 2, "--counts: is for an encoder on a CAN bus"),
         ("can:can0", ("--node", "5"), 2, "name interface and channel, as can:socketcan:can0"),
         ("can:virtual:x", (), 2, "--node: name the encoder's number on the bus, from 1 to 127"),
         ("can:virtual:x", ("--node", "128"), 2, "--node: name the encoder's number"),

@@ -19,8 +19,8 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.forms import block_in
 from gen_profile.planner.machine import planned_axes
 from gen_profile.progress import Progress
-from gen_profile.proof.check import BlockJudgement, is_planner_block
-from gen_profile.proof.prove import HISTORIES, prove
+from gen_profile.proof.check import BlockJudgement, histories_of, is_planner_block
+from gen_profile.proof.prove import prove
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.strict_json import parse_json
@@ -143,8 +143,7 @@ class PlannerTable(BlockTable):
     def check(self, values: Array, progress: Progress) -> BlockJudgement:
         """Prove the block with other numbers, on as many histories as its manifest tells of."""
         text = constant_planner(with_buffer(self.source, list(map(literal, values.tolist())))).text()
-        record = manifest_beside(self.path, read_artefact(self.path), planner=True).check or {}
-        histories = int(record.get("histories", HISTORIES))
+        histories = histories_of(manifest_beside(self.path, read_artefact(self.path), planner=True))
         proof = prove(self.spec, text, histories=histories, progress=progress)
         return BlockJudgement(path=self.path, text=text, spec=self.spec, check=proof, manifest="none")
 

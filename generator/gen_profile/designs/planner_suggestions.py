@@ -19,11 +19,8 @@ from gen_profile.units import RATES
 # the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 UNKNOWN = 1.25  # times the limit: at least so much a block counts that shows one of the next
-OF_SWAY = {
-    TAKEN_BACK,
-    WORDS["given up"],
-    kind_of(WORDS["idle"]),
-}  # it waits, too, where a plan would break its promise
+# the block waits, too, where a plan would break its promise
+OF_SWAY = {TAKEN_BACK, WORDS["given up"], kind_of(WORDS["idle"])}
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 

@@ -126,7 +126,7 @@ def check_block(
     _require_inputs(path, text, planner_block(spec).text)
     agreement = provenance(manifest, content, spec)
     known = _record(manifest) if agreement != "none" else {}
-    count = histories or known.get("histories", HISTORIES)
+    count = histories or histories_of(manifest if known else None)
     if history is not None and not 0 <= history < count:
         raise SpecError(f"history {history}: the histories are numbered from 0 to {count - 1}.")
     proof = partial(prove, spec, text, histories=count, scheduler=scheduler, progress=progress)
@@ -153,6 +153,23 @@ def _require_inputs(path: Path, text: str, due: str) -> None:
             f"{path} is no block of this spec: only one of them has an input {differing[0]}; name the spec "
             "that it was written of."
         )
+
+
+def histories_of(manifest: Manifest | None) -> int:
+    """Tell on how many histories a block was proved; the usual number of one that was not.
+
+    Raises
+    ------
+    OutputError
+        The manifest has another value there.
+    """
+    count = _record(manifest).get("histories", HISTORIES)
+    if type(count) is not int or count < 1:
+        raise OutputError(
+            f"The manifest's check.histories must be a whole number from 1 on, found {count!r}: it was "
+            "altered; export the block again."
+        )
+    return count
 
 
 def _record(manifest: Manifest | None) -> Mapping[str, Any]:

@@ -19,9 +19,9 @@ from gen_profile.planner.interface import BlockAxis
 
 POSITION, VELOCITY, STOP = "position", "velocity", "stop"
 QUICK_STOP, DISABLED = "quick-stop", "disabled"
-MISTIMED, LIVE, REFUSED, NO_NUMBER, LIMITS, CONTRADICTORY, FOLLOWING, BLOCKED, NO_MOTION = range(
-    1, 10
-)  # errors
+# values of nErrorId
+MISTIMED, LIVE, REFUSED, NO_NUMBER, LIMITS = range(1, 6)
+CONTRADICTORY, FOLLOWING, BLOCKED, NO_MOTION = range(6, 10)
 OF_COMMANDS = (REFUSED, CONTRADICTORY, BLOCKED)  # which go with them
 REPLACED, ABORTED_POSITION, ABORTED_VELOCITY = 3, 1, 2  # why bCommandAborted is set
 ZONES = 8  # intervals of each kind

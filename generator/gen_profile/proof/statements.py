@@ -251,9 +251,7 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from greatest("loose", apart, widest)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
-        if (
-            order.kind in (POSITION, VELOCITY) and not followed.reserve
-        ):  # else it may brake or be calmed beyond
+        if order.kind in (POSITION, VELOCITY) and not followed.reserve:  # else it may be calmed beyond
             yield from _within_travel(followed, motion, slice(order.begin, order.end))
         begin = max(
             0, order.begin - (order.kind == STOP)

@@ -72,6 +72,8 @@ def log_swing(
     from gen_profile.artefacts.writing import deliver
     from gen_profile.identification.phone import COLUMNS, Phone
 
+    if counts is not None and not source.startswith("can:"):
+        raise SpecError("--counts: is for an encoder on a CAN bus, as can:socketcan:can0; leave it out.")
     if source.startswith("opc.tcp:"):
         if node is None:
             raise SpecError("--node: name the node whose value swings, as ns=4;s=GVL.rAngle.")
