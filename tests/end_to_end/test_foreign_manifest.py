@@ -131,3 +131,16 @@ def test_a_number_of_histories_that_means_nothing_is_refused(tmp_path, count):
     table = read_table(tmp_path / "bay.st")
     with pytest.raises(OutputError, match="whole number from 1 on"):
         table.check(table.values, no_progress)
+
+
+RECORDS = [{}, {"seed": "x", "search_parents": []}, {"seed": 0, "search_parents": [[9]]}]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("record", RECORDS)
+def test_what_a_record_lacks_to_replay_a_history_is_found_anew(tmp_path, record):
+    (tmp_path / "bay.st").write_text(BLOCK)
+    written = manifest(parse_spec(BAY), "bay.st", "planner", sha256(BLOCK.encode()), histories=2, **record)
+    (tmp_path / "manifest.json").write_bytes(written)
+    outcome = run_here("check", tmp_path / "bay.st", "--history", 1)
+    assert outcome.code == 0, outcome.err

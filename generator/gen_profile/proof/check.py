@@ -133,7 +133,7 @@ def check_block(
     if history is None:
         replayed = proof()
     else:
-        if known.get("histories") != count:  # the search's histories depend on what it has found
+        if not _is_whole(known, count):  # the search's histories depend on what it has found
             known = proof().to_dict()
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec), count, seed, parents)
@@ -170,6 +170,15 @@ def histories_of(manifest: Manifest | None) -> int:
             "altered; export the block again."
         )
     return count
+
+
+def _is_whole(record: Mapping[str, Any], count: int) -> bool:
+    """Tell whether a record has all that replaying one of so many histories takes."""
+    seed, parents = record.get("seed"), record.get("search_parents")
+    if record.get("histories") != count or type(seed) is not int or not isinstance(parents, list):
+        return False
+    numbers = [number for one in parents for number in (one if isinstance(one, list) else [None])]
+    return all(type(number) is int and 0 <= number < count for number in numbers)
 
 
 def _record(manifest: Manifest | None) -> Mapping[str, Any]:
