@@ -390,7 +390,7 @@ def test_check_repeats_the_proof_from_the_file(deployed):
 
 def test_check_replays_one_history(deployed):
     folder, document = deployed
-    worst = document["proof"]["worst"]
+    worst = dict(document["proof"]["worst"])
     one = run_here("check", folder / "bay 3.st", "--history", worst["number"], "--json").document
     share, own = one["history"].pop("share"), worst.pop("share")
     assert one["history"] == worst
