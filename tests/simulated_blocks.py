@@ -3,8 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
+
 from gen_profile.artefacts.manifest import Manifest, artefact_of
-from gen_profile.deployment.mailbox import Mailbox
+from gen_profile.deployment.mailbox import LinkLostError, Mailbox
+from gen_profile.deployment.simulated_block import SimulatedBlock
+from gen_profile.deployment.watching.watch import watch
 from gen_profile.designs.design import design
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import block_files
@@ -80,6 +84,53 @@ class DirectLink:
         self.operations += 1
         self.block.run(1)
         return self.block.outputs["aState"].copy()
+
+
+class Machine(DirectLink):
+    """A block whose task goes on while time passes, and what happens to it at given times."""
+
+    def __init__(self, table, script=(), alter=lambda values: values, pace=1.0):
+        super().__init__(SimulatedBlock(table))
+        self.block.run(60)
+        self.time, self.called, self.pace = 0.0, 0, pace
+        self.cycle = table.spec.export.cycle_time
+        self.script, self.alter, self.lost = sorted(script, key=lambda one: one[0]), alter, []
+        self.runs = True
+
+    def advance(self, seconds):
+        self.time += seconds
+        while self.script and self.script[0][0] <= self.time:
+            self.script.pop(0)[1](self)
+        due = round(self.time * self.pace / self.cycle)
+        if due > self.called:
+            if self.runs:
+                self.block.run(due - self.called)
+            self.called = due
+
+    def state(self):
+        if any(begin <= self.time < end for begin, end in self.lost):
+            raise LinkLostError("the cable was pulled")
+        return self.alter(self.block.outputs["aState"].copy())
+
+    def reopen(self):
+        self.state()
+
+
+def setting(**inputs):
+    return lambda machine: [machine.block.set(name, np.atleast_1d(value)) for name, value in inputs.items()]
+
+
+def seen(table, machine, seconds=6.0):
+    events = []
+    found = watch(
+        table,
+        machine,
+        lambda _state, _at, words: events.append(words),
+        seconds=seconds,
+        now=lambda: machine.time,
+        pause=machine.advance,
+    )
+    return found, [one for one in events if one]
 
 
 def box_of(link):

@@ -24,7 +24,7 @@ from gen_profile.deployment.mailbox import Mailbox
 from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
 from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
 from gen_profile.deployment.table import read_table
-from gen_profile.deployment.watch import Judge
+from gen_profile.deployment.watching.judge import Judge
 from gen_profile.errors import DeploymentError
 
 SETTINGS = ("export.plc_tables=variables", "export.plc_layout=samples", "export.cycle_time=0.02")
@@ -244,7 +244,7 @@ def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch
 
 @pytest.mark.slow
 def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, once_watched):
-    monkeypatch.setattr("gen_profile.deployment.watch.LOST_FOR", 1.0)
+    monkeypatch.setattr("gen_profile.deployment.watching.watch.LOST_FOR", 1.0)
     ending = ExitStack()
     url = ending.enter_context(controller(files, secure=False))
     where = ("--to", url, "--security", "none")

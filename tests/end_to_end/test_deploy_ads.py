@@ -13,7 +13,7 @@ from end_to_end.test_deploy import BARE, free_port
 
 from gen_profile.deployment.ads import AdsAccess, AdsLink
 from gen_profile.deployment.ads_sim import SimulatedAdsController
-from gen_profile.deployment.block_state import read_state
+from gen_profile.deployment.block_state import MotionState, read_state
 from gen_profile.deployment.deploy import deploy, verify
 from gen_profile.deployment.mailbox import RIGHT, LinkLostError, Mailbox
 from gen_profile.deployment.table import BlockTable, read_table
@@ -243,7 +243,7 @@ def test_every_bit_of_a_number_arrives(bench):
         link.write(odd)
         with bench.lock:
             assert (bench.block.get("aRequest").view(np.uint64) == odd.view(np.uint64)).all()
-        assert read_state(link.state(), 1).checked == RIGHT
+        assert read_state(link.state(), 1, MotionState).checked == RIGHT
 
 
 def test_an_array_of_another_length_is_refused(bench, monkeypatch):

@@ -13,7 +13,7 @@ from snap7.error import S7ConnectionError, S7TimeoutError
 from snap7.server import Server
 from snap7.type import SrvArea
 
-from gen_profile.deployment.block_state import read_state
+from gen_profile.deployment.block_state import MotionState, read_state
 from gen_profile.deployment.deploy import deploy, verify
 from gen_profile.deployment.mailbox import RIGHT, Mailbox
 from gen_profile.deployment.s7 import S7Access, S7Link
@@ -299,7 +299,7 @@ def test_every_bit_of_a_number_arrives(bench, tables):
         link.write(odd)
         found = link._doubles(0, 256)
         assert (found.view(np.uint64) == odd.view(np.uint64)).all()
-        assert read_state(link.state(), 1).checked == RIGHT
+        assert read_state(link.state(), 1, MotionState).checked == RIGHT
 
 
 def test_the_exported_data_block_has_the_arrays_where_they_are_looked_for(files):

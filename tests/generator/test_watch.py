@@ -6,15 +6,14 @@ import types
 
 import numpy as np
 import pytest
-from simulated_blocks import DirectLink, box_of, exported, poked
+from simulated_blocks import DirectLink, Machine, box_of, exported, poked, seen, setting
 
-from gen_profile.deployment import watch as watching
-from gen_profile.deployment.block_state import MOVING, read_state
+from gen_profile.deployment.block_state import MOVING, MotionState, read_state
 from gen_profile.deployment.deploy import deploy
-from gen_profile.deployment.mailbox import LinkLostError
 from gen_profile.deployment.simulated_block import SimulatedBlock
 from gen_profile.deployment.table import read_table
-from gen_profile.deployment.watch import watch
+from gen_profile.deployment.watching import watch as watching
+from gen_profile.deployment.watching.motion import MotionJudge
 from gen_profile.errors import CheckFailed, DeploymentError
 
 GANTRY = ("export.cycle_time=0.02", "move.duration=8.0")
@@ -30,54 +29,7 @@ def other(tmp_path_factory):
     return read_table(exported(tmp_path_factory.mktemp("other"), "move.distance=0.2"))
 
 
-class Machine(DirectLink):
-    """A block whose task goes on while time passes, and what happens to it at given times."""
-
-    def __init__(self, table, script=(), alter=lambda values: values, pace=1.0):
-        super().__init__(SimulatedBlock(table))
-        self.block.run(60)
-        self.time, self.called, self.pace = 0.0, 0, pace
-        self.cycle = table.spec.export.cycle_time
-        self.script, self.alter, self.lost = sorted(script, key=lambda one: one[0]), alter, []
-        self.runs = True
-
-    def advance(self, seconds):
-        self.time += seconds
-        while self.script and self.script[0][0] <= self.time:
-            self.script.pop(0)[1](self)
-        due = round(self.time * self.pace / self.cycle)
-        if due > self.called:
-            if self.runs:
-                self.block.run(due - self.called)
-            self.called = due
-
-    def state(self):
-        if any(begin <= self.time < end for begin, end in self.lost):
-            raise LinkLostError("the cable was pulled")
-        return self.alter(self.block.outputs["aState"].copy())
-
-    def reopen(self):
-        self.state()
-
-
-def setting(**inputs):
-    return lambda machine: [machine.block.set(name, np.atleast_1d(value)) for name, value in inputs.items()]
-
-
 START = (0.5, setting(bExecute=1.0))
-
-
-def seen(table, machine, seconds=6.0):
-    events = []
-    found = watch(
-        table,
-        machine,
-        lambda _state, _at, words: events.append(words),
-        seconds=seconds,
-        now=lambda: machine.time,
-        pause=machine.advance,
-    )
-    return found, [one for one in events if one]
 
 
 @pytest.mark.slow
@@ -263,14 +215,14 @@ def test_a_motion_that_jumps_waits_or_bends_is_told(calls, gain, words, table):
     machine = Machine(table, [START])
     machine.advance(1.0)
     machine.advance(1.0)
-    judge, before = watching.Judge(table), machine.block.outputs["aState"].copy()
+    judge, before = MotionJudge(table), machine.block.outputs["aState"].copy()
     machine.block.run(1)
     after = machine.block.outputs["aState"].copy()
-    judge.take(read_state(before, 1), 0.0)
+    judge.take(read_state(before, 1, MotionState), 0.0)
     after[[0, -1]] = before[0] + calls
     after[14:18] *= gain
     with pytest.raises(CheckFailed, match=words):
-        judge.take(read_state(after, 1), 0.02)
+        judge.take(read_state(after, 1, MotionState), 0.02)
 
 
 def test_states_of_two_cycles_are_read_again(table):

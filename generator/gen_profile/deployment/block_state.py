@@ -1,6 +1,8 @@
-"""What a playback block shows of itself in every cycle (``state.st`` writes it)."""
+"""What a block shows of itself in every cycle: ``aState``, that ``state.st`` and ``buffers.st`` write."""
 
 from __future__ import annotations
+
+from typing import ClassVar, TypeVar
 
 import attrs
 import numpy as np
@@ -9,15 +11,16 @@ from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.playback.buffers import AXIS_STATE, STATE_HEAD, state_length
 
-IDLE, WAITING, MOVING, DONE, ABORTED, FAILED = range(6)
-PHASES = ("idle", "waiting", "moving", "done", "aborted", "failed")
+IDLE, WAITING, MOVING, DONE, ABORTED, FAILED = range(6)  # phases of a playback block
+DISABLED, STANDING, GUIDED, BRAKING = range(4)  # and of a planner block: nState
+NO_COMMAND, TO_POSITION, AT_VELOCITY = range(3)  # nCommand
 WHOLE = 10  # values that are whole numbers, ahead of the others
 MOST = 2.0**52  # of whatever is counted
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class BlockState:
-    """One cycle of a block.
+    """One cycle of a block, whichever it is.
 
     Attributes
     ----------
@@ -28,12 +31,51 @@ class BlockState:
     error : int
         ``nErrorId``.
     off_nominal : bool
-        Whether the timing no longer cancels the sway.
+        Whether the load may sway: the timing no longer cancels it, or a planner block does not promise it.
     buffer : int
         The one in use.
     checked : int
         Whether the checksum of the buffer in use was found right (1), wrong (2), or not yet worked out (0).
     checksum : int
+    kind : float
+        What blocks that take each other's tables have in common, as a number.
+    position, velocity, acceleration : (axes,) array
+        Setpoints, in axis units and s.
+    """
+
+    PHASES: ClassVar[tuple[str, ...]]
+    HEAD: ClassVar[tuple[str, ...]]  # names of the values ahead of the axes', but the last; empty: unused
+    OF_AXIS: ClassVar[tuple[str, ...]]
+
+    calls: int
+    phase: int
+    error: int
+    off_nominal: bool = attrs.field(converter=bool)
+    buffer: int
+    checked: int
+    checksum: int
+    kind: float
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def phase_name(self) -> str:
+        """Name the phase."""
+        return self.PHASES[self.phase]
+
+    @property
+    def setpoints(self) -> Array:
+        """Position, velocity and acceleration, shape (3, axes)."""
+        return np.array((self.position, self.velocity, self.acceleration))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class MotionState(BlockState):
+    """One cycle of a playback block.
+
+    Attributes
+    ----------
     runs : int
         Starts since the block was loaded, those of a way that was left included.
     cycle : int
@@ -44,31 +86,20 @@ class BlockState:
         of the next cycle.
     rate, slope : float
         Along the path, 1 as planned; and its change, in 1/s.
-    position, velocity, acceleration : (axes,) array
-        Setpoints, in axis units and s.
-    kind : float
-        What blocks that take each other's tables have in common, as a number.
     gain, shift : (axes,) array
         Of the path's positions, to which the setpoints lead: 1, and 0 in axis units, as planned.
     """
 
-    calls: int
-    phase: int
-    error: int
-    off_nominal: bool
-    buffer: int
-    checked: int
-    checksum: int
+    PHASES = ("idle", "waiting", "moving", "done", "aborted", "failed")
+    HEAD = ("runs", "cycle", "motion", "fraction", "rate", "slope")
+    OF_AXIS = ("gain", "shift")
+
     runs: int
     cycle: int
     motion: int
     fraction: float
     rate: float
     slope: float
-    kind: float
-    position: Array
-    velocity: Array
-    acceleration: Array
     gain: Array
     shift: Array
 
@@ -77,13 +108,42 @@ class BlockState:
         """How far the motion is, in cycles as planned."""
         return self.cycle + self.fraction
 
-    @property
-    def setpoints(self) -> Array:
-        """Position, velocity and acceleration, shape (3, axes)."""
-        return np.array((self.position, self.velocity, self.acceleration))
+
+@attrs.frozen(kw_only=True, eq=False)
+class PlannerState(BlockState):
+    """One cycle of a planner block.
+
+    Attributes
+    ----------
+    disabled_at : int
+        The last of the calls in which it was disabled.
+    command : int
+        ``nCommand``.
+    promise : int
+        ``nPromise``.
+    time_to_go : float
+        s, of what is committed.
+    target, speed : (axes,) array
+        Of the command to a position, and of the one to a velocity, in axis units and s.
+    """
+
+    PHASES = ("disabled", "standing", "moving", "braking")
+    HEAD = ("disabled_at", "command", "promise", "time_to_go", "", "")
+    OF_AXIS = ("target", "speed")
+
+    disabled_at: int
+    command: int
+    promise: int
+    time_to_go: float
+    target: Array
+    speed: Array
 
 
-def read_state(values: Array, axes: int) -> BlockState | None:
+_FIRST = ("calls", "phase", "error", "off_nominal", "buffer", "checked", "checksum")
+State = TypeVar("State", bound=BlockState)
+
+
+def read_state(values: Array, axes: int, kind: type[State]) -> State | None:
     """Take a block's state apart.
 
     Parameters
@@ -91,6 +151,8 @@ def read_state(values: Array, axes: int) -> BlockState | None:
     values : (values,) array
         Of ``aState``.
     axes : int
+    kind : type
+        `MotionState` or `PlannerState`.
 
     Returns
     -------
@@ -100,7 +162,7 @@ def read_state(values: Array, axes: int) -> BlockState | None:
     Raises
     ------
     DeploymentError
-        They are no state of a block for so many axes.
+        They are no state of such a block for so many axes.
     """
     if len(values) != state_length(axes):
         raise DeploymentError(
@@ -112,17 +174,15 @@ def read_state(values: Array, axes: int) -> BlockState | None:
     if values[0] != values[-1] or values[0] == 0.0:
         return None
     whole = values[:WHOLE]
-    if not np.isfinite(values).all() or (whole != np.floor(whole)).any() or not _in_range(whole):
+    in_range = (whole >= 0.0).all() and (whole <= MOST).all() and whole[1] < len(kind.PHASES)
+    if not np.isfinite(values).all() or (whole != np.floor(whole)).any() or not in_range:
         raise DeploymentError(
             "aState holds no state of a block; let the controller show it as an array of LREAL, "
             "written by nothing but the block."
         )
-    counts = [int(value) for value in whole.tolist()]
+    head = [int(value) for value in whole.tolist()] + values[WHOLE:STATE_HEAD].tolist()
     of_axes = values[STATE_HEAD:-1].reshape(axes, len(AXIS_STATE)).T
-    names = [field.name for field in attrs.fields(BlockState)]
-    fields = dict(zip(names, (*counts, *values[WHOLE:STATE_HEAD].tolist(), *of_axes), strict=True))
-    return BlockState(**fields | {"off_nominal": bool(fields["off_nominal"])})
-
-
-def _in_range(whole: Array) -> bool:
-    return bool((whole >= 0.0).all() and (whole <= MOST).all() and whole[1] < len(PHASES))
+    names = (*_FIRST, *kind.HEAD, "kind", "position", "velocity", "acceleration", *kind.OF_AXIS)
+    fields = dict(zip(names, (*head, *of_axes), strict=True))
+    fields.pop("", None)
+    return kind(**fields)

@@ -77,6 +77,7 @@ class S7Link:
     def __init__(self, access: S7Access, table: BlockTable) -> None:
         self._access, self._client = access, Client()
         self._axes, self._kind, self._name = table.constant("cAxes"), table.constant("cKind"), table.path.name
+        self._state = table.state
         try:
             self._connect()
         except LinkLostError as error:
@@ -122,7 +123,7 @@ class S7Link:
     def _require_block(self) -> None:
         """Find the block's state in the data block, before anything is written there."""
         for _ in range(READ_AGAIN):
-            if (state := read_state(self.state(), self._axes)) is not None:
+            if (state := read_state(self.state(), self._axes, self._state)) is not None:
                 break
         if state is None or state.kind != self._kind:
             raise DeploymentError(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from gen_profile.artefacts.manifest import SEAL, artefact_of, seal_of, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.bounded_file import DOCUMENT
+from gen_profile.deployment.block_state import BlockState, MotionState, PlannerState
 from gen_profile.errors import CheckFailed, ExportError, OutputError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.forms import block_in
@@ -68,6 +69,8 @@ class BlockTable:
         and of the values.
     """
 
+    state: ClassVar[type[BlockState]] = MotionState  # what the block shows of itself
+
     path: Path
     specs: tuple[Spec, ...]
     source: BlockSource
@@ -88,6 +91,11 @@ class BlockTable:
     def start(self) -> Array:
         """Where the axes begin, in their units, shape (axes,)."""
         return self.motions[0].start
+
+    @property
+    def axes(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each axis whose setpoints the block issues."""
+        return tuple((axis.name, axis.unit) for axis in self.spec.axis_scales())
 
     @cached_property
     def motions(self) -> tuple[PlaybackTable, ...]:
@@ -127,18 +135,18 @@ class BlockTable:
 class PlannerTable(BlockTable):
     """What a controller is to hold of a planner block: the numbers that it plans by."""
 
+    state = PlannerState
+
     @property
     def start(self) -> Array:
         """Where the axes begin that it plans, in m (or rad), shape (axes,)."""
         return np.array(self.spec.move.start)[list(planned_axes(self.spec))]
 
     @property
-    def motions(self) -> tuple[PlaybackTable, ...]:
-        """Give none: raises ExportError."""
-        raise ExportError(
-            f"{self.path}: a planner block plays no table that its setpoints could be held to; read bPromise "
-            "and nErrorId in the controller."
-        )
+    def axes(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each axis that it plans."""
+        machine = self.spec.machine()
+        return tuple((machine.actuated[n].name, machine.actuated[n].unit) for n in planned_axes(self.spec))
 
     def check(self, values: Array, progress: Progress) -> BlockJudgement:
         """Prove the block with other numbers, on as many histories as its manifest tells of."""

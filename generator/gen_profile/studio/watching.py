@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from gen_profile.deployment.block_state import PHASES, BlockState
+from gen_profile.deployment.block_state import BlockState
 from gen_profile.deployment.mailbox import MailboxLink
-from gen_profile.deployment.run_so_far import RunSoFar
 from gen_profile.deployment.table import BlockTable
-from gen_profile.deployment.watch import Watched, watch
+from gen_profile.deployment.watching.judge import Watched
+from gen_profile.deployment.watching.run_so_far import so_far
+from gen_profile.deployment.watching.watch import watch
 from gen_profile.motion.profile import Array
 
 MOST_POINTS = 500  # of a curve
@@ -29,7 +30,7 @@ class Watching:
     """
 
     def __init__(self, table: BlockTable, link: MailboxLink) -> None:
-        self._table, self._link, self._run = table, link, RunSoFar(table)
+        self._table, self._link, self._run = table, link, so_far(table)
         self._ended, self._thread = Event(), Thread(target=self._watch, daemon=True)
         self._now: dict[str, Any] = {}
         self._seen: Watched | None = None
@@ -43,27 +44,24 @@ class Watching:
         self._thread.join()
 
     def part(self) -> dict[str, Any]:
-        """Tell how the block stands, and its run so far beside its table's."""
+        """Tell how the block stands, and what it did so far beside what it was to do."""
         fault = None if self._seen is None else self._seen.fault
-        axes = self._table.spec.axis_scales()
-        cycles = self._run.planned.shape[1]
-        step = -(-cycles // MOST_POINTS)
-        times = self._table.spec.export.cycle_time * np.arange(cycles)
+        run = self._run
+        step = -(-len(run.times) // MOST_POINTS)
         return {
             "part": "watched",
             "of": "watch",
             "name": self._table.path.name,
             "faults": [] if fault is None else list(fault.sentences),
-            "duration": float(times[-1]),
-            "times": times[::step].tolist(),
+            "times": run.times[::step].tolist(),
             "axes": [
                 {
-                    "name": axis.name,
-                    "unit": axis.unit,
-                    "planned": [_points(row[:, column], step) for row in self._run.planned],
-                    "seen": [_points(row[:, column], step) for row in self._run.seen],
+                    "name": name,
+                    "unit": unit,
+                    "planned": [_points(row[:, column], step) for row in run.planned],
+                    "seen": [_points(row[:, column], step) for row in run.seen],
                 }
-                for column, axis in enumerate(axes)
+                for column, (name, unit) in enumerate(self._table.axes)
             ],
             **self._now,
         }
@@ -76,17 +74,12 @@ class Watching:
             raise KeyboardInterrupt  # which is how a watch ends
 
     def _take(self, state: BlockState, at: float, _events: str) -> None:
-        place = self._run.take(state)
         self._now = {
             "seconds": at,
-            "phase": PHASES[state.phase],
+            "phase": state.phase_name,
             "error": state.error,
-            "changed": state.off_nominal,
-            "runs": state.runs,
-            "motion": state.motion if len(self._table.motions) > 1 else None,
-            "time": place * self._table.spec.export.cycle_time,
-            "rate": state.rate,
             "setpoints": state.setpoints.T.tolist(),
+            **self._run.take(state),
         }
 
 

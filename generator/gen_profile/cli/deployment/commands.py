@@ -40,7 +40,9 @@ if TYPE_CHECKING:
 @click.argument("artefact", type=PathType())
 @controller_options(required=True)
 @click.option("--verify", is_flag=True, help="Only tell whether the controller uses this table.")
-@click.option("--watch", is_flag=True, help="Verify, then hold every setpoint to the table until Ctrl-C.")
+@click.option(
+    "--watch", is_flag=True, help="Verify, then hold every setpoint to what was proved until Ctrl-C."
+)
 @click.option("--for", "seconds", type=click.FloatRange(min=0.1), metavar="SECONDS", help="Watch so long.")
 @click.option(
     "--log", metavar="CSV", type=OutputFile(), help="Write what is watched, a row for each cycle seen."
@@ -143,9 +145,9 @@ def verified(
 
 
 def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None, as_json: bool) -> None:
-    """Hold what the block issues to the table, and end with what is not as proved."""
+    """Hold what the block issues to what was proved, and end with what differs."""
     from gen_profile.cli.deployment.watching import reporting, words
-    from gen_profile.deployment.watch import watch
+    from gen_profile.deployment.watching.watch import watch
 
     with ExitStack() as stack:
         with progress() as tell:
@@ -155,7 +157,7 @@ def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | No
         with reporting(table, log) as report:
             watched = watch(table, link, report, seconds=seconds)
     document = {"action": "watched", "controller": link.server, **table.hashes, **watched.to_dict()}
-    print_outcome(document, words(watched, artefact), as_json)
+    print_outcome(document, words(watched, table), as_json)
     if watched.fault is not None:
         click.echo(f"Error: {watched.fault}", err=True)
         raise SystemExit(watched.fault.exit_code)

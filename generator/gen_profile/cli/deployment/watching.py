@@ -12,17 +12,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
-from gen_profile.deployment.block_state import MOVING, PHASES, BlockState
-from gen_profile.deployment.run_so_far import RunSoFar
-from gen_profile.deployment.watch import Watched
+from gen_profile.deployment.block_state import (
+    AT_VELOCITY,
+    MOVING,
+    TO_POSITION,
+    BlockState,
+    MotionState,
+    PlannerState,
+)
+from gen_profile.deployment.table import PlannerTable
+from gen_profile.deployment.watching.judge import Watched
+from gen_profile.deployment.watching.run_so_far import so_far
 from gen_profile.errors import OutputError
+from gen_profile.planner.interface import LOST
 
 if TYPE_CHECKING:
     from rich.console import Group
 
     from gen_profile.deployment.table import BlockTable
-    from gen_profile.deployment.watch import Report
+    from gen_profile.deployment.watching.watch import Report
 
 HEIGHT, MARGIN = 6, 12  # lines of an axis's picture, and columns beside it
 REDRAWN = 0.1  # s between two pictures
@@ -30,20 +40,25 @@ IDLE_PERIOD = 1.0  # s between two rows of a log while nothing moves
 SUFFIXES = {"position": "", "velocity": "_per_s", "acceleration": "_per_s2"}
 
 
-def words(watched: Watched, artefact: Path) -> str:
+def words(watched: Watched, table: BlockTable) -> str:
     """Say what was seen."""
+    planner = isinstance(table, PlannerTable)
     exact = watched.exact == watched.moving
     rounding = " bit for bit" if exact else f", {watched.exact} bit for bit, the others but for last digits"
+    if not watched.moving:
+        moving = "no motion in them"
+    elif planner:
+        moving = f"in {watched.moving} of them a motion, within all limits"
+    else:
+        moving = f"in {watched.moving} of them a motion's setpoints, all the table's{rounding}"
     parts = [
-        f"{artefact} watched for {watched.seconds:.1f} s: {watched.states} of {watched.cycles} cycles read",
-        f"in {watched.moving} of them a motion's setpoints, all the table's{rounding}"
-        if watched.moving
-        else "no motion in them",
-        f"motions begun: {watched.runs}, arrived: {watched.completed}",
+        f"{table.path} watched for {watched.seconds:.1f} s: {watched.states} of {watched.cycles} cycles read",
+        moving,
+        f"motions begun: {watched.runs}, {'targets reached' if planner else 'arrived'}: {watched.completed}",
     ]
     notes = {
-        "with changed timing": watched.off_nominal,
-        "starts refused": watched.refused,
+        "promises withdrawn" if planner else "with changed timing": watched.off_nominal,
+        "errors" if planner else "starts refused": watched.refused,
         "connections taken up again": watched.lost,
     }
     return "; ".join([*parts, *(f"{what}: {count}" for what, count in notes.items() if count)]) + "."
@@ -79,35 +94,44 @@ def _events_on_stderr(_state: BlockState, at: float, events: str) -> None:
 
 @contextmanager
 def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
-    axes = table.spec.axis_scales()
+    planner = isinstance(table, PlannerTable)
+    commanded = {"target": "", "speed": "_per_s"} if planner else {}
     columns = [
-        f"{axis.name}_{quantity}_{axis.unit}{suffix}"
-        for axis in axes
-        for quantity, suffix in SUFFIXES.items()
+        f"{name}_{quantity}_{unit}{suffix}"
+        for name, unit in table.axes
+        for quantity, suffix in (SUFFIXES | commanded).items()
     ]
+    own = ("promise", "command", "time_to_go_s") if planner else ("off_nominal", "place_cycles", "rate")
     began, last = datetime.now(UTC), -IDLE_PERIOD
     try:
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(
-                ["time_s", "call", "phase", "error", "off_nominal", "place_cycles", "rate", *columns, "event"]
-            )
+            writer.writerow(["time_s", "call", "phase", "error", *own, *columns, "event"])
 
             def report(state: BlockState, at: float, events: str) -> None:
                 nonlocal last
-                if state.phase != MOVING and not events and at - last < IDLE_PERIOD:
+                if not _moves(state) and not events and at - last < IDLE_PERIOD:
                     return
                 if last < 0.0:
                     events = "; ".join(filter(None, (f"began {began.isoformat(timespec='seconds')}", events)))
                 last = at
-                row: list[Any] = [f"{at:.3f}", state.calls, PHASES[state.phase], state.error]
-                row += [int(state.off_nominal), repr(state.place), repr(state.rate)]
-                writer.writerow([*row, *map(repr, state.setpoints.T.ravel().tolist()), events])
+                row: list[Any] = [f"{at:.3f}", state.calls, state.phase_name, state.error]
+                values = state.setpoints
+                if isinstance(state, PlannerState):
+                    row += [state.promise, state.command, repr(state.time_to_go)]
+                    values = np.vstack((values, state.target, state.speed))
+                elif isinstance(state, MotionState):
+                    row += [int(state.off_nominal), repr(state.place), repr(state.rate)]
+                writer.writerow([*row, *map(repr, values.T.ravel().tolist()), events])
                 file.flush()
 
             yield report
     except OSError as error:
         raise OutputError(f"{path}: cannot be written on: {error.strerror}.") from error
+
+
+def _moves(state: BlockState) -> bool:
+    return state.phase == MOVING or bool((state.velocity != 0.0).any())
 
 
 @contextmanager
@@ -116,7 +140,7 @@ def _on_terminal(table: BlockTable) -> Iterator[Report]:
     from rich.live import Live
 
     console = Console(stderr=True)
-    draw = _picture(table)
+    draw = picture(table)
     drawn = -REDRAWN
     with Live(console=console, auto_refresh=False, refresh_per_second=1 / REDRAWN) as live:
 
@@ -132,29 +156,38 @@ def _on_terminal(table: BlockTable) -> Iterator[Report]:
         yield report
 
 
-def _picture(table: BlockTable) -> Callable[[BlockState, float, int], Group]:
-    """Give what draws a state: a line of figures, and for each axis its way so far over the table's."""
+def picture(table: BlockTable) -> Callable[[BlockState, float, int], Group]:
+    """Give what draws a state: a line of figures, and each axis's way so far over what it was to be."""
     from rich.console import Group
     from rich.text import Text
 
     from gen_profile.streaming.live_terminal import curves
 
-    axes, run, period = table.spec.axis_scales(), RunSoFar(table), table.spec.export.cycle_time
+    run = so_far(table)
 
     def draw(state: BlockState, at: float, width: int) -> Group:
-        place = run.take(state)
-        planned, seen = run.planned[0], run.seen[0]
-        head = f"{at:.1f} s  {PHASES[state.phase]}, {place * period:.2f} of {(len(seen) - 1) * period:.2f} s"
-        head += f", rate {state.rate:.3g}" * (state.phase == MOVING)
-        head += f", error {state.error}" * bool(state.error) + ", timing changed" * state.off_nominal
-        parts = [Text(head)]
-        for column, axis in enumerate(axes):
+        head = f"{at:.1f} s  {state.phase_name}{_head(run.take(state))}"
+        parts = [Text(head + f", error {state.error}" * bool(state.error))]
+        for column, (name, unit) in enumerate(table.axes):
             figures = [f"{value[column]:.6g}" for value in state.setpoints]
-            unit = axis.unit
-            parts.append(
-                Text(f"{axis.name}: {figures[0]} {unit}, {figures[1]} {unit}/s, {figures[2]} {unit}/s²")
+            parts.append(Text(f"{name}: {figures[0]} {unit}, {figures[1]} {unit}/s, {figures[2]} {unit}/s²"))
+            parts += curves(
+                run.planned[0, :, column], run.seen[0, :, column], max(10, width - MARGIN), HEIGHT
             )
-            parts += curves(planned[:, column], seen[:, column], max(10, width - MARGIN), HEIGHT)
         return Group(*parts)
 
     return draw
+
+
+def _head(figures: dict[str, Any]) -> str:
+    """Put the figures beside the picture of a motion, or of a planner block, into words."""
+    if "rate" in figures:
+        head = f", {figures['time']:.2f} of {figures['duration']:.2f} s, rate {figures['rate']:.3g}"
+        return f"{head}, timing changed" if figures["changed"] else head
+    commanded = ", ".join(f"{value:.6g}" for value in figures["commanded"])
+    head = {TO_POSITION: f", to {commanded}", AT_VELOCITY: f", stick at {commanded}"}.get(
+        figures["command"], ""
+    )
+    if figures["to_go"] > 0.0:
+        head += f", {figures['to_go']:.1f} s to go"
+    return head + (f"; the load may sway, because {why}" if (why := LOST.get(figures["promise"])) else "")

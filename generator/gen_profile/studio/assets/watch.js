@@ -27,11 +27,20 @@ const watched = (() => {
     $("unproved").replaceChildren(...faults.map((one) => element("p", {}, page.phrase(one))));
     if (!phase) return;
     const seconds = (value) => `${numbers.local(value.toFixed(2))} s`;
-    const rows = [
-      ["watch.phase", [page.phrase(`watch.${phase}`), part.error ? `nErrorId ${part.error}` : "", part.changed ? page.phrase("watch.changed") : ""].filter(Boolean).join(", ")],
+    const planner = "promise" in part;
+    const ofMotion = () => [
       ["watch.runs", [part.runs, part.motion === null ? "" : `nProfile ${part.motion}`].filter(String).join(", ")],
       ["watch.time", `${numbers.local(part.time.toFixed(2))} / ${seconds(part.duration)}`],
       ["watch.rate", numbers.local(part.rate.toFixed(2))],
+    ];
+    const ofPlanner = () => [
+      ["watch.command", [page.phrase(`watch.command.${part.command}`), ...(part.command ? [part.commanded.map(numbers.short).join("; ")] : [])].join(" ")],
+      ["watch.to_go", seconds(part.to_go)],
+      ["watch.promise", page.phrase(`watch.promise.${part.promise}`)],
+    ];
+    const rows = [
+      ["watch.phase", [page.phrase(`watch.${phase}`), part.error ? `nErrorId ${part.error}` : "", part.changed ? page.phrase("watch.changed") : ""].filter(Boolean).join(", ")],
+      ...(planner ? ofPlanner() : ofMotion()),
     ].map(([key, value]) => [page.phrase(key), value]);
     const named = (name, order) => `${page.phrase(name)}: ${page.phrase(["position", "velocity", "acceleration"][order])}`;
     for (const [axis, { name, unit }] of axes.entries()) {
@@ -41,7 +50,7 @@ const watched = (() => {
     const panels = [0, 1].flatMap((order) => axes.map(({ name, unit, planned, seen }) => ({
       title: named(name, order), x_label: page.phrase("drive.time"), y_label: `${unit}${order ? "/s" : ""}`, x: part.times, levels: [], bands: [],
       curves: [
-        { name: "watch.table", colour: "ghost", dash: "dash", width: 1.2, y: planned[order] },
+        { name: planner ? "watch.commanded" : "watch.table", colour: "ghost", dash: "dash", width: 1.2, y: planned[order] },
         { name: "watch.controller", colour: "#0072b2", dash: "solid", width: 2.4, y: seen[order], spans: true },
       ],
     })));
