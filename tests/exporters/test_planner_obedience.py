@@ -68,6 +68,14 @@ def test_a_stop_while_turning_round_passes_no_end_that_was_stated(text):
     assert not last(driver, "bBusy")
 
 
+@pytest.mark.parametrize(("away", "back"), [(2.0, 0.8), (3.0, 1.2), (4.0, 0.8)])
+def test_a_stop_comes_soon_where_the_axis_is_to_turn_round_anyway(text, away, back):
+    """It took 13 to 15 s, as the stop was sought that ends farthest ahead of where the motion would end."""
+    driver = standing(text, 17.0, fL1=6.0, fm2=2000.0)
+    driver.hold(away, bExecute=1, fTarget=2.0).hold(back, bExecute=1, fTarget=19.0).hold(9.0, bStop=1)
+    assert (last(driver, "bBusy"), last(driver, "fVelocity")) == (0, 0.0)
+
+
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", ["text", "hoisting"])
 def test_no_stop_passes_the_ends_that_were_stated(request, kind, seed):
@@ -406,6 +414,17 @@ class TestZones:
         assert stopped.error_id[-1] == 8
         assert stopped.outputs["bCommandAborted"][-1]
         assert (stopped.velocity[-1], stopped.position[-1] <= 20.0) == (0.0, True)
+
+    @pytest.mark.parametrize("gap", [1.0, 2.0])
+    def test_a_stick_back_through_a_slow_one_first_stops_what_leads_away(self, gap):
+        """No plan to its velocity passes there; the axis led away for 8.9 s, by up to 5 m."""
+        planner = gp.Planner(ZONED, position=16.0)
+        planner.hold(2.0)
+        planner.restrict(slow=[(13.0 - gap, 16.0 - gap, 0.2)])
+        place = planner.hold(2.0, target=35.0).position[-1]
+        back = planner.hold(7.0, velocity=-1.0)
+        assert back.position.max() < place + 3.0
+        assert back.velocity[-1] < 0.0
 
     def test_a_stick_that_changes_while_it_slows_down_goes_no_faster(self, planner):
         """It held 0.8 m/s, as what was committed was too fast anyway."""

@@ -15,6 +15,8 @@ FORMER = {  # machine: how many are drawn, seed, number
         (400, 12, 237),  # error 8, where a plan began beside a blocked interval
         (400, 7, 167),  # 19 mm beyond the stated ends of a stop
         (300, 12, 23),  # judged by the rope of its beginning, while it planned for another one
+        (200, 2, 134),  # a stop 0.1 s late, sought along the motion of an axis that turns round
+        (200, 4, 4),  # no fault: judged by the time that it was in a slow interval, too
     ],
     "slow": [
         (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
@@ -22,6 +24,8 @@ FORMER = {  # machine: how many are drawn, seed, number
         (300, 5, 39),  # fTimeToGo half of what it took pulses to turn round
         (225, 5, 64),  # a rope that came with a command, as that of before was being taken over: 7 mm left
         (225, 5, 125),  # 2.6 s late, as from rest a plan for the target before led away from the new one
+        (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
+        (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded

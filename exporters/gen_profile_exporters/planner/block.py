@@ -84,6 +84,7 @@ RESERVE = 0.1  # share of the limits that only calming takes up, where live para
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
 AXIS_LOOP = re.compile(r"(?ms)^( *)FOR (\w+) := 0 TO cAxes - 1 DO[^\n]*\n(.*?)^\1END_FOR;[^\n]*\n")
+FIRST = re.compile(r"\b0(?: \* c\w+)+( \+ )?")  # of the first axis: how many of something there are before
 WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")
@@ -209,11 +210,12 @@ def _parts() -> dict[str, str]:
 
 
 def _without_loops(text: str) -> str:
-    """Take the loops over axes away where there is one axis."""
+    """Take the loops over axes away where there is one axis, of number 0."""
 
     def once(loop: re.Match[str]) -> str:
-        margin, counter, body = loop.groups()
-        return f"{margin}{counter} := 0;\n" + re.sub("(?m)^ {4}", "", _without_loops(body))
+        _, counter, body = loop.groups()
+        body = re.sub("(?m)^ {4}", "", re.sub(rf"\b{counter}\b", "0", _without_loops(body)))
+        return FIRST.sub(lambda found: "" if found[1] else "0", body.replace("(0 + 1) * ", ""))
 
     return AXIS_LOOP.sub(once, text)
 

@@ -30,7 +30,7 @@ from gen_profile.proof.followed import (
     runs_of,
     slowing,
 )
-from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
+from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
 from gen_profile.proof.statements import (
     blocked,
     events,
@@ -149,7 +149,7 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if (end - begin) * followed.cycle < FROM_REST * followed.period or followed.gives_up(end):
             continue  # it was replaced before, or that is a fault of its own
         place, before = motion.position[:, begin], motion.velocity[:, begin]
-        own = slice(begin, end)
+        own, since = slice(begin, end), begin
         match order.kind:
             case "position":
                 if not min(order.tops) > 0.0:
@@ -160,17 +160,16 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 tops = [(1.0 - followed.reserve) * top for top in order.tops]
                 wanted = [min(max(w, -top), top) for w, top in zip(order.values, tops, strict=True)]
                 allowed = reaching(followed, before, wanted)
-                there = np.ones(end - begin, dtype=bool)
-                for k, w in enumerate(wanted):
-                    there &= _near(followed, motion, k, w, own)
+                reached = [_reached(followed, motion, k, w, own) for k, w in enumerate(wanted)]
+                first, since = max(reached, key=lambda one: one[0] - one[1])
+                there = np.arange(begin, end) >= first
             case "stop":
                 allowed = slowing(followed, before, TO_STOP)
                 there = motion.stands[own] | followed.sensed("bDamping")[own]
             case _:
                 continue
-        latest = begin + followed.after(allowed)
+        latest = since + followed.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
-        since = begin
         if order.kind == POSITION:  # it counts from when the way was last damped
             until = min(first, latest + followed.after(followed.settle))
             since += int(np.flatnonzero(followed.sensed("bDamping")[begin:until]).max(initial=0))
@@ -208,27 +207,27 @@ def _left(
             yield Allowance("left", first + begin, float(away[begin:end].max()), EXACT)
 
 
-def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice) -> Flags:
-    """Whether an axis has a velocity, or is near the end of its way or a slow interval."""
-    limits = followed.limits[axis]
-    reached = (
-        np.abs(motion.velocity[axis, own] - wanted)
-        <= IN_VELOCITY * limits.velocity + followed.reserve * limits.velocity
-    )
-    if not wanted or reached[-1]:
-        return reached
-    position, speed = motion.position[axis, own], abs(wanted)
+def _reached(
+    followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice
+) -> tuple[int, int]:
+    """Tell from when an axis has a velocity, and until when its way's end or a slow interval hindered it."""
+    limits, speed = followed.limits[axis], abs(wanted)
+    position, velocity = motion.position[axis, own], motion.velocity[axis, own]
+    reached = np.abs(velocity - wanted) <= (IN_VELOCITY + followed.reserve) * limits.velocity
+    first = int(np.argmax(reached)) if reached.any() else len(reached)
     near = speed * (speed / limits.acceleration + limits.acceleration / limits.jerk + AHEAD * followed.period)
-    reached |= followed.room(axis, position, np.array(wanted)) <= near
+    hindered = (speed > 0.0) & (followed.room(axis, position, np.array(wanted)) <= near)
     for zone in followed.zones:
         if zone.axis == axis and 0.0 < zone.limit < speed:
-            reached |= np.maximum(zone.low - position, position - zone.high) <= near
-    return reached
+            hindered |= np.maximum(zone.low - position, position - zone.high) <= near
+    return own.start + first, own.start + int(np.flatnonzero(hindered[:first]).max(initial=0))
 
 
 def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge that axes go never the wrong way, nor at rest, for longer than it takes to turn round."""
-    against, wants = np.zeros((2, followed.cycles), dtype=bool)
+    wants, held = np.zeros((2, followed.cycles), dtype=bool)
+    for order in followed.orders:
+        held[order.begin : order.end] = order.kind == DISABLED or not min(order.tops) > 0.0
     near = max(STILL, followed.wander)
     for k, (velocity, position, way, limits) in enumerate(
         zip(motion.velocity, motion.position, motion.way, followed.limits, strict=True)
@@ -238,14 +237,12 @@ def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]
         there = np.where(
             motion.goes, np.abs(way) > near, room * (way != 0.0) > 0.1 * followed.period * np.abs(way)
         )
-        against |= (velocity * np.sign(way) < -slack) & (there | ~motion.goes)
-        wants |= there
-    for order in followed.orders:
-        if order.kind == DISABLED or not min(order.tops) > 0.0:
-            against[order.begin : order.end] = wants[order.begin : order.end] = False
-    for begin, end in runs_of(against):
-        allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
-        yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
+        wants |= there & ~held
+        for side in (-1.0, 1.0):  # one command after the other may be of the other side, sooner than it turns
+            against = (side * way > 0.0) & (side * velocity < -slack) & (there | ~motion.goes) & ~held
+            for begin, end in runs_of(against):
+                allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
+                yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in runs_of(wants & motion.stands):
         allowed = followed.reaction + ENABLED + calmed(followed) * followed.period
         if followed.gives_up(end):

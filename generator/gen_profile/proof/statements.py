@@ -288,11 +288,13 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
 
 def _within_travel(followed: Followed, motion: IssuedMotion, own: slice) -> Iterator[Allowance]:
     """Measure how far stated ends of a stop lie beyond the travel, and axes beyond the targets' range."""
-    low, high = followed.of("fStopLow")[:, own], followed.of("fStopHigh")[:, own]
-    for k, limits in enumerate(followed.limits):
+    since = slice(max(0, own.start - 1), own.stop)
+    for k, (low, high, limits) in enumerate(
+        zip(followed.of("fStopLow"), followed.of("fStopHigh"), followed.limits, strict=True)
+    ):
         first, last = limits.targets[0] - limits.margin, limits.targets[1] + limits.margin
-        place = motion.position[k, own]
-        beyond = np.maximum(first - low[k], high[k] - last) * (first <= place[0] <= last)
+        place, beyond = motion.position[k, own], np.maximum(first - low, high - last)[since]
+        beyond *= beyond[0] <= EXACT  # else it is on its way back from there
         yield from greatest("loose", beyond, EXACT, own.start)
         first, last = limits.targets
         damps = followed.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
