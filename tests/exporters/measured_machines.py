@@ -1,7 +1,8 @@
 """Machines as independent judges of damping by a sensor; nothing is shared with the block.
 
-A bay crane: two masses on two rods, in absolute angles, by Lagrange's equations of the places x − L1 sin a
-and x − L1 sin a − L2 sin b. An arm on a torsion spring. Liquid in a tank, by two of its modes.
+A gantry: a mass on a rod, by Newton's law in Cartesian coordinates. A bay crane: two masses on two rods, in
+absolute angles, by Lagrange's equations of the places x − L1 sin a and x − L1 sin a − L2 sin b. An arm on a
+torsion spring. Liquid in a tank, by two of its modes.
 """
 
 from math import cos, pi, sin, tanh
@@ -145,3 +146,43 @@ class MeasuredTank(MeasuredMachine):
                 for angle, rate, length, lost in zip(angles, rates, self.lengths, loss, strict=True)
             ),
         )
+
+
+class MeasuredGantry:
+    """A load on a rod below a trolley that moves in x and y; measured are the two angles of its joint."""
+
+    def __init__(self, block, length, *, swing, cycle):
+        """`swing`: m in x and y, from which it is let go."""
+        self.block, self.length, self.cycle = block, length, cycle
+        below = -((length**2 - swing[0] ** 2 - swing[1] ** 2) ** 0.5)
+        self.place, self.speed = np.array([-swing[0], -swing[1], below]), np.zeros(3)
+        self.velocity, self.gust = np.zeros(2), np.zeros(2)
+        self.inputs, self.rows = dict(block.inputs), []
+
+    def shows(self):
+        x, y, z = -self.place
+        return {"x": np.arctan2(x, z), "y": np.arcsin(y / self.length)}
+
+    def run(self, seconds, sensor=lambda axis, value: value, **inputs):
+        """Let time pass; `sensor`: axis and true value → what is said."""
+        self.inputs |= inputs
+        for _ in range(round(seconds / self.cycle)):
+            for axis, value in self.shows().items():
+                self.inputs |= {f"fSensor_{axis}": sensor(axis, value), f"bSensorValid_{axis}": 1.0}
+            self.block.inputs |= self.inputs
+            told = {name: float(values[0]) for name, values in self.block.play_on(1).items()}
+            velocity = np.array([told["fVelocity_x"], told["fVelocity_y"]])
+            felt = np.array([*(self.velocity - velocity) / self.cycle - self.gust, -G])
+            self.velocity, steps = velocity, 4
+            for _ in range(steps):  # Störmer-Verlet, back on the sphere and its tangent each time
+                h = self.cycle / steps
+                self.speed = self.speed + h * (felt + self._pull(felt) * self.place)
+                self.place = self.place + h * self.speed
+                self.place *= self.length / np.linalg.norm(self.place)
+                self.speed -= self.place * (self.speed @ self.place) / self.length**2
+            self.rows.append(told | {"sway_x": -self.place[0], "sway_y": -self.place[1]})
+        return {name: np.array([row[name] for row in self.rows]) for name in self.rows[0]}
+
+    def _pull(self, felt):
+        """Of the rod, by the load's mass and the rod's vector."""
+        return -(self.speed @ self.speed + felt @ self.place) / self.length**2

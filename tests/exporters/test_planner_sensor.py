@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
-from exporters.measured_machines import MeasuredCrane, MeasuredJoint, MeasuredTank
+from exporters.measured_machines import MeasuredCrane, MeasuredGantry, MeasuredJoint, MeasuredTank
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.design import planner_block
@@ -334,10 +334,74 @@ def test_what_cannot_be_served_is_refused_in_a_sentence(name):
         planner_block(preset_spec("bay-crane", [*MEASURED, *changes]))
 
 
-def test_a_sensor_needs_a_disturbance_and_one_axis():
+def test_a_sensor_needs_a_disturbance():
     with pytest.raises(SpecError, match=r"planner\.disturbance: required by planner.sensor"):
         preset_spec("bay-crane", [LIVE, SENSOR])
-    limits = "limits={velocity=1.0, acceleration=0.3, jerk=1.0, travel=[0.0, 40.0]}"
-    changes = [SENSOR.replace("theta1", "theta_x"), SWING.replace("payload", "payload-x"), limits]
-    with pytest.raises(SpecError, match="more directions"):
-        planner_block(preset_spec("gantry-crane", changes))
+
+
+GANTRY = [
+    "limits={velocity=1.0, acceleration=0.3, jerk=1.0, travel=[0.0, 40.0]}",
+    'planner.sensor={quantity="angle", of=["theta_x", "theta_y"], noise=0.0005}',
+    "planner.disturbance={swing={payload-x=0.5, payload-y=0.5}, settle=15.0}",
+    "plant.L=3.0",  # a fast swing beside its jerk, which keeps great pulses from being followed by others
+    "export.cycle_time=0.02",
+    "planner.operations=50000",
+]
+
+
+def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails():
+    compiled = compile_counting(planner_block(preset_spec("gantry-crane", GANTRY)).text)
+    gantry, random = MeasuredGantry(CountedBlock(compiled), 3.0, swing=(0.45, -0.3), cycle=0.02), np.random
+    gantry.inputs |= {"bEnable": 1.0, "fActPosition_x": 20.0, "fActPosition_y": 10.0}
+
+    def noisy(axis, value):
+        return value + 0.0005 * random.default_rng(len(gantry.rows)).standard_normal()
+
+    issued = gantry.run(14.0, noisy)
+    for axis in "xy":
+        assert np.abs(issued[f"sway_{axis}"][-250:]).max() < ALLOWED
+        assert np.abs(issued[f"fSwayEstimated_{axis}"] - issued[f"sway_{axis}"])[-250:].max() < 0.01
+        assert np.abs(issued[f"fAcceleration_{axis}"]).max() <= 0.3 * (1.0 + ROUNDING)
+        assert np.abs(np.diff(issued[f"fAcceleration_{axis}"])).max() <= 0.02 * (1.0 + ROUNDING)
+        assert not issued[f"nSensorFault_{axis}"].any()
+    assert issued["bPromise"][-1]
+    gantry.gust = np.array([0.15, 0.0])
+    gantry.run(1.5, noisy)
+    gantry.gust = np.zeros(2)
+    issued = gantry.run(12.0, lambda axis, value: np.nan if axis == "y" else noisy(axis, value))
+    assert np.abs(issued["sway_x"][-700:-400]).max() > 1.5 * ALLOWED
+    assert np.abs(issued["sway_x"][-250:]).max() < 0.5 * ALLOWED
+    assert issued["nSensorFault_y"][-1] == 2.0 and not issued["nSensorFault_x"].any()
+    assert not issued["bPromise"][-1]
+
+
+GANTRIES_REFUSED = {
+    "twice": ("gantry-crane", ['planner.sensor.of=["theta_x", "theta_x"]'], "along the same axis; name one"),
+    "none": (
+        "gantry-crane",
+        ["planner.sensor.of=[]"],
+        "planner.sensor.of: must name a coordinate that swings",
+    ),
+    "unknown": ("gantry-crane", ['planner.sensor.of=["theta_x", "y"]'], "of: no coordinate that swings"),
+    "swing": (
+        "gantry-crane",
+        ["planner.disturbance.swing={payload-x=0.5}"],
+        "must name a load that theta_y shows; state it for payload-y",
+    ),
+    "curved": (
+        "tower-crane",
+        [
+            'planner.sensor={quantity="angle", of="theta_r", noise=0.001}',
+            "planner.disturbance={swing={payload-radial=0.5}, settle=15.0}",
+        ],
+        "axes that lead straight",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GANTRIES_REFUSED)
+def test_what_several_sensors_cannot_do_is_refused_in_a_sentence(name):
+    machine, changes, words = GANTRIES_REFUSED[name]
+    shared = GANTRY[:1] if machine == "tower-crane" else GANTRY
+    with pytest.raises(SpecError, match=words):
+        planner_block(preset_spec(machine, [*shared, *changes]))

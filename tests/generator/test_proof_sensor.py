@@ -65,7 +65,7 @@ def test_a_gust_pushes_as_its_acceleration_says(spec):
     drawn = (histories.history(choices) for choices in Numbering.of(histories, 60, 0).drawn)
     one = next(h.sensed for h in drawn if h.sensed is not None and h.sensed.gusts)
     times = np.arange(0.0, one.ends + 2.0, 1e-3)
-    pushed = np.diff(one.pushed(times), 2) / 1e-6
+    pushed = np.diff(one.pushed(times)[:, 0], 2) / 1e-6
     due = sum(
         gust.acceleration * np.sin(np.pi * np.clip((times[1:-1] - gust.time) / gust.lasts, 0.0, 1.0))
         for gust in one.gusts
@@ -108,7 +108,7 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     assert "the payload is damped to check.residual_sway later than allowed by 0.976 s" in late
     (alarm,) = faults(sound, *followed(0.0, fault=5.0))
     assert "nSensorFault 5" in alarm
-    gusty = attrs.evolve(sound, gusts=(Gust(time=2.0, lasts=1.0, acceleration=0.1),))
+    gusty = attrs.evolve(sound, gusts=(Gust(time=2.0, lasts=1.0, acceleration=0.1, along=(1.0,)),))
     assert not faults(gusty, *followed(0.2 * (times < 14.0)))
     silent = attrs.evolve(sound, fault="silent", fails=3.0)
     assert "not noticed" in faults(silent, *followed(0.0))[0]
@@ -197,7 +197,7 @@ def test_python_and_play_give_it_what_the_sensor_shows(text, spec):
         f"{0.02 * k:.2f},{0.05 * np.cos(1.16 * 0.02 * k):.4f}\n" for k in range(200)
     )
     with pytest.raises(SpecError, match=r"sensor: the block has none; state planner\.sensor"):
-        read_sensor_log(log, {})
+        read_sensor_log(log, [])
     issued = play(text, "time_s,command,value\n0.0,stop,\n", sensor_text=log)
     head, *rows = issued.table.splitlines()
     damping = head.split(",").index("damping")
@@ -205,3 +205,53 @@ def test_python_and_play_give_it_what_the_sensor_shows(text, spec):
     for wrong, words in (("time,value\n0,0\n", "no column time_s"), ("time_s,value\n0,x\n", "line 2")):
         with pytest.raises(SpecError, match=words):
             play(text, "time_s,command,value\n0.0,stop,\n", sensor_text=wrong)
+
+
+GANTRY = [
+    "limits={velocity=1.0, acceleration=0.4, jerk=2.0, travel=[0.0, 20.0]}",
+    'planner.sensor={quantity="angle", of=["theta_x", "theta_y"], noise=0.002, offset=0.005}',
+    "planner.sensor.delay=[0.05, 0.15]",
+    "planner.disturbance={swing={payload-x=0.5, payload-y=0.5}, settle=15.0}",
+    "planner.disturbance.gust={acceleration=0.1, longest=5.0}",
+    *("planner.live={L=[3.0, 9.0]}", "export.cycle_time=0.01", "robustness.uncertain={L=0.05}"),
+]
+
+
+@pytest.fixture(scope="module")
+def gantry():
+    return preset_spec("gantry-crane", GANTRY)
+
+
+@pytest.mark.slow
+def test_sensors_of_a_gantry_are_given_by_axis(gantry):
+    planner = Planner(gantry, position=[10.0, 10.0])
+    shown = np.stack([0.05 * np.cos(1.4 * 0.01 * np.arange(600)), np.zeros(600)], axis=1)
+    issued = planner.hold(6.0, sensor=shown).outputs
+    assert issued["bSensorUsed_x"][-1] and issued["bSensorUsed_y"][-1] and issued["bDamping"].any()
+    assert np.ptp(issued["fPosition_x"]) > 0.05 > 0.0 == np.ptp(issued["fPosition_y"])
+    with pytest.raises(SpecError, match=r"sensor: must be a number for each axis \(x, y\)"):
+        planner.step(sensor=0.0)
+    axes = planner_block(gantry).text, "time_s,command,value_x,value_y\n0.0,stop,,\n"
+    rows = "".join(f"{0.1 * k:.1f},{0.001 * k},{-0.002 * k}\n" for k in range(20))
+    head, *issued = play(*axes, sensor_text="time_s,value_x,value_y\n" + rows).table.splitlines()
+    x, y = (head.split(",").index(f"{axis}_sway_estimated_m") for axis in "xy")
+    last = [float(cell) if "." in cell else 0.0 for cell in issued[180].split(",")]
+    assert last[x] > 0.02 and last[y] < -0.04
+    with pytest.raises(SpecError, match="no column value_y; the first line must be time_s,value_x,value_y"):
+        play(*axes, sensor_text="time_s,value_x\n0.0,0.0\n")
+
+
+@pytest.mark.slow
+def test_a_gantry_with_two_sensors_passes_its_proof(gantry):
+    proof = prove(gantry, planner_block(gantry).text, histories=12, workers=2)
+    assert proof.passed, proof.reasons()
+    assert proof.apart <= 1e-9  # FMPy pushes both axes alike
+    drawn = map(Histories.of(gantry).history, Numbering.of(Histories.of(gantry), 60, 0).drawn)
+    sensed = [one.sensed for one in drawn if one.sensed]
+    assert {one.failing for one in sensed if one.fault} == {0, 1}
+    assert any(min(map(abs, gust.along)) > 0.1 for one in sensed for gust in one.gusts)
+    one = worst_damped(proof)
+    figures = damping_figures(
+        gantry, proof, trace(gantry, planner_block(gantry).text, Histories.of(gantry), one.history)
+    )
+    assert [len(panel.lines) for panel in figures[0].panels] == [2, 2, 2, 1, 1]

@@ -270,7 +270,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "constants": _constants(c),
         **axis_words(c.axes),
         **axis_interface(c.axes),
-        **of_sensor.values(c.sensor),
+        **of_sensor.values(c.sensor, [axis.suffix for axis in c.axes]),
         **{f"last_{name}": str(length - 1) for name, length in _lengths(c).items()},
     }
 
@@ -302,7 +302,7 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "gain": axes * modes,
         "fine": axes * modes * _fine(c),
         "reach": axes * len(_reach_slots(c)),
-        **of_sensor.lengths(c.sensor, modes, c.cycle),
+        **of_sensor.lengths(c.sensor, modes, axes, c.cycle),
     }
 
 
@@ -358,7 +358,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         **of_search.whole(),
         "cColumnWork": _column_work(c),
         "cReaches": len(_reach_slots(c)),
-        **of_sensor.whole(c.sensor, modes, c.cycle),
+        **of_sensor.whole(c.sensor, modes, len(c.axes), c.cycle),
     }
 
 
@@ -422,9 +422,9 @@ def _longest_slot(c: PlannerConstants) -> int:
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 110 + 4 * c.modes * (4 * c.modes + 17)
-    axes = (120 + (following if c.rates else 0) + (23 * ZONES if c.zones else 0)) * len(c.axes)
-    finer, sensed = of_errors.cycle_work(_watched(c)), of_sensor.cycle_work(c.sensor, c.modes)
-    return axes - 35 + 15 * len(c.live) + finer + sensed
+    sensed = of_sensor.cycle_work(c.sensor, c.modes)
+    axes = (120 + sensed + (following if c.rates else 0) + (23 * ZONES if c.zones else 0)) * len(c.axes)
+    return axes - 35 + 15 * len(c.live) + of_errors.cycle_work(_watched(c))
 
 
 def _longest_kernel(c: PlannerConstants) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -14,22 +14,33 @@ from gen_profile_exporters.playback.structured_text import literal
 Array = NDArray[np.float64]
 
 LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
+LARGEST_PULSE = 4.0  # by what the greatest acceleration makes in a slot: a larger one keeps the next ones out
 KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
 NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
 CORRELATED = 0.15  # of what else may differ: a misreading where nothing differs otherwise for a period
 STEADY = 0.03  # share by which a live parameter may be another than planned with, while motions are judged
 MEMORY = 1.0  # slow periods, over which what it shows of the axis's own motions is
-ROWS_BEFORE = 4  # of the model by mode, where one axis is planned: frequency, decay, error and sway
+ROWS_BEFORE = 3  # of the model by mode: frequency, decay and error; then sway, axis by axis
+INPUTS = {"aSensor": "fSensor", "bNews": "bSensorValid", "aSensorAge": "fSensorAge"}  # by the arrays
+OUTPUTS = {
+    "fSwayEstimated": "aSwayEstimated[{}]",
+    "fSwayUncertainty": "aSwayUncertainty[{}]",
+    "bSensorUsed": "bUsed[{}]",
+    "nSensorFault": "aSensorFault[{}]",
+    "fSensorScale": "1.0 + aOwnScale[{}]",
+}
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class SensorConstants:
-    """A sensor, and what is done by it.
+    """A sensor, or one for each of some axes, and what is done by them.
 
     Attributes
     ----------
-    words, unit, load : str
-        What is measured, in which unit; and the load whose sway is an output.
+    words : mapping of int to str
+        What is measured of the loads' sway along each axis, by its place among those that are planned.
+    unit, load : str
+        In which unit; and the load whose sway is an output.
     rate : bool
         Whether it measures a rate.
     age, oldest, drop_out : float
@@ -48,7 +59,7 @@ class SensorConstants:
         m, by which damping may lead away.
     """
 
-    words: str
+    words: Mapping[int, str]
     unit: str
     load: str
     rate: bool
@@ -78,39 +89,71 @@ def damping_slots(frequencies: Array) -> int:
     return max(LEAST_SLOTS, round(KERNEL_PERIODS * float(frequencies[0] / frequencies[1])))
 
 
+def model_rows(modes: int) -> int:
+    """Rows of the model for the sensor of an axis."""
+    return 5 * modes + 2
+
+
 def damping_rows(modes: int) -> int:
     """Conditions of the damping kernel."""
     return 2 * modes - 1
 
 
-def values(sensor: SensorConstants | None) -> dict[str, str]:
-    """Words and numbers of the declarations."""
+def values(sensor: SensorConstants | None, suffixes: Sequence[str]) -> dict[str, str]:
+    """Words and numbers of the declarations, by the ends of all axes' names."""
     if sensor is None:
         return {}
+    sensed = {axis: (suffixes[axis], words) for axis, words in sensor.words.items()}
+    age = literal(sensor.age)
+    inputs = [
+        f"    fSensor{of} : LREAL; (* {sensor.unit}, {words} *)\n"
+        f"    bSensorValid{of} : BOOL; (* fSensor{of} was measured *)\n"
+        f"    fSensorAge{of} : LREAL := {age}; (* s, since then *)"
+        for of, words in sensed.values()
+    ]
+    outputs = [
+        f"    fSwayEstimated{of} : LREAL; (* m, of the {sensor.load}, by {words} *)\n"
+        f"    fSwayUncertainty{of} : LREAL; (* m, that it may be off by *)\n"
+        f"    bSensorUsed{of} : BOOL;\n"
+        f"    nSensorFault{of} : DINT; (* why it is not used *)\n"
+        f"    fSensorScale{of} : LREAL := 1.0; (* what it shows of the axis's motions, by what is due *)"
+        for of, words in sensed.values()
+    ]
+    taken = [
+        f"{array}[{k}] := {name}{of};" for k, (of, _) in sensed.items() for array, name in INPUTS.items()
+    ]
+    given = [
+        f"{name}{of} := {value.format(k)};"
+        for k, (of, _) in sensed.items()
+        for name, value in OUTPUTS.items()
+    ]
     return {
-        "measured": sensor.words,
-        "sensor_unit": sensor.unit,
-        "sensor_age": literal(sensor.age),
+        "measured": " and ".join(f"fSensor{of} is {words}" for of, words in sensed.values()),
+        "sensor_inputs": "\n".join(inputs),
+        "sensor_outputs": "\n".join(outputs),
+        "take_sensors": "\n".join(taken),
+        "give_sensors": "\n".join(given),
         "drop_out": f"{sensor.drop_out:g}",
         "room": f"{sensor.room:.3g}",
-        "end_load": sensor.load,
     }
 
 
-def lengths(sensor: SensorConstants | None, modes: int, cycle: float) -> dict[str, int]:
+def lengths(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -> dict[str, int]:
     """Lengths of arrays."""
     if sensor is None:
         return {}
     rows = damping_rows(modes)
-    return {"expected": _expected(sensor, cycle), "damp_row": rows, "damp_gram": rows**2}
+    expected = axes * _expected(sensor, cycle)
+    return {"expected": expected, "own": 6 * axes, "damp_row": rows, "damp_gram": rows**2}
 
 
-def whole(sensor: SensorConstants | None, modes: int, cycle: float) -> dict[str, int]:
+def whole(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -> dict[str, int]:
     """Give the constants that are whole numbers."""
     if sensor is None:
         return {}
     return {
-        "cSensorRow": ROWS_BEFORE * modes,
+        "cSensorRow": (ROWS_BEFORE + axes) * modes,
+        "cSensorRows": model_rows(modes),
         "cExpectedLength": _expected(sensor, cycle),
         "cDropOutCycles": max(1, round(sensor.drop_out / cycle)),
         "cDampRows": damping_rows(modes),
@@ -142,6 +185,7 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cDampTo": sensor.end,
         "cDampRoom": sensor.room,
         "cDampLength": KERNEL_PERIODS,
+        "cDampPulse": LARGEST_PULSE,
     }
 
 
@@ -151,7 +195,7 @@ def _expected(sensor: SensorConstants, cycle: float) -> int:
 
 
 def cycle_work(sensor: SensorConstants | None, modes: int) -> int:
-    """Floating-point operations of every cycle."""
+    """Floating-point operations of every cycle for each axis."""
     return 0 if sensor is None else 120 + 40 * modes
 
 

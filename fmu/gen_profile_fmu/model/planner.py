@@ -30,6 +30,10 @@ OWN = (  # inputs and outputs of each axis
     *("fTarget", "fVelocityCommand", "fVelocityLimit", "fFollowingLimit", STANDS, MOVES),
     *("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance", "fStopLow", "fStopHigh"),
 )
+SENSED = (  # likewise of each of several
+    *("fSensor", "bSensorValid", "fSensorAge", "bSensorUsed", "nSensorFault", "fSensorScale"),
+    *("fSwayEstimated", "fSwayUncertainty"),
+)
 SETPOINTS = {
     "fPosition": "setpoint",
     "fVelocity": "setpoint_velocity",
@@ -250,7 +254,7 @@ def _name(variable: StVariable, block: _PlacedBlock) -> str:
 def _of_axis(name: str, axes: Mapping[str, str]) -> tuple[str, str]:
     """Part a variable's name from its ending, and tell whose axis that is."""
     for suffix, axis in axes.items():
-        if name.endswith(suffix) and name.removesuffix(suffix) in OWN:
+        if name.endswith(suffix) and name.removesuffix(suffix) in (OWN + SENSED if suffix else OWN):
             return name.removesuffix(suffix), axis
     return name, ""
 

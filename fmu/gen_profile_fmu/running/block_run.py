@@ -50,27 +50,30 @@ class CalledBlock:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Measurement:
-    """What a block's sensor tells it of the plant, and how the air pushes the loads.
+    """What a block's sensors tell it of the plant, and how the air pushes the loads.
 
     Attributes
     ----------
-    quantity : str
-        Name of the plant's variable that is measured.
-    shows, valid : int
-        Places of the block's inputs that take it, and that say whether there is news.
-    cycles : (cycles, 5) array
+    quantities : (sensors,) sequence of str
+        Names of the plant's variables that are measured.
+    shows, valid : (sensors,) sequence of int
+        Places of the block's inputs that take them, and that say whether there is news.
+    cycles : (cycles, sensors, 4) array
         Of each cycle that there may be: gain and offset of the sensor, how many cycles ago the value is of,
-        whether there is news, and by how much, in m, the block's first axis is moved unseen: to the loads,
-        which see accelerations alone, that is a force in proportion to their masses.
+        and whether there is news.
+    pushed : (cycles, axes) array
+        By how much, in m, the block's axes are moved unseen: to the loads, which see accelerations alone,
+        that is a force in proportion to their masses.
     again : int
         How often the axes may move on after they came to rest, as a sensor may show: what counts is the rest
         that lasts.
     """
 
-    quantity: str
-    shows: int
-    valid: int
+    quantities: Sequence[str]
+    shows: Sequence[int]
+    valid: Sequence[int]
     cycles: Array
+    pushed: Array
     again: int = 0
 
 
@@ -172,8 +175,8 @@ class BlockRun:
     trace : (cycles, outputs + loads) array or None
     copies : (marks, bytes) array or None
         Of the block's instance, as they were before marked cycles.
-    shown : (cycles,) array
-        What a sensor measures of, at the beginning of each cycle; empty without one.
+    shown : (cycles, sensors) array
+        What sensors measure of, at the beginning of each cycle.
     """
 
     axes: tuple[AxisExtremes, ...]
@@ -186,7 +189,7 @@ class BlockRun:
     fault: int
     trace: Array | None = None
     copies: NDArray[np.uint8] | None = None
-    shown: Array = attrs.field(factory=lambda: np.zeros(0))
+    shown: Array = attrs.field(factory=lambda: np.zeros((0, 0)))
 
 
 class _Block(Structure):
@@ -216,10 +219,10 @@ class _History(Structure):
         ("ratios", POINTER(c_double)),
         ("n_marks", c_size_t),
         ("marks", POINTER(c_long)),
-        ("n_measured", c_long),
-        ("measured", POINTER(c_double)),
-        ("quantity", c_uint),
-        *((name, c_size_t) for name in ("shows", "valid")),
+        ("n_sensors", c_size_t),
+        *((name, POINTER(c_double)) for name in ("measured", "pushed")),
+        ("quantities", POINTER(c_uint)),
+        *((name, POINTER(c_size_t)) for name in ("shows", "valid")),
         ("shown", POINTER(c_double)),
         ("again", c_long),
     ]
@@ -307,13 +310,14 @@ class BlockFollower:
         }
         size = ctypes.sizeof(block.memory)
         copies = np.empty((len(marks), size), dtype=np.uint8)
-        shown = np.zeros(0 if script.measured is None else len(script.measured.cycles))
+        shown = np.zeros((0, 0) if script.measured is None else script.measured.cycles.shape[:2])
         outcome = _Outcome(
             **{name: doubles(array) for name, array in kept.items() if array.size},
             copies=copies.ctypes.data,
             n_rows=rows,
         )
-        room = np.empty(2 * outputs + loads + len(block.axes) + script.inputs.shape[1])
+        axes, inputs = len(block.axes), script.inputs.shape[1]
+        room = np.empty(2 * outputs + loads + axes + inputs + len(self._setpoints))
         self._loop(
             byref(self._fmu),
             byref(_called(block, script)),
@@ -377,13 +381,15 @@ class BlockFollower:
 
     def _measured(self, measured: Measurement | None, shown: Array) -> dict[str, Any]:
         if measured is None:
-            return {"n_measured": 0}
+            return {"n_sensors": 0}
+        sensors = len(measured.quantities)
         return {
-            "n_measured": len(measured.cycles),
+            "n_sensors": sensors,
             "measured": doubles(measured.cycles),
-            "quantity": self._numbers([measured.quantity])[0],
-            "shows": measured.shows,
-            "valid": measured.valid,
+            "pushed": doubles(measured.pushed),
+            "quantities": self._numbers(measured.quantities),
+            "shows": (c_size_t * sensors)(*measured.shows),
+            "valid": (c_size_t * sensors)(*measured.valid),
             "shown": doubles(shown),
             "again": measured.again,
         }

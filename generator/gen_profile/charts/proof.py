@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 from gen_profile.charts.curves import TIME
 from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Level, Line, Map, Panel, Style
 from gen_profile.charts.picture import save
+from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.closed_loop import Trace, trace
@@ -59,7 +61,6 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     """Draw each axis, ropes that change, and the sway over time; shade what is not promised."""
     few = slice(None, None, -(-len(trace.times) // SAMPLES))
     times, limit = trace.times[few], 1e3 * list(proof.limit.values())[-1]
-    signs = (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
     arrival = _arrival(trace)
     bands = [*_unpromised(trace)]
     panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
@@ -84,7 +85,7 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
                 Line(name=name, x=times, y=1e3 * sway[few], style=style)
                 for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
             ],
-            levels=[Level(value=sign * limit, between=(arrival, times[-1])) for sign in signs],
+            levels=[Level(value=sign * limit, between=(arrival, times[-1])) for sign in _signs(spec)],
             bands=bands,
         )
     )
@@ -93,6 +94,11 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
         panels=panels,
         columns=1,
     )
+
+
+def _signs(spec: Spec) -> tuple[float, ...]:
+    """Tell which signs the end load's sway may have: none where it is the length of two directions'."""
+    return (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
 
 
 def _arrival(trace: Trace) -> float:
@@ -140,40 +146,46 @@ def _sound(proof: Proof) -> list[JudgedHistory]:
 
 def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
     """Draw gusts, what the sensor showed, sway and position; then what remained of all histories."""
-    sensor, sensed = spec.planner.sensor, trace.history.sensed
+    sensor, sensed, axes = spec.planner.sensor, trace.history.sensed, [*trace.history.axes.values()]
     assert sensor is not None and sensed is not None
     few, end_load = slice(None, None, -(-len(trace.times) // SAMPLES)), spec.machine().end_load_name
     times, cycle = trace.times[few], float(trace.times[1])
     edges = cycle * np.arange(-1.0, len(trace.times) + 1.0, dtype=np.float64)
-    pushed = np.diff(sensed.pushed(edges), 2)[few] / cycle**2
-    bands, limit = [*_unpromised(trace)], 1e3 * proof.limit[end_load]
-    unit = next((one.unit for one in spec.machine().unactuated if one.name == sensor.of), "m")
-    estimated = Line(name="estimated", x=times, y=1e3 * trace.issued["fSwayEstimated"][few], style=COMMAND)
-    truth = Line(name="true", x=times, y=1e3 * trace.sway["this history"][few], style=Style(colour=INK))
-    shown = Line(name="shown", x=times, y=trace.measured[few], style=SETPOINT)
-    gusts = Line(name="gusts", x=times, y=pushed, style=SETPOINT)
-    (axis,) = trace.history.axes.values()
-    moved = Line(name="setpoint", x=times, y=trace.issued["fPosition"][few], style=SETPOINT)
+    bands, limit = [*_unpromised(trace)], 1e3 * list(proof.limit.values())[-1]
+    unit = next((one.unit for one in spec.machine().unactuated if one.name in sensor.names), "m")
+    outputs = [axis.of("fSwayEstimated") for axis in axes]
+    estimates = [trace.issued[output] for output in outputs if output in trace.issued]
+
+    def lines(names: Sequence[str], columns: Array) -> list[Line]:
+        return [
+            Line(name=name, x=times, y=column, style=style)
+            for name, column, style in zip(names, columns.T, (SETPOINT, COMMAND), strict=False)
+        ]
+
+    def panel(title: str, y_label: str, lines: list[Line]) -> Panel:
+        return Panel(title=title, x_label=TIME, y_label=y_label, lines=lines, bands=bands)
+
+    along = [axis.name or "gusts" for axis in axes]
+    shown = f"{sensor.quantity} ({unit}/s)" if sensor.quantity == "rate" else f"{sensor.quantity} ({unit})"
+    true = trace.sway["this history"][few]
+    sways = np.stack([true, length(np.stack(estimates, axis=1))[few, 0]], axis=1)
+    sway = panel(f"Sway of the {end_load}", "sway (mm)", lines(["true", "estimated"], 1e3 * sways))
     panels = [
-        Panel(title="Gusts", x_label=TIME, y_label="push (m/s²)", lines=[gusts], bands=bands),
-        Panel(
-            title=f"What the sensor shows: {sensor.quantity} of {sensor.of}",
-            x_label=TIME,
-            y_label=f"{sensor.quantity} ({unit}/s)"
-            if sensor.quantity == "rate"
-            else f"{sensor.quantity} ({unit})",
-            lines=[shown],
-            bands=bands,
+        panel("Gusts", "push (m/s²)", lines(along, np.diff(sensed.pushed(edges), 2, axis=0)[few] / cycle**2)),
+        panel(
+            f"What the sensor shows: {sensor.quantity} of {' and '.join(sensor.names)}",
+            shown,
+            lines(sensor.names if len(axes) > 1 else ["shown"], trace.measured[few]),
         ),
-        Panel(
-            title=f"Sway of the {end_load}",
-            x_label=TIME,
-            y_label="sway (mm)",
-            lines=[truth, estimated],
-            levels=[Level(value=sign * limit) for sign in (1.0, -1.0)],
-            bands=bands,
+        attrs.evolve(sway, levels=[Level(value=sign * limit) for sign in _signs(spec)]),
+        *(
+            panel(
+                f"Position of {axis.name}" if axis.name else "Position",
+                f"position ({axis.unit})",
+                lines(["setpoint"], trace.issued[axis.of("fPosition")][few, None]),
+            )
+            for axis in axes
         ),
-        Panel(title="Position", x_label=TIME, y_label=f"position ({axis.unit})", lines=[moved], bands=bands),
     ]
     caption = "Shaded: not promised. Dashed in red: what may remain."
     return [Figure(caption=caption, panels=panels, columns=1), _remains_figure(spec, proof)]

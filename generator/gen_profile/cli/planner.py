@@ -166,7 +166,8 @@ def write(
     "--sensor",
     "sensor_path",
     type=InputFile(),
-    help="CSV with time_s, value: what the block's sensor shows; a row holds until the next.",
+    help="CSV with time_s, value (of several axes value_AXIS): what sensors show; "
+    "each row holds until the next.",
 )
 @output_options
 def play(

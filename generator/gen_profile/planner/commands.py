@@ -15,13 +15,13 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.events import COLUMNS, events_of
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.interface import SENSED, SENSOR, BlockAxis, live_inputs
+from gen_profile.planner.interface import SENSED, BlockAxis, live_inputs, sensed_axes
 from gen_profile.planner.sensor_log import SensorLog, read_sensor_log
 from gen_profile.suggestion import number_meant
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")
 FIRST = ("time_s", "command")
-WHOLE = ("bBusy", "bDone", "nErrorId", "bPromise", "bDamping", "bSensorUsed", "nSensorFault")
+WHOLE = ("b", "n")  # first letters of outputs that are whole numbers
 CHUNK = 10_000  # cycles between looks at whether the axis stands
 LONGEST = 3600.0  # s, of what follows the last command
 MOST_CYCLES = 10_000_000  # before the last command
@@ -181,8 +181,10 @@ def play(
     if commands[-1].begin(cycle) > MOST_CYCLES:
         at, most = f"{commands[-1].time:g} s", f"{MOST_CYCLES * cycle:g} s"
         raise SpecError(f"commands: the last one comes at {at}, and at most {most} are played in one go.")
-    log = None if sensor_text is None else read_sensor_log(sensor_text, block.inputs)
-    columns = _columns(block.axes) | (SENSED if SENSOR[0] in block.inputs else {})
+    sensed = sensed_axes(block.inputs, block.axes)
+    log = None if sensor_text is None else read_sensor_log(sensor_text, sensed)
+    columns = _columns(block.axes) | ({"damping": "bDamping"} if sensed else {})
+    columns |= {axis.prefix + name: axis.of(output) for axis in sensed for name, output in SENSED.items()}
     places = {name: block.outputs.index(output) for name, output in columns.items()}
     lines, promise = ["time_s," + ",".join(columns)], block.outputs.index("nPromise")
     shown: dict[int, None] = {}  # as an ordered set
@@ -194,7 +196,7 @@ def play(
     )
     for number, row in enumerate(chain.from_iterable(issued)):
         cells = (
-            str(int(row[places[name]])) if output in WHOLE else repr(float(row[places[name]]))
+            str(int(row[places[name]])) if output.startswith(WHOLE) else repr(float(row[places[name]]))
             for name, output in columns.items()
         )
         lines.append(f"{number * cycle:.9g}," + ",".join(cells))

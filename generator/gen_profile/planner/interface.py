@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from functools import lru_cache
 
 import attrs
@@ -15,11 +15,10 @@ OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of ea
 ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
 STATES = ("bBusy", "bPromise", "nErrorId", "bEnabled")
 LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs that the first blocks had not
-SENSOR = ("fSensor", "bSensorValid", "fSensorAge")  # of blocks with one
-SENSED = {  # what such a block tells, by the columns of a table
+SENSOR = ("fSensor", "bSensorValid", "fSensorAge")  # of axes with one
+SENSED = {  # what is told of such an axis, by the columns of a table
     "sway_estimated_m": "fSwayEstimated",
     "sway_uncertainty_m": "fSwayUncertainty",
-    "damping": "bDamping",
     "sensor_used": "bSensorUsed",
     "sensor_fault": "nSensorFault",
 }
@@ -82,6 +81,11 @@ def block_axes(text: str) -> tuple[BlockAxis, ...]:
     return axes
 
 
+def sensed_axes(inputs: Container[str], axes: Iterable[BlockAxis]) -> list[BlockAxis]:
+    """Tell along which axes a block has a sensor."""
+    return [axis for axis in axes if axis.of(SENSOR[0]) in inputs]
+
+
 def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, str]:
     """Tell which inputs of a planner block are live parameters, by the parameters' names.
 
@@ -94,5 +98,5 @@ def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, s
     known = list(inputs)
     if missing := [name for name in standard if name not in known]:
         raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
-    standard += [*SENSOR, *(name for later in LATER for name in (later, *(axis.of(later) for axis in axes)))]
+    standard += [name for later in (*SENSOR, *LATER) for name in (later, *(axis.of(later) for axis in axes))]
     return {name[1:]: name for name in known if name not in standard and "[" not in name}

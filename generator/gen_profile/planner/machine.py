@@ -22,6 +22,7 @@ MOST_LIVE = 2
 DEGREES = (3, 6, 9, 12)
 ACCURACY = 1e-5  # relative, of the frequencies over the live ranges
 MOST_TERMS = 60
+ALONE = 1e-6  # of what a sensor shows, by other axes
 SAME = 1e-9  # relative difference
 STILL = 1e-9  # acceleration of a coordinate, relative to an axis's, that counts as none
 NEGLIGIBLE = 1e-7  # coefficient, relative to the largest of its function
@@ -157,6 +158,75 @@ def planned_axes(spec: Spec) -> dict[int, BlockAxis]:
     return {k: BlockAxis(name=axes[k].name if several else "", unit=axes[k].unit) for k in numbers}
 
 
+@attrs.frozen(kw_only=True)
+class SensedDirection:
+    """What a sensor measures along an axis.
+
+    Attributes
+    ----------
+    axis : int
+        That makes swing what it shows.
+    of : str
+        A coordinate's name, or a load's.
+    largest : tuple of int
+        The load that shows each mode most, by its number.
+    end_load : int
+        Number of the end load in this direction.
+    """
+
+    axis: int
+    of: str
+    largest: tuple[int, ...]
+    end_load: int
+
+
+def sensed_directions(spec: Spec) -> dict[int, SensedDirection]:
+    """Find what sensors measure along which axes, by the axes' numbers.
+
+    Raises
+    ------
+    SpecError
+        One shows no axis, or several, or what another one shows.
+    """
+    sensor, found = spec.planner.sensor, dict[int, SensedDirection]()
+    assert sensor is not None
+    middle = linearized(spec, [0.0] * len(spec.planner.live))
+    end = range(len(spec.machine().loads))[spec.machine().end_load]
+    for of in sensor.names:
+        shown = {
+            axis: float(np.abs(_row(spec, middle, of) @ driven_modes(middle, axis)).max())
+            for axis in planned_axes(spec)
+        }
+        axis = max(shown, key=lambda number: shown[number])
+        if any(other > ALONE * shown[axis] for number, other in shown.items() if number != axis):
+            raise SpecError(f"planner.sensor.of: {of} shows more than one axis; measure along one.")
+        if axis in found:
+            raise SpecError(
+                f"planner.sensor.of: {found[axis].of} and {of} swing along the same axis; name one of them."
+            )
+        sways = np.abs(middle.sway_gain @ driven_modes(middle, axis))
+        found[axis] = SensedDirection(
+            axis=axis,
+            of=of,
+            largest=tuple(sways.argmax(axis=0).tolist()),
+            end_load=end[int(sways[end, 0].argmax())],
+        )
+    return found
+
+
+def shown_of_modes(spec: Spec, at: Linearization, direction: SensedDirection) -> Array:
+    """Give what the sensor shows of `driven_modes` (or of their rates), shape (modes,)."""
+    return np.asarray(_row(spec, at, direction.of) @ driven_modes(at, direction.axis))
+
+
+def _row(spec: Spec, at: Linearization, of: str) -> Array:
+    sensor, plant = spec.planner.sensor, spec.machine()
+    assert sensor is not None
+    if sensor.quantity == "sway":
+        return np.asarray(at.sway_gain[list(plant.loads).index(of)])
+    return np.asarray(np.eye(len(plant.unactuated))[[one.name for one in plant.unactuated].index(of)])
+
+
 def frequency_errors(spec: Spec) -> Array:
     """By which share the stated errors change each mode's frequency at most, at the live ranges' corners."""
     return np.asarray(
@@ -192,6 +262,16 @@ def left_by_errors(spec: Spec, point: Sequence[float]) -> Array:
         for mode in range(len(at.distinct_frequencies))
     ]
     return np.concatenate([_frequency_errors(spec, point), gains])
+
+
+def driven_modes(at: Linearization, axis: int) -> Array:
+    """Give the coordinates' amplitudes in modes of different frequencies that an axis makes, as columns.
+
+    Each follows z″ + 2 ζ ω z′ + ω² z = the axis's acceleration, times its column.
+    """
+    driven = at.modes * np.linalg.solve(at.modes, at.input)[:, axis]
+    modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
+    return np.asarray(driven @ np.eye(len(at.distinct_frequencies))[modes])
 
 
 def second_order_sway(spec: Spec) -> Array:

@@ -20,12 +20,18 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from gen_profile.planner.chebyshev import Array
-from gen_profile.planner.machine import linearized, planned_axes
-from gen_profile.planner.sensor import damping_kernel, shown_of_modes
+from gen_profile.planner.machine import (
+    SensedDirection,
+    linearized,
+    planned_axes,
+    sensed_directions,
+    shown_of_modes,
+)
+from gen_profile.planner.sensor import damping_kernel
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
-from gen_profile_exporters.planner.sensor_constants import ROWS_BEFORE
+from gen_profile_exporters.planner.sensor_constants import ROWS_BEFORE, model_rows
 
 POINTS = 3  # of each live range
 FREQUENCIES = np.geomspace(0.02, 9.0, 2001)  # of the slowest mode's
@@ -75,8 +81,9 @@ def sensor_margins(spec: Spec, text: str) -> Margins | None:
         if variable.array and variable.initial
     }
     found = [
-        _margins(_loop(spec, written, point), float(linearized(spec, point).distinct_frequencies[0]))
+        _margins(_loop(spec, written, point, one), float(linearized(spec, point).distinct_frequencies[0]))
         for point in product(np.linspace(-1.0, 1.0, POINTS).tolist(), repeat=len(spec.planner.live))
+        for one in sensed_directions(spec).values()
     ]
     return Margins(
         delay=min(one.delay for one in found),
@@ -97,19 +104,22 @@ def _margins(open_loop: Complex, slowest: float) -> Margins:
     )
 
 
-def _loop(spec: Spec, written: Mapping[str, Array], point: Sequence[float]) -> Complex:
+def _loop(
+    spec: Spec, written: Mapping[str, Array], point: Sequence[float], direction: SensedDirection
+) -> Complex:
     """Give −Q/(1 + Q) at all frequencies: the loop from the sensor to itself."""
     sensor = spec.planner.sensor
     assert sensor is not None
-    at, (axis,) = linearized(spec, point), planned_axes(spec)
+    at, axes = linearized(spec, point), list(planned_axes(spec))
     frequencies = at.distinct_frequencies
     modes, slowest, rate = len(frequencies), float(frequencies[0]), int(sensor.quantity == "rate")
-    rows = _model(spec, written, point)[ROWS_BEFORE * modes :]
+    rows = _model(spec, written, point)[(ROWS_BEFORE + len(axes)) * modes :]
+    rows = rows[axes.index(direction.axis) * model_rows(modes) :]
     push, shown = rows[:modes], rows[modes : 2 * modes]
     gains = rows[3 * modes : 5 * modes + 1] / spec.export.cycle_time
     s = 1j * slowest * FREQUENCIES
     decays = at.distinct_damping_ratios * frequencies
-    moved = np.linalg.solve(at.modes, at.input)[:, axis] * shown_of_modes(spec, at)
+    moved = shown_of_modes(spec, at, direction)
     machine, learnt = np.zeros_like(s), gains[-1] / s
     for mode in range(modes):
         own = s * s + 2.0 * decays[mode] * s + frequencies[mode] ** 2

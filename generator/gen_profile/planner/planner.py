@@ -16,7 +16,7 @@ from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
-from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs
+from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs, sensed_axes
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
@@ -110,7 +110,8 @@ class Orders(TypedDict, total=False):
     velocity_limit : float or (axes,) array
         m/s; 0 for none but the machine's.
     sensor : float or (cycles,) array
-        What the sensor shows in every cycle, in its unit; there is no news where it is not given.
+        What the sensor shows in every cycle, in its unit; there is no news where it is not given. Of
+        sensors along several axes (axes,) or (cycles, axes).
     """
 
     target: ArrayLike | None
@@ -343,12 +344,13 @@ class Planner(Summarised):
 
     def _sensed(self, shown: ArrayLike | None, cycles: int) -> dict[str, Array]:
         """Give what the sensor shows, or that there is no news of it."""
-        value, valid, _ = SENSOR
+        axes = sensed_axes(self._inputs, self._axes)
+        valid = {axis.of(SENSOR[1]): np.full(1, float(shown is not None)) for axis in axes}
         if shown is None:
-            return {valid: np.zeros(1)} if valid in self._inputs else {}
-        if value not in self._inputs:
+            return valid
+        if not axes:
             raise SpecError("sensor: the planner has none; state planner.sensor.")
-        return {value: _column("sensor", shown, cycles), valid: np.ones(1)}
+        return _columns_of(SENSOR[0], "sensor", shown, axes, cycles) | valid
 
     def _command(self, orders: Orders, columns: dict[str, Array]) -> None:
         """Let another command take the place of the one that holds; one that was stopped is given anew."""

@@ -7,7 +7,7 @@ y = Σ shown z (or of z') + offset. The gains are those of the steady Kalman fil
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import attrs
@@ -16,8 +16,17 @@ from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, 
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
-from gen_profile.planner.machine import frequency_errors, linearized, planned_axes
-from gen_profile.problem.linearization import Linearization
+from gen_profile.planner.machine import (
+    DEGREES,
+    MOST_TERMS,
+    SensedDirection,
+    driven_modes,
+    frequency_errors,
+    linearized,
+    planned_axes,
+    sensed_directions,
+    shown_of_modes,
+)
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile_exporters.planner.block import KERNEL_SLOTS, SLOTS_PER_PERIOD
@@ -26,6 +35,7 @@ from gen_profile_exporters.planner.sensor_constants import (
     SensorConstants,
     damping_rows,
     damping_slots,
+    model_rows,
 )
 
 BANDWIDTH = 1.0  # of the observer at most, by the slowest frequency: what ropes and delays are wrong by
@@ -99,32 +109,40 @@ def sensor_constants(
     if sensor is None or disturbance is None:
         return None
     _refuse_machine(spec)
-    sensed = {tuple(point): _sensed(spec, sensor, disturbance, point) for point in points}
-    for one in sensed.values():
+    directions = sensed_directions(spec)
+    sensed = [_sensed(spec, point, one) for point in points for one in directions.values()]
+    for one in sensed:
         _refuse(spec, sensor, one)
-    degree = int(interpolated.exponents.max(initial=0))
-    rows = interpolate(lambda at: _rows(spec, sensor, disturbance, at), interpolated.curvatures, degree)
-    _require_accurate(spec, sensor, disturbance, rows, list(sensed))
-    others = [_others(spec, sensor, disturbance, one) - rows(point)[-1] for point, one in sensed.items()]
-    raised = rows.coefficients.copy()
-    raised[-1, ~rows.exponents.any(axis=0)] += max(0.0, *others)  # none is less than what is true
-    return _constants(spec, sensor, disturbance, list(sensed.values())), attrs.evolve(
-        rows, coefficients=raised
-    )
+    least, modes = int(interpolated.exponents.max(initial=0)), len(sensed[0].frequencies)
+    true = np.array([_rows(spec, directions, point) for point in points])
+    for degree in [least, *(degree for degree in DEGREES if degree > least and spec.planner.live)]:
+        rows = interpolate(lambda at: _rows(spec, directions, at), interpolated.curvatures, degree)
+        found = np.array([rows(point) for point in points])
+        error = _error(found, true, modes)
+        if error <= ACCURATE and rows.exponents.shape[1] <= MOST_TERMS:
+            break
+    else:
+        raise SpecError(
+            f"planner.live: over these ranges what the sensor shows would be known to {error:.1g} only; "
+            "narrow the ranges."
+        )
+    raised, last = rows.coefficients.copy(), slice(model_rows(modes) - 1, None, model_rows(modes))
+    below = (true - found)[:, last].max(axis=0).clip(0.0)  # none is less than what is true
+    raised[last, ~rows.exponents.any(axis=0)] += below[:, None]
+    return _constants(spec, sensor, disturbance, sensed), attrs.evolve(rows, coefficients=raised)
 
 
 def _constants(
     spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, sensed: Sequence[SensedModes]
 ) -> SensorConstants:
-    rate, of = sensor.quantity == "rate", sensor.of
-    axis = spec.limits.of(next(iter(planned_axes(spec))))
-    assert axis.acceleration
+    rate, directions = sensor.quantity == "rate", sensed_directions(spec)
+    acceleration = max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
     allowed = min(spec.check.residual_sway.values())
     disturbed = max(_disturbed(sensor, disturbance, one) for one in sensed)
     own, own_slope = (
         max(
             2.0
-            * axis.acceleration
+            * acceleration
             * float(np.abs(one.shown * one.push) @ one.frequencies ** (int(rate) + order - 2.0))
             for one in sensed
         )
@@ -133,9 +151,14 @@ def _constants(
     slope = own_slope + disturbed * max(float(one.frequencies[0]) for one in sensed)
     noise = sensor.noise
     floor = max(float(_floor(sensor, one)[0]) for one in sensed)
-    unit = next((one.unit for one in spec.machine().unactuated if one.name == of), "m")
+    unit = next((one.unit for one in spec.machine().unactuated if one.name in sensor.names), "m")
+    words = {"angle": "{}", "rate": "the rate of {}", "sway": "the sway of the {}"}[sensor.quantity]
     return SensorConstants(
-        words={"angle": of, "rate": f"the rate of {of}", "sway": f"the sway of the {of}"}[sensor.quantity],
+        words={
+            place: words.format(directions[number].of)
+            for place, number in enumerate(planned_axes(spec))
+            if number in directions
+        },
         unit=f"{unit}/s" if rate else unit,
         load=spec.machine().end_load_name,
         rate=rate,
@@ -171,8 +194,8 @@ def largest_innovation(spec: Spec) -> float:
     """Find what a value may differ by, at most, from what the block expects, in the sensor's unit."""
     sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
     assert sensor is not None and disturbance is not None
-    points = between(len(spec.planner.live))
-    sensed = (_sensed(spec, sensor, disturbance, point) for point in points)
+    points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
+    sensed = (_sensed(spec, point, one) for point in points for one in directions)
     return _gate(sensor, max(_disturbed(sensor, disturbance, one) for one in sensed))
 
 
@@ -191,41 +214,28 @@ def _age(sensor: SensorSpec) -> float:
     return 0.5 * (sensor.delay[0] + sensor.delay[1])
 
 
-def _sensed(
-    spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]
-) -> SensedModes:
-    at = linearized(spec, point)
-    (axis,) = planned_axes(spec)
-    shown = at.sway_gain @ at.modes
-    driven = np.linalg.solve(at.modes, at.input)[:, axis]
-    largest = _largest(spec)
-    scale = shown[largest, range(len(driven))] * np.sign(driven * shown[largest, range(len(driven))])
-    end = spec.machine().end_load.start
-    by_load = dict(zip(spec.machine().loads, (shown[:, 0] / scale[0]).tolist(), strict=True))
+def _sensed(spec: Spec, point: Sequence[float], direction: SensedDirection) -> SensedModes:
+    at, disturbance = linearized(spec, point), spec.planner.disturbance
+    assert disturbance is not None
+    sways = at.sway_gain @ driven_modes(at, direction.axis)
+    push = np.abs(sways[direction.largest, range(sways.shape[1])])
+    by_load = dict(zip(spec.machine().loads, np.abs(sways[:, 0] / push[0]).tolist(), strict=True))
+    swings = [
+        swing / by_load[load] for load, swing in disturbance.swing.items() if by_load[load] > LEAST_SHOWN
+    ]
+    if not swings:
+        raise SpecError(
+            f"planner.disturbance.swing: must name a load that {direction.of} shows; state it for "
+            f"{list(by_load)[direction.end_load]}."
+        )
     return SensedModes(
         frequencies=at.distinct_frequencies,
         decays=at.distinct_damping_ratios * at.distinct_frequencies,
-        push=driven * scale,
-        shown=shown_of_modes(spec, at) / scale,
-        end_load=shown[end] / scale,
-        swing=min(swing / abs(by_load[load]) for load, swing in disturbance.swing.items()),
+        push=push,
+        shown=shown_of_modes(spec, at, direction) / push,
+        end_load=sways[direction.end_load] / push,
+        swing=min(swings),
     )
-
-
-def shown_of_modes(spec: Spec, at: Linearization) -> Array:
-    """Give what the sensor shows of each mode's coordinate (or of its rate), shape (modes,)."""
-    sensor, plant = spec.planner.sensor, spec.machine()
-    assert sensor is not None
-    if sensor.quantity == "sway":
-        return np.asarray(at.sway_gain[list(plant.loads).index(sensor.of)] @ at.modes)
-    return np.asarray(at.modes[[one.name for one in plant.unactuated].index(sensor.of)])
-
-
-def _largest(spec: Spec) -> list[int]:
-    """Find the load that shows each mode most in the middle of the live ranges, by its number."""
-    middle: Linearization = linearized(spec, [0.0] * len(spec.planner.live))
-    loads: list[int] = np.abs(middle.sway_gain @ middle.modes).argmax(axis=0).tolist()
-    return loads
 
 
 def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
@@ -307,17 +317,24 @@ def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: S
     return float(seen * np.sqrt(slowest))
 
 
-def _rows(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, point: Sequence[float]) -> Array:
-    """Values of the model's rows: push, shown, end load's sway, gains of z and z' by mode; then two.
+def _rows(spec: Spec, directions: Mapping[int, SensedDirection], point: Sequence[float]) -> Array:
+    """Values of the model's rows, axis by axis: push, shown, end load's sway, gains of z and z'; then two.
 
     These are the offset's gain, and `_others`. The gains are those for a cycle, of what differed as long ago
-    as a value usually is old.
+    as a value usually is old. Of an axis without a sensor all are 0.
     """
-    one = _sensed(spec, sensor, disturbance, point)
-    state, _, gain = _filter(sensor, one)
-    now = spec.export.cycle_time * expm(state * _age(sensor)) @ gain
-    others = _others(spec, sensor, disturbance, one)
-    return np.array([*one.push, *one.shown, *one.end_load, *now[:-1:2], *now[1:-1:2], now[-1], others])
+    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
+    assert sensor is not None and disturbance is not None
+    modes, rows = len(linearized(spec, point).distinct_frequencies), list[Array]()
+    for number in planned_axes(spec):
+        rows.append(np.zeros(model_rows(modes)))
+        if number in directions:
+            one = _sensed(spec, point, directions[number])
+            state, _, gain = _filter(sensor, one)
+            now = spec.export.cycle_time * expm(state * _age(sensor)) @ gain
+            others = _others(spec, sensor, disturbance, one)
+            rows[-1][:] = *one.push, *one.shown, *one.end_load, *now[:-1:2], *now[1:-1:2], now[-1], others
+    return np.concatenate(rows)
 
 
 def _law() -> Array:
@@ -351,10 +368,11 @@ def _refuse_machine(spec: Spec) -> None:
     sensor = spec.planner.sensor
     assert sensor is not None
     axes, middle = planned_axes(spec), linearized(spec, [0.0] * len(spec.planner.live))
-    if len(axes) > 1 or len(middle.frequencies) > len(middle.distinct_frequencies):
+    alike = len(middle.frequencies) == len(axes) * len(middle.distinct_frequencies)
+    if not alike or (len(axes) > 1 and any(axis.unit != "m" for axis in axes.values())):
         raise SpecError(
-            "planner.sensor: the block damps by one axis whose loads swing along it alone so far, and this "
-            "machine has more directions; leave the sensor out."
+            "planner.sensor: the block damps by axes that lead straight, along each of which loads swing "
+            "alike and alone; this machine's do not, so leave the sensor out."
         )
     for number in axes:
         travel, room = spec.limits.of(number).travel, damping_room(spec)
@@ -372,11 +390,11 @@ def _refuse_machine(spec: Spec) -> None:
 
 def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
     """Refuse a sensor that does not show the slowest mode, or too late, and pulses that do not act on it."""
-    slowest = float(one.frequencies[0])
+    slowest, named = float(one.frequencies[0]), " or ".join(sensor.names)
     shown = np.abs(one.shown * one.frequencies ** (sensor.quantity == "rate"))
     if not shown[0] > LEAST_SHOWN * shown.max():
         raise SpecError(
-            f"planner.sensor.of: {sensor.of} does not show the slowest swing; measure another coordinate."
+            f"planner.sensor.of: {named} does not show the slowest swing; measure another coordinate."
         )
     needed = (AGAIN - BEGIN) * min(spec.check.residual_sway.values())
     known, *others = _known_sway(spec, one)
@@ -387,7 +405,7 @@ def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
         )
     if max(others, default=0.0) > needed:
         raise SpecError(
-            f"planner.sensor.of: {sensor.of} does not show the faster swings well enough: {max(others):.2g} "
+            f"planner.sensor.of: {named} does not show the faster swings well enough: {max(others):.2g} "
             f"m that gusts make of them would not be seen, and {needed:.2g} m may be; measure another "
             'coordinate, or the sway of a load (quantity = "sway").'
         )
@@ -410,30 +428,12 @@ def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
         )
 
 
-def _require_accurate(
-    spec: Spec,
-    sensor: SensorSpec,
-    disturbance: DisturbanceSpec,
-    rows: Interpolant,
-    points: Sequence[Sequence[float]],
-) -> None:
-    """Refuse live ranges over which what the sensor shows would be known too roughly."""
-    true = np.array([_rows(spec, sensor, disturbance, point) for point in points])
-    modes = (true.shape[1] - 2) // 5
-    error = np.abs(np.array([rows(point) for point in points]) - true)[:, : 3 * modes]
-    worst = float(
-        (
-            error
-            / np.maximum(
-                np.abs(true[:, : 3 * modes]).max(axis=0), LEAST_SHOWN * np.abs(true[:, : 3 * modes]).max()
-            )
-        ).max()
-    )
-    if worst > ACCURATE:
-        raise SpecError(
-            f"planner.live: over these ranges what the sensor shows would be known to {worst:.1g} only; "
-            "narrow the ranges."
-        )
+def _error(found: Array, true: Array, modes: int) -> float:
+    """Tell by which share the model's rows, (points, rows), are off in what the sensor shows."""
+    rows = np.arange(true.shape[1]).reshape(-1, model_rows(modes))[:, : 3 * modes].ravel()
+    largest = np.abs(true[:, rows]).max(axis=0)
+    apart = np.abs(found - true)[:, rows] / np.maximum(largest, LEAST_SHOWN * largest.max())
+    return float(apart.max())
 
 
 def between(live: int) -> list[tuple[float, ...]]:

@@ -1,11 +1,11 @@
-"""A log of a sensor, cycle by cycle what a planner block is given of it."""
+"""A log of sensors, cycle by cycle what a planner block is given of them."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import attrs
@@ -13,21 +13,24 @@ import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
-from gen_profile.planner.interface import SENSOR
+from gen_profile.planner.interface import SENSOR, BlockAxis
 
-COLUMNS = ("time_s", "value")
+TIME, VALUE = "time_s", "value"
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class SensorLog:
-    """What a sensor showed, and when the controller got it.
+    """What sensors showed, and when the controller got it.
 
     Attributes
     ----------
-    times, values : (samples,) arrays
+    axes : sequence of BlockAxis
+        Along which they measure.
+    times, values : (samples,) and (samples, axes) arrays
         s, rising, and in the sensor's unit. A value holds until the next; after the last there is no news.
     """
 
+    axes: Sequence[BlockAxis]
     times: Array
     values: Array
 
@@ -39,48 +42,50 @@ class SensorLog:
         """Put what is known in some cycles, from the first one on, into rows of a block's inputs."""
         times = (np.arange(first, first + len(rows)) + 1e-9) * cycle
         sample = np.searchsorted(self.times, times, side="right") - 1
-        value, valid = (list(inputs).index(name) for name in SENSOR[:2])
-        rows_read = rows.copy()
-        rows_read[:, value] = self.values[np.maximum(sample, 0)]
-        rows_read[:, valid] = (sample >= 0) & (times < self.times[-1] + cycle)
+        rows_read, names = rows.copy(), list(inputs)
+        for axis, shown in zip(self.axes, self.values.T, strict=True):
+            value, valid = (names.index(axis.of(name)) for name in SENSOR[:2])
+            rows_read[:, value] = shown[np.maximum(sample, 0)]
+            rows_read[:, valid] = (sample >= 0) & (times < self.times[-1] + cycle)
         return rows_read
 
 
-def read_sensor_log(text: str, inputs: Mapping[str, float]) -> SensorLog:
-    """Read a log for a block of these inputs.
+def read_sensor_log(text: str, axes: Sequence[BlockAxis]) -> SensorLog:
+    """Read a log for a block with a sensor along these axes.
 
     Parameters
     ----------
     text : str
-        CSV with the columns ``time_s, value``.
-    inputs : mapping of str to float
-        The block's.
+        CSV with the columns ``time_s, value``; of several axes one value each: ``value_x``.
+    axes : sequence of BlockAxis
 
     Raises
     ------
     SpecError
-        With the line and the cure; or the block has no sensor.
+        With the line and the cure; or there is no axis.
     """
-    if SENSOR[0] not in inputs:
+    if not axes:
         raise SpecError("sensor: the block has none; state planner.sensor in the spec that it is written of.")
     rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
-    names = [name.strip() for name in rows.fieldnames or ()]
-    if missing := [name for name in COLUMNS if name not in names]:
+    names, columns = [name.strip() for name in rows.fieldnames or ()], [TIME, *(a.of(VALUE) for a in axes)]
+    if missing := [name for name in columns if name not in names]:
         raise SpecError(
-            f"sensor: there is no column {missing[0]}; the first line must be {','.join(COLUMNS)}."
+            f"sensor: there is no column {missing[0]}; the first line must be {','.join(columns)}."
         )
     rows.fieldnames = names
     readings = []
     for row in rows:
         try:
-            readings.append([float(row[name] or "") for name in COLUMNS])
+            readings.append([float(row[name] or "") for name in columns])
         except ValueError:
-            raise SpecError(f"sensor, line {rows.line_num}: time_s and value must be numbers.") from None
+            raise SpecError(
+                f"sensor, line {rows.line_num}: {' and '.join(columns)} must be numbers."
+            ) from None
     if not readings:
-        raise SpecError("sensor: there is no row; write one such as 0.0,0.01.")
-    times, values = np.array(readings).T
+        raise SpecError(f"sensor: there is no row; write one such as 0.0{',0.01' * len(axes)}.")
+    times, *values = np.array(readings).T
     if not (math.isfinite(times.sum()) and times[0] >= 0.0) or any(
         b < a for a, b in pairwise(times.tolist())
     ):
         raise SpecError("sensor: time_s must rise from 0 or later on.")
-    return SensorLog(times=times, values=values)
+    return SensorLog(axes=axes, times=times, values=np.stack(values, axis=1))

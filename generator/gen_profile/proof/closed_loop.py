@@ -203,13 +203,13 @@ class ClosedLoop:
             self._followers.put(follower)
 
     def measured(self, history: History, run: BlockRun) -> Array:
-        """Give what the sensor told the block in each cycle of a run, not a number where nothing."""
+        """Give what sensors told the block in each cycle of a run, (cycles, sensors), NaN for nothing."""
         found = self._script(history).measured
         if found is None:
-            return np.full(run.cycles, np.nan)
-        gain, added, age, valid, _ = found.cycles[: run.cycles].T
-        then = np.maximum(np.arange(run.cycles) - age.astype(np.int64), 0)
-        return np.where(valid != 0.0, gain * run.shown[then] + added, np.nan)
+            return np.full((run.cycles, 0), np.nan)
+        gain, added, age, valid = np.moveaxis(found.cycles[: run.cycles], 2, 0)
+        then = np.maximum(np.arange(run.cycles)[:, None] - age.astype(np.int64), 0)
+        return np.where(valid != 0.0, gain * np.take_along_axis(run.shown, then, axis=0) + added, np.nan)
 
     def distance_from_fmpy(self, history: History, cycles: int) -> float:
         """Let FMPy's own importer co-simulate what the block issued in so many cycles.
@@ -222,10 +222,11 @@ class ClosedLoop:
         traced = self.run(history, rows=cycles).trace
         assert traced is not None
         position = np.tile(self._places(history), (len(traced) + 1, 1))
-        sensed = history.sensed
-        pushed = sensed.pushed(np.arange(1.0, len(position)) * self.cycle) if sensed else 0.0
         for number, axis in self._histories.axes.items():
-            position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))] + pushed
+            position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))]
+        if history.sensed:
+            pushed = history.sensed.pushed(np.arange(1.0, len(position)) * self.cycle)
+            position[1:, list(self._histories.axes)] += pushed
         script = self._script(history)
         given = _rows_at(script.start_cycles, script.inputs, np.arange(len(traced)))
         for hoist in self._hoists(history):
@@ -416,8 +417,8 @@ class Trace:
     sway : mapping of str to (cycles,) array
         Of the end load in m (its magnitude where it has two directions), by machines: that of the history,
         the one that the block is given, and some at corners of the uncertain ranges.
-    measured : (cycles,) array
-        What the sensor told the block, not a number where nothing.
+    measured : (cycles, sensors) array
+        What sensors told the block, not a number where nothing.
     """
 
     history: History

@@ -161,8 +161,10 @@ class Followed:
         ]
 
     def sensed(self, name: str) -> Flags:
-        """Tell when an output of a block with a sensor is set; never of one without."""
-        return np.asarray(self.issued.get(name, np.zeros(self.cycles)) != 0.0)
+        """Tell when an output of a block with sensors is set, of any axis; never of one without."""
+        outputs = [name, *(axis.of(name) for axis in self.axes)]
+        issued = [self.issued[output] for output in outputs if output in self.issued]
+        return np.asarray(np.any([np.zeros(self.cycles), *issued], axis=0))
 
     @property
     def cycles(self) -> int:

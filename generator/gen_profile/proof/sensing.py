@@ -1,4 +1,4 @@
-"""What a block's sensor meets in a history: a swing, gusts, its own errors and a fault; and its verdict."""
+"""What a block's sensors meet in a history: a swing, gusts, their own errors and a fault; and a verdict."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from gen_profile.motion.profile import Array
-from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.interface import SENSOR, BlockAxis
+from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
 from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
@@ -51,11 +52,15 @@ TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
 
 @attrs.frozen(kw_only=True)
 class Gust:
-    """A push on all loads in proportion to their masses, half a sine: s, s and m/s² at most."""
+    """A push on all loads in proportion to their masses, half a sine: s, s and m/s² at most.
+
+    `along` are its shares along the axes that the block plans.
+    """
 
     time: float
     lasts: float
     acceleration: float
+    along: tuple[float, ...]
 
 
 @attrs.frozen(kw_only=True)
@@ -67,14 +72,18 @@ class SensedHistory:
     starts : mapping of str to float
         What swings at first, in the slowest mode: coordinates by name, their rates as ``NAME.rate``.
     gusts : tuple of Gust
-    delay, offset : float
-        s, and in the sensor's unit.
+    delay : float
+        s.
+    offsets : tuple of float
+        Of each sensor in its unit.
     seed : int
-        Of its noise.
+        Of their noise.
     lost : float
         s, from which on news fails to come for a while.
     fault : str
         One of `FAULTS`, or empty.
+    failing : int
+        Which sensor has it.
     fails, innovation : float
         s, when; and the greatest difference from what is expected that counts as a swing, in its unit.
     """
@@ -82,10 +91,11 @@ class SensedHistory:
     starts: Mapping[str, float]
     gusts: tuple[Gust, ...]
     delay: float
-    offset: float
+    offsets: tuple[float, ...]
     seed: int
     lost: float
     fault: str
+    failing: int
     fails: float
     innovation: float
 
@@ -109,6 +119,9 @@ class SensedHistory:
         """
         sensor, disturbance = _stated(spec)
         kind, swing, phase, delay, offset, seed, lost, fails, *others = choices
+        random, directions = np.random.default_rng([int(seed * 2**32), 1]), sensed_directions(spec)
+        more = random.random((3, len(directions) - 1)).tolist()  # of the second sensor, and so on
+        places = [list(planned_axes(spec)).index(number) for number in directions]
         fault = ""
         if kind >= SOUND:
             fault = FAULTS[min(int((kind - SOUND) / (1.0 - SOUND) * len(FAULTS)), len(FAULTS) - 1)]
@@ -123,16 +136,25 @@ class SensedHistory:
                 begin = gusts[-1].time + gusts[-1].lasts if gusts else 0.0  # no two push at once
                 start = begin + share * (latest - (lasts if fault else 0.0) - begin)  # likewise
                 acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
+                along = random.standard_normal(len(places)) if len(places) > 1 else np.ones(1)
+                shares = np.zeros(len(planned_axes(spec)))
+                shares[places] = along / np.linalg.norm(along)
                 if start >= begin:
-                    gusts.append(Gust(time=start, lasts=lasts, acceleration=acceleration))
+                    gusts.append(
+                        Gust(time=start, lasts=lasts, acceleration=acceleration, along=tuple(shares.tolist()))
+                    )
+        shares_and_phases = zip([swing, *more[0]], [phase, *more[1]], strict=True)
         return cls(
-            starts=_starts(spec, max(0.0, _stretched(swing)), 2.0 * np.pi * phase, *machine),
+            starts=_starts(
+                spec, [(max(0.0, _stretched(a)), 2.0 * np.pi * b) for a, b in shares_and_phases], *machine
+            ),
             gusts=tuple(gusts),
             delay=sensor.delay[0] + min(1.0, 1.1 * delay) * (sensor.delay[1] - sensor.delay[0]),
-            offset=_stretched(2.0 * offset - 1.0) * sensor.offset,
+            offsets=tuple(_stretched(2.0 * each - 1.0) * sensor.offset for each in (offset, *more[2])),
             seed=int(seed * 2**32),
             lost=lost * until,
             fault=fault,
+            failing=int(random.integers(len(directions))),
             fails=fails * until,
             innovation=largest_innovation(spec) if fault else 0.0,
         )
@@ -148,30 +170,50 @@ class SensedHistory:
         return max([self.fails if self.fault else 0.0, *(gust.time + gust.lasts for gust in self.gusts)])
 
     def pushed(self, times: Array) -> Array:
-        """Tell by how much in m an axis would have to move to push the loads alike, at some times in s."""
-        way = np.zeros_like(times)
+        """Tell by how much in m axes would have to move to push the loads alike, at some times in s.
+
+        Shape (times, axes), or (times, 1) without gusts.
+        """
+        way = np.zeros((len(times), len(self.gusts[0].along) if self.gusts else 1))
         for gust in self.gusts:
             since, turn = np.maximum(times - gust.time, 0.0), np.pi / gust.lasts
             within = np.minimum(since, gust.lasts)
             speed = gust.acceleration / turn
-            way += speed * (within - np.sin(turn * within) / turn) + 2.0 * speed * (since - within)
+            alone = speed * (within - np.sin(turn * within) / turn) + 2.0 * speed * (since - within)
+            way += np.outer(alone, gust.along)
         return way
 
     def measurement(self, spec: Spec, inputs: Sequence[str], cycle: float, cycles: int) -> Measurement:
-        """Give what the sensor tells a block of these inputs in so many cycles, each of `cycle` s."""
+        """Give what sensors tell a block of these inputs in so many cycles, each of `cycle` s."""
         sensor, _ = _stated(spec)
-        times, random = np.arange(cycles) * cycle, np.random.default_rng(self.seed)
-        rows = np.zeros((cycles, 5))
-        gain, added, age, valid, pushed = rows.T
-        gain[:], added[:] = 1.0, self.offset + sensor.noise * random.standard_normal(cycles)
-        age[:], valid[:], pushed[:] = (
-            round(self.delay / cycle),
-            1.0,
-            self.pushed(np.asarray(times + cycle, dtype=np.float64)),
+        axes, directions = planned_axes(spec), sensed_directions(spec)
+        quantity = {"angle": "{}", "rate": "{}.rate", "sway": "sway.{}"}[sensor.quantity]
+        shows, valid = (
+            [list(inputs).index(axes[number].of(name)) for number in directions] for name in SENSOR[:2]
         )
+        rows = [self._told(sensor, place, cycle, cycles) for place in range(len(directions))]
+        pushed = np.zeros((cycles, len(axes)))
+        pushed += self.pushed(np.arange(1.0, cycles + 1.0) * cycle)
+        return Measurement(
+            quantities=[quantity.format(of) for of in sensor.names],
+            shows=shows,
+            valid=valid,
+            cycles=np.stack(rows, axis=1),
+            pushed=pushed,
+            again=AS_OFTEN if self.fault else ONCE,
+        )
+
+    def _told(self, sensor: SensorSpec, place: int, cycle: float, cycles: int) -> Array:
+        """Give what one of the sensors makes of its quantity, as a `Measurement` says it."""
+        times = np.arange(cycles) * cycle
+        random = np.random.default_rng([self.seed, place] if place else self.seed)
+        rows = np.zeros((cycles, 4))
+        gain, added, age, valid = rows.T
+        gain[:], added[:] = 1.0, self.offsets[place] + sensor.noise * random.standard_normal(cycles)
+        age[:], valid[:] = round(self.delay / cycle), 1.0
         valid[(times >= self.lost) & (times < self.lost + LOST * sensor.drop_out)] = 0.0
         first = min(round(self.fails / cycle), cycles - 1)
-        match self.fault:
+        match self.fault if place == self.failing else "":
             case "silent":
                 valid[first:] = 0.0
             case "no number":
@@ -184,7 +226,7 @@ class SensedHistory:
             case "jump":
                 added[first:] += JUMP * self.innovation * (self.seed / 2**32)
             case "noise":
-                added[first:] = self.offset + NOISIER * (added[first:] - self.offset)
+                added[first:] = self.offsets[place] + NOISIER * (added[first:] - self.offsets[place])
             case "sign":
                 gain[first:] = -1.0
             case "scale":
@@ -195,14 +237,7 @@ class SensedHistory:
                 age[first:] = round(LATER * self.delay / cycle)
             case "drop-outs":
                 valid[first:] = _coming_and_going(LOST * sensor.drop_out / cycle, cycles - first, random)
-        quantities = {"angle": "{}", "rate": "{}.rate", "sway": "sway.{}"}
-        return Measurement(
-            quantity=quantities[sensor.quantity].format(sensor.of),
-            shows=list(inputs).index("fSensor"),
-            valid=list(inputs).index("bSensorValid"),
-            cycles=rows,
-            again=AS_OFTEN if self.fault else ONCE,
-        )
+        return rows
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -241,27 +276,30 @@ def sensor_faults(
     """
     assert run.trace is not None
     issued = dict(zip(outputs, run.trace.T, strict=False))
-    yield from _misstated(spec, one, run.trace, issued, (cycle, period, resets))
-    noticed = issued["nSensorFault"]
-    at = int(np.argmax(noticed != 0.0)) * cycle
-    if one.fault:
-        yield from _faults_of_a_faulty_one(spec, one, run, at if noticed.any() else None, cycle)
+    axes, _, disturbance = planned_axes(spec), *_stated(spec)
+    for place, (number, direction) in enumerate(sensed_directions(spec).items()):
+        axis, fault = axes[number], one.fault if place == one.failing else ""
+        sway = run.trace[:, len(outputs) + direction.end_load]
+        yield from _misstated(disturbance, one, fault, (axis, issued, sway), (cycle, period, resets))
+        noticed = issued[axis.of("nSensorFault")]
+        at = int(np.argmax(noticed != 0.0)) * cycle
+        if fault:
+            yield from _faults_of_a_faulty_one(spec, one, run, (at if noticed.any() else None, sway), cycle)
+        elif noticed.any():
+            yield (
+                f"a sound sensor is taken for a faulty one ({axis.of('nSensorFault')} "
+                f"{noticed[noticed != 0.0][0]:.0f}), at {at:.2f} s"
+            )
+    if one.fault or run.stands < 0:
         return
-    if noticed.any():
-        yield (
-            f"a sound sensor is taken for a faulty one (nSensorFault {noticed[noticed != 0.0][0]:.0f}), "
-            f"at {at:.2f} s"
-        )
-    if run.stands < 0:
-        return
-    near = np.abs(issued["fPosition"] - issued["fPosition"][-1]) <= damping_room(spec)
+    places = np.stack([issued[axis.of("fPosition")] for axis in axes.values()])
+    near = (np.abs(places - places[:, -1:]) <= damping_room(spec)).all(axis=0)
     rests = (issued["bBusy"] == 0.0) | (near & (issued["bDamping"] != 0.0))  # not damped on the way
     first = min(round(last / cycle) + TAKEN_UP, len(rests) - 1)
     arrived = first + int(np.argmax(rests[first:]))
-    _, disturbance = _stated(spec)
     settled = max(arrived, round(one.ends / cycle)) + round(disturbance.settle / cycle)
-    sway = np.abs(run.trace[settled:, len(outputs) :])
-    for (load, most), column in zip(spec.check.residual_sway.items(), sway.T, strict=True):
+    sways = np.abs(run.trace[settled:, len(outputs) :])
+    for (load, most), column in zip(spec.check.residual_sway.items(), sways.T, strict=True):
         if len(column) and column.max() > most:
             late = np.flatnonzero(column > most)[-1] * cycle
             yield (
@@ -271,52 +309,50 @@ def sensor_faults(
 
 
 def _misstated(
-    spec: Spec,
+    disturbance: DisturbanceSpec,
     one: SensedHistory,
-    trace: Array,
-    issued: Mapping[str, Array],
+    fault: str,
+    given: tuple[BlockAxis, Mapping[str, Array], Array],
     times: tuple[float, float, Sequence[float]],
 ) -> Iterator[str]:
-    """Say whether what it estimates, or finds the sensor to show of the axis's own motions, is wrong."""
-    cycle, period, resets = times
-    plant, (_, disturbance) = spec.machine(), _stated(spec)
-    used = issued["bSensorUsed"] != 0.0
+    """Say whether what it estimates, or finds a sensor to show of the axis's own motions, is wrong."""
+    (axis, issued, sway), (cycle, period, resets) = given, times
+    used = issued[axis.of("bSensorUsed")] != 0.0
     if not one.fault:
-        sway = trace[:, trace.shape[1] - len(plant.loads) + plant.end_load.start]
-        apart = (np.abs(issued["fSwayEstimated"] - sway) - issued["fSwayUncertainty"]) * used
+        uncertainty = axis.of("fSwayUncertainty")
+        apart = (np.abs(issued[axis.of("fSwayEstimated")] - sway) - issued[uncertainty]) * used
         at = int(np.argmax(apart))
         if apart[at] > OFF * min(disturbance.swing.values()):
-            yield f"fSwayUncertainty is too small by {apart[at]:.3g} m, at {at * cycle:.2f} s"
-    if one.fault not in SHOWS or disturbance.gust is None:
+            yield f"{uncertainty} is too small by {apart[at]:.3g} m, at {at * cycle:.2f} s"
+    if fault not in SHOWS or disturbance.gust is None:
         return
     cycles = np.arange(len(used))
     used[[min(round(time / cycle), len(used) - 1) for time in resets]] = False  # it forgets
-    first = one.fails if one.fault else 0.0
+    first = one.fails if fault else 0.0
     rate, since = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
     swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
-    own = lfilter(swings.ravel(), fades, issued["fAcceleration"] * (cycles * cycle > first))
+    own = lfilter(swings.ravel(), fades, issued[axis.of("fAcceleration")] * (cycles * cycle > first))
     share = cycle / period
     strength = rate**2 * np.sqrt(lfilter([share], [1.0, share - 1.0], own**2)) / disturbance.gust.acceleration
     strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
     at = int(np.argmax(strength))
-    wrong = abs(issued["fSensorScale"][at] - SHOWS[one.fault])
+    scale = axis.of("fSensorScale")
+    wrong = abs(issued[scale][at] - SHOWS[fault])
     if strength[at] > STRONG and wrong > KNOWN_TO:
-        yield f"fSensorScale is wrong by {wrong:.3g}, at {at * cycle:.2f} s"
+        yield f"{scale} is wrong by {wrong:.3g}, at {at * cycle:.2f} s"
 
 
 def _faults_of_a_faulty_one(
-    spec: Spec, one: SensedHistory, run: BlockRun, noticed: float | None, cycle: float
+    spec: Spec, one: SensedHistory, run: BlockRun, found: tuple[float | None, Array], cycle: float
 ) -> Iterator[str]:
-    """Say what is wrong where the sensor is: noticed too late, or the load made to swing."""
-    sensor, disturbance = _stated(spec)
+    """Say what is wrong where a sensor is: noticed too late, or the load made to sway."""
+    (sensor, disturbance), (noticed, sway) = _stated(spec), found
     late = (noticed if noticed is not None else np.inf) - one.fails - sensor.drop_out
     if one.fault in NOTICED and late > sensor.drop_out:  # as much later, where news failed to come before
         yield f"the sensor's fault is not noticed ({one.fault}, at {one.fails:.2f} s)"
     if noticed is None and not run.promise and one.fault not in SHOW_NOTHING:
         yield f"the sensor's fault is neither noticed nor harmless ({one.fault}, at {one.fails:.2f} s)"
-    assert run.trace is not None
-    end = run.trace.shape[1] - len(spec.machine().loads) + spec.machine().end_load.start
-    swings = float(np.abs(run.trace[round(one.fails / cycle) :, end]).max(initial=0.0))
+    swings = float(np.abs(sway[round(one.fails / cycle) :]).max(initial=0.0))
     if swings > HARM * min(disturbance.swing.values()):
         yield f"a faulty sensor ({one.fault}) makes the load swing by {swings:.3g} m, at {one.fails:.2f} s"
 
@@ -330,23 +366,29 @@ def _coming_and_going(lost: float, cycles: int, random: np.random.Generator) -> 
 
 
 def _starts(
-    spec: Spec, share: float, phase: float, parameters: Mapping[str, float], places: Sequence[float]
+    spec: Spec,
+    swings: Sequence[tuple[float, float]],
+    parameters: Mapping[str, float],
+    places: Sequence[float],
 ) -> dict[str, float]:
-    """Let the slowest mode swing by a share of what is stated."""
+    """Let the slowest mode swing along each axis with a sensor by a share of what is stated, at a phase."""
     plant, (_, disturbance) = spec.machine(), _stated(spec)
-    at = linearize(plant, parameters, places)
-    by_load = dict(zip(plant.loads, np.abs(at.sway_gain @ at.modes[:, 0]).tolist(), strict=True))
-    size = share * min(swing / by_load[load] for load, swing in disturbance.swing.items())
-    swings, rate = size * np.cos(phase), -size * np.sin(phase) * at.frequencies[0]
-    found: dict[str, float] = {}
-    for coordinate, shape in zip(plant.unactuated, at.modes[:, 0].tolist(), strict=True):
-        found |= {coordinate.name: swings * shape, f"{coordinate.name}.rate": rate * shape}
-    return found
+    at, found = linearize(plant, parameters, places), np.zeros((2, len(plant.unactuated)))
+    for axis, (share, phase) in zip(sensed_directions(spec), swings, strict=True):
+        driven = driven_modes(at, axis)[:, 0]
+        shape = driven / driven[np.abs(driven).argmax()]
+        by_load = dict(zip(plant.loads, np.abs(at.sway_gain @ shape).tolist(), strict=True))
+        most = [swing / by_load[load] for load, swing in disturbance.swing.items() if by_load[load]]
+        size = share * min(most)
+        found += np.outer([size * np.cos(phase), -size * np.sin(phase) * at.frequencies[0]], shape)
+    names = [coordinate.name for coordinate in plant.unactuated]
+    rates = zip((f"{name}.rate" for name in names), found[1].tolist(), strict=True)
+    return dict(zip(names, found[0].tolist(), strict=True)) | dict(rates)
 
 
 def _stated(spec: Spec) -> tuple[SensorSpec, DisturbanceSpec]:
     sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
-    assert sensor is not None and disturbance is not None and len(planned_axes(spec)) == 1
+    assert sensor is not None and disturbance is not None
     return sensor, disturbance
 
 

@@ -214,7 +214,8 @@ def _shown(followed: Followed) -> Iterator[tuple[int, int]]:
 def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
     """Tell when it may, and when it must be unknown how the load swings."""
     may_be, must_be = np.zeros((2, followed.cycles), dtype=bool)
-    sees = followed.sensed("bSensorUsed") & motion.stands
+    used = [followed.sensed(axis.of("bSensorUsed")) for axis in followed.axes]
+    sees = np.all(used, axis=0) & motion.stands
     for order in followed.orders:
         moving, at = not motion.stands[max(0, order.begin - 1)], order.begin
         if order.kind == DISABLED:

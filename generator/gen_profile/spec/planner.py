@@ -17,15 +17,15 @@ Span = Annotated[tuple[float, float], Rising()]
 
 @attrs.frozen(kw_only=True)
 class SensorSpec(Checked, table="planner.sensor"):
-    """A sensor of one coordinate or load of the machine, in m (or rad) and s.
+    """A sensor of a coordinate or load of the machine, or one alike for each of several, in m (or rad), s.
 
     Attributes
     ----------
     quantity : str
         Whether it measures a coordinate (``angle``, in m where that is a length) or its rate, or the
         ``sway`` of a load in m.
-    of : str
-        Name of the coordinate or load, positive as in the machine's equations.
+    of : str, or tuple of str
+        Name of the coordinate or load, positive as in the machine's equations; or one along each axis.
     noise : float
         One standard deviation, independent from value to value.
     offset : float
@@ -37,11 +37,16 @@ class SensorSpec(Checked, table="planner.sensor"):
     """
 
     quantity: Literal["angle", "rate", "sway"]
-    of: str
+    of: str | tuple[str, ...]
     noise: Positive
     offset: NotNegative = 0.0
     delay: Annotated[tuple[NotNegative, NotNegative], Rising("times in s")] = (0.0, 0.0)
     drop_out: Positive = 0.5
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is measured, one or several."""
+        return (self.of,) if isinstance(self.of, str) else self.of
 
 
 @attrs.frozen(kw_only=True)

@@ -270,17 +270,16 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
             missing, of = ("disturbance", "sensor") if disturbance is None else ("sensor", "disturbance")
             yield f"planner.{missing}", Phrase("required by planner.{of}", of=of), f"planner.{of}"
         return
-    swing = [coordinate.name for coordinate in plant.unactuated]
-    if sensor.quantity == "sway" and sensor.of not in plant.loads:
-        yield (
-            "planner.sensor.of",
-            Phrase("no load of the machine{hint}", hint=suggestion(sensor.of, plant.loads)),
-        )
-    elif sensor.quantity != "sway" and sensor.of not in swing:
-        yield (
-            "planner.sensor.of",
-            Phrase("no coordinate that swings{hint}", hint=suggestion(sensor.of, swing)),
-        )
+    known = [coordinate.name for coordinate in plant.unactuated]
+    what = "coordinate that swings"
+    if sensor.quantity == "sway":
+        known, what = list(plant.loads), "load of the machine"
+    if not sensor.names:
+        yield "planner.sensor.of", Phrase("must name a {what}", what=what)
+    for name in sensor.names:
+        if name not in known:
+            problem = Phrase("no {what}{hint}", what=what, hint=suggestion(name, known))
+            yield "planner.sensor.of", problem
     if not disturbance.swing:
         yield "planner.disturbance.swing", "must name a load"
     for name in ("live_rate", "zones"):

@@ -99,7 +99,11 @@ class Structurer:
         """
         origin: Any = get_origin(kind)
         if origin in (Union, UnionType):
-            fitted = None if value is None else self.fit(value, get_args(kind)[0], where, words=words)
+            first, second = get_args(kind)
+            several = get_origin(second) is tuple and isinstance(value, list | tuple)
+            fitted = (
+                None if value is None else self.fit(value, second if several else first, where, words=words)
+            )
         elif origin is not None:
             of_form = {Annotated: self._constrained, Mapping: self._mapping, tuple: self._tuple}
             fitted = of_form.get(origin, self._choice)(value, get_args(kind), where, words)

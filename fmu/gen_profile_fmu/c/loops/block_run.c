@@ -22,9 +22,9 @@ typedef struct {
     size_t size;                         /* of the instance in bytes */
 } Block;
 
-/* Of a cycle: what the sensor makes of the quantity of so many cycles ago, gain x value + added, and how the air pushes. */
+/* Of a cycle: what a sensor makes of its quantity of so many cycles ago, gain x value + added. */
 typedef struct {
-    double gain, added, age, valid, pushed; /* pushed: m, as if the first axis were moved by so much */
+    double gain, added, age, valid;
 } Measured;
 
 typedef struct {
@@ -45,11 +45,12 @@ typedef struct {
     const double *ratios;                /* of the axis's position to the input */
     size_t n_marks;
     const long *marks;                   /* rising cycles, before which the block's instance is copied */
-    long n_measured;                     /* 0: no sensor; else cycles, as many as there may be */
-    const Measured *measured;
-    unsigned quantity;                   /* what it shows */
-    size_t shows, valid;                 /* places of two inputs */
-    double *shown;                       /* n_measured values, to be written */
+    size_t n_sensors;
+    const Measured *measured;            /* n_sensors of each cycle that there may be */
+    const double *pushed;                /* of each of these and each axis: m, as if the air moved it by so much */
+    const unsigned *quantities;          /* n_sensors: what they show */
+    const size_t *shows, *valid;         /* n_sensors: places of two inputs */
+    double *shown;                       /* as `measured`, to be written */
     long again;                          /* how often the axes may move on after they stood: the rest that lasts counts */
 } History;
 
@@ -121,24 +122,38 @@ static void take_loads(const History *history, const double *sway, bool counts, 
     }
 }
 
-/* What the sensor tells in a cycle, of which the plant stands at the beginning. */
+/* What sensors tell in a cycle, of which the plant stands at the beginning. */
 static int measure(const Fmu *fmu, const History *history, long k, double *inputs) {
-    const Measured *now = history->measured + k;
-    const int status = get(fmu, &history->quantity, 1, history->shown + k);
-    const long then = k - (long)now->age;
-    inputs[history->shows] = now->gain * history->shown[then < 0 ? 0 : then] + now->added;
-    inputs[history->valid] = now->valid;
+    const long n = (long)history->n_sensors;
+    const int status = get(fmu, history->quantities, history->n_sensors, history->shown + n * k);
+    for (long i = 0; i < n; i++) {
+        const Measured *now = history->measured + n * k + i;
+        const long then = k - (long)now->age;
+        inputs[history->shows[i]] = now->gain * history->shown[n * (then < 0 ? 0 : then) + i] + now->added;
+        inputs[history->valid[i]] = now->valid;
+    }
     return status;
 }
 
-/* `room`: 2 x n_outputs + n_loads + n_axes + n_inputs. */
+/* Let the plant follow the setpoints for a cycle, its axes where the air seems to have them. */
+static int follow(const Fmu *fmu, const Block *block, const History *history, long k, double *setpoints) {
+    memcpy(setpoints, history->setpoints, history->n_setpoints * sizeof(double));
+    for (size_t i = 0; history->n_sensors > 0 && i < block->n_axes; i++) {
+        setpoints[history->led[i]] += history->pushed[k * (long)block->n_axes + (long)i];
+    }
+    const int status = set(fmu, history->setpoint_references, history->n_setpoints, setpoints);
+    return status == GOOD ? step(fmu, (double)k * history->cycle, history->cycle) : status;
+}
+
+/* `room`: 2 x n_outputs + n_loads + n_axes + n_inputs + n_setpoints. */
 EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history, double *room, Found *found) {
     double *before = NULL, *now = room;
     double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads, *inputs = stood + block->n_axes;
+    double *setpoints = inputs + block->n_inputs;
     long last = history->start_cycles[history->n_rows - 1], end = last + history->longest;
-    long again = history->n_measured > 0 ? history->again : 0;
+    long again = history->n_sensors > 0 ? history->again : 0;
     size_t row = 0, mark = 0;
-    bool promised = history->n_measured == 0; /* since it stands: a sensor may tell only later that the load is calm */
+    bool promised = history->n_sensors == 0; /* since it stands: a sensor may tell only later that the load is calm */
     begin_axes(block, found);
     found->stands = -1;
     found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
@@ -146,7 +161,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         while (row + 1 < history->n_rows && history->start_cycles[row + 1] <= k) row++;
         memcpy(inputs, history->inputs + row * block->n_inputs, block->n_inputs * sizeof(double));
         for (size_t i = 0; i < block->n_axes; i++) inputs[history->actual[i]] += history->setpoints[history->led[i]];
-        if (history->n_measured > 0 && measure(fmu, history, k, inputs) != GOOD) found->status = !GOOD;
+        if (history->n_sensors > 0 && measure(fmu, history, k, inputs) != GOOD) found->status = !GOOD;
         for (; mark < history->n_marks && history->marks[mark] == k; mark++) {
             memcpy(found->copies + mark * block->size, block->instance, block->size);
         }
@@ -165,7 +180,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         if (k >= last && found->stands < 0 && standing(block, now)) {
             found->stands = k;
             end = k + history->settle + history->watch;
-            promised = history->n_measured == 0;
+            promised = history->n_sensors == 0;
             for (size_t i = 0; i < block->n_axes; i++) stood[i] = now[block->axes[3 * i]];
         }
         for (size_t i = 0; i < block->n_axes; i++) {
@@ -177,11 +192,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         for (size_t i = 0; i < history->n_hoists; i++) {
             history->setpoints[history->hoists[i]] = history->ratios[i] * inputs[history->columns[i]];
         }
-        const double alone = history->setpoints[history->led[0]];
-        if (history->n_measured > 0) history->setpoints[history->led[0]] += history->measured[k].pushed;
-        if (found->status == GOOD) found->status = set(fmu, history->setpoint_references, history->n_setpoints, history->setpoints);
-        history->setpoints[history->led[0]] = alone;
-        if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);
+        if (found->status == GOOD) found->status = follow(fmu, block, history, k, setpoints);
         if (found->status == GOOD) found->status = get(fmu, history->load_references, history->n_loads, sway);
         if (found->stands >= 0 && found->promise && !promised) {
             promised = true;
