@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from itertools import combinations, pairwise, product
-from math import pi, prod
+from math import inf, pi, prod
 from multiprocessing import get_all_start_methods, get_context
 from typing import Any
 
@@ -16,7 +16,7 @@ from flint import acb_mat, arb, ctx
 
 from gen_profile_recheck.axes import axis_pieces, quintic
 from gen_profile_recheck.boxes import MachineBox, MotionPiece
-from gen_profile_recheck.enclosure import NotProvedError, SwayClaim, require
+from gen_profile_recheck.enclosure import NotProvedError, SwayClaim, prove
 from gen_profile_recheck.jets import derivatives
 from gen_profile_recheck.machines import MACHINES
 from gen_profile_recheck.reading import (
@@ -31,8 +31,13 @@ from gen_profile_recheck.reading import (
 
 PRECISION = 64  # bits of balls
 SAME = 1e-9  # relative, by which what is stated may be off for rounding
+NEAR, STANDING = 1e-6, 1e-7  # of a move, within which an axis is at its ends and travel, and stands
 OVERSHOOT = {"velocity": 0.02, "acceleration": 0.4}  # beyond limits of the axes, beside rounding
 KINDS = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}
+OF_AXIS = {*KINDS, "travel"}
+OF_SPEC = {"name", "plant", "move", "actuator", "robustness", "cost", "solver", "limits", "check", "axis"}
+OF_SPEC |= {"export", "can", "planner"}
+OF_CHECK = {"residual_sway", "uncertain", "spans", "samples", "seed", "path", "wind"}
 ALLOWED = 1.01  # of limits.sway
 SHORTEST_WATCH = 4.0  # s; or two of the slowest periods
 
@@ -68,10 +73,12 @@ def check(
         raise NotProvedError(f"the certificate is none of the kind {FORMAT!r}")
     if wrong := sorted(KEYS ^ document.keys()):
         raise NotProvedError(f"the certificate lacks {', '.join(wrong)}, or should not have it")
-    if hashlib.sha256(artefact).hexdigest() != document["artefact_sha256"]:
+    digest = hashlib.sha256(artefact).hexdigest()
+    if digest != document["artefact_sha256"]:
         raise NotProvedError("the certificate is about another artefact")
     try:
-        case = Case(artefact, spec_of(read_json(spec), document["spec_sha256"]), document)
+        case = Case(artefact, spec_of(read_json(spec), digest, document["spec_sha256"]), document)
+        case.require_move()
         case.require_setpoints()
         case.require_times()
         case.require_cover()
@@ -95,14 +102,22 @@ class Case:
         machine = MACHINES.get(spec["plant"].get("type"))
         if machine is None:
             raise NotProvedError("not covered: machines other than those in machines.py")
-        if spec["actuator"]["type"] != "ideal":
+        if spec["actuator"] != {"type": "ideal"}:
             raise NotProvedError("not covered: drives that lag behind their setpoints")
-        if "foreign" in spec["check"] or "fmu" in spec["check"]:
-            raise NotProvedError("not covered: a foreign model of the machine (check.fmu)")
+        limits, rates = spec["limits"], [f"{name}.rate" for name in machine.coordinates]
+        known = [
+            (spec["check"], OF_CHECK),
+            (limits, OF_AXIS | {"sway", "axis"}),
+            (limits["axis"], machine.axes),
+        ]
+        known += [(one, OF_AXIS) for one in limits["axis"].values()]
+        known.append((spec["move"].get("initial", {}), [*machine.coordinates, *rates]))
+        if more := [key for table, keys in known for key in table if key not in keys]:
+            raise NotProvedError(f"not covered: {more[0]} in the spec")
         self.machine, self.spec, self.document, ranges = machine, spec, document, ranges_of(spec)
         if {name: tuple(ends) for name, ends in document["ranges"].items()} != ranges:
             raise NotProvedError("the certificate is about other ranges")
-        self.ranges = {name: ranges[name] for name in document["ranges"]}
+        self.ranges = ranges
         self.parameters = {name: one for name, one in spec["plant"].items() if isinstance(one, (int, float))}
         self.setpoints = read_setpoints(artefact, spec, machine.axes)
         self.proof = ProofMaterial(document, 2 * len(machine.coordinates), len(machine.axes))
@@ -117,12 +132,42 @@ class Case:
         machines = f"Proved of all machines with {named or 'nominal parameters'}"
         return f"{machines}: {times} at most {bounds}{on_the_way}."
 
+    def _limits(self, axis: str) -> Mapping[str, Any]:
+        limits = self.spec["limits"]
+        return {**limits, **limits["axis"].get(axis, {})}
+
+    def require_move(self) -> None:
+        """Require the move that the spec asks for: its ends, its time and its travel."""
+        move, setpoints = self.spec["move"], self.setpoints
+        times, cycle, speeds = setpoints.times, setpoints.cycle, move["final_velocity"]
+        due = times[-1] if (shortest := move["duration"] == "minimum") else move["duration"]
+        sizes = [abs(end - start) for start, end in zip(move["start"], move["target"], strict=True)]
+        longest, arrived = max(sizes) or 1.0, 0
+        for n, (name, size, speed) in enumerate(zip(self.machine.axes, sizes, speeds, strict=True)):
+            positions, resolution = setpoints.positions[n], setpoints.resolution[n]
+            near, end = NEAR * (size or longest) + resolution, move["target"][n] + (times[-1] - due) * speed
+            off = max(abs(positions[0] - move["start"][n]), abs(positions[-1] - end))
+            if off > near + shortest * cycle * abs(speed):
+                raise NotProvedError(f"the setpoints do not move {name} from where to where the spec asks")
+            low, high = self._limits(name).get("travel", (-inf, inf))
+            if min(positions) < low - near or max(positions) > high + near:
+                raise NotProvedError(f"the setpoints take {name} beyond its travel")
+            still = STANDING * longest + resolution / 2
+            away = (
+                position - positions[-1] - (times[row] - times[-1]) * speed
+                for row, position in enumerate(positions)
+            )
+            arrived = max(
+                arrived, 1 + max((row for row, one in enumerate(away) if abs(one) > still), default=-1)
+            )
+        if times[max(arrived - 1, 0)] >= due * (1 - SAME) or times[-1] + cycle <= due * (1 + SAME):
+            raise NotProvedError("the setpoints arrive at another time than the spec asks")
+
     def require_setpoints(self) -> None:
         """Require what is said of velocity, acceleration and jerk, where the spec limits them only."""
-        limits, said = self.spec["limits"], self.document["setpoints"]
-        asked: dict[str, dict[str, Any]] = {}
+        said, asked = self.document["setpoints"], dict[str, dict[str, Any]]()
         for number, name in enumerate(self.machine.axes):
-            own = {**limits, **limits.get("axis", {}).get(name, {})}
+            own = self._limits(name)
             for order, (kind, unit) in enumerate(KINDS.items(), start=1):
                 if (limit := own.get(kind)) is None:
                     continue
@@ -230,7 +275,7 @@ class Case:
         def prove_box(number: int) -> None:
             box = MachineBox(self.machine, self.parameters, self.ranges, proof.parts[number], proof.terms)
             motion = zip(halves, zip(*axes, strict=True), proof.motion(number), strict=True)
-            require([MotionPiece(box, *one) for one in motion], list(proof.scales(number)), start, claims)
+            prove([MotionPiece(box, *one) for one in motion], list(proof.scales(number)), start, claims)
 
         if processes == 1 or len(numbers) == 1 or "fork" not in get_all_start_methods():
             for done, _ in enumerate(map(prove_box, numbers), start=1):

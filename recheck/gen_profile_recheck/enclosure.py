@@ -37,7 +37,7 @@ class NotProvedError(Exception):
     """A sentence that says why nothing is proved."""
 
 
-def require(
+def prove(
     pieces: Sequence[MotionPiece], scales: Sequence[Any], start: Sequence[float], claims: Sequence[SwayClaim]
 ) -> None:
     """Prove the bounds of all sways of the machines of a box, piece after piece.
@@ -48,7 +48,7 @@ def require(
     """
     for more in MORE:
         try:
-            _require(pieces, scales, start, claims, more)
+            _prove(pieces, scales, start, claims, more)
         except NotProvedError:
             if more == MORE[-1]:
                 raise
@@ -56,7 +56,7 @@ def require(
             return
 
 
-def _require(
+def _prove(
     pieces: Sequence[MotionPiece], scales: Any, start: Sequence[float], claims: Sequence[SwayClaim], more: int
 ) -> None:
     error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
