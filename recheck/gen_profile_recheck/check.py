@@ -106,6 +106,7 @@ class Case:
             raise NotProvedError("not covered: drives that lag behind their setpoints")
         limits, rates = spec["limits"], [f"{name}.rate" for name in machine.coordinates]
         known = [
+            (spec, OF_SPEC),
             (spec["check"], OF_CHECK),
             (limits, OF_AXIS | {"sway", "axis"}),
             (limits["axis"], machine.axes),
