@@ -34,6 +34,11 @@ class Machine:
     sway: Callable[[Values, Values, SimpleNamespace], list[Scalar]]
     constants: Callable[[Mapping[str, Scalar]], SimpleNamespace] = lambda p: SimpleNamespace(**p)
 
+    @property
+    def states(self) -> list[str]:
+        """Name all coordinates, and then their rates."""
+        return [name + of for of in ("", ".rate") for name in self.coordinates]
+
     def speed(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give dq of x = (q, w), where w = dq − D v does not leap when v does."""
         q, w = x[: len(x) // 2], x[len(x) // 2 :]

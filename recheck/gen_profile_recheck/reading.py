@@ -20,8 +20,6 @@ from typing import Any
 
 from flint import arb_mat
 
-from gen_profile_recheck.enclosure import NotProvedError
-
 FORMAT = "gen-profile certificate 1"
 CLAIMS = {"bounds_m", "limits_m", "on_the_way", "setpoints", "ranges", "from_s", "until_s"}
 KEYS = CLAIMS | {"format", "spec_sha256", "artefact_sha256", "axes", "parts", "terms", "motions", "scales"}
@@ -34,10 +32,14 @@ GREATEST = 1 << 45  # whole number that is a coefficient
 MOST, MOST_CYCLES = 1 << 27, 1 << 21  # numbers of an array, and cycles of a block
 
 
-def require(fits: bool, what: str) -> None:
-    """Raise a ValueError where something is not as it should be."""
+class NotProvedError(Exception):
+    """A sentence that says why nothing is proved."""
+
+
+def require(fits: bool, why_not: str) -> None:
+    """Raise a `NotProvedError` where something is not as it should be."""
     if not fits:
-        raise ValueError(what)
+        raise NotProvedError(why_not)
 
 
 def read_json(text: bytes) -> Any:
@@ -49,11 +51,11 @@ def read_json(text: bytes) -> Any:
     """
 
     def finite(number: str) -> float:
-        require(isfinite(value := float(number)), f"{number[:20]} is no finite number")
+        require(isfinite(value := float(number)), f"a file is no JSON of finite numbers ({number[:20]})")
         return value
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        require(len(dict(pairs)) == len(pairs), "a key stands twice")
+        require(len(dict(pairs)) == len(pairs), "a key stands twice in a file")
         return dict(pairs)
 
     try:
@@ -86,8 +88,8 @@ def spec_of(document: Mapping[str, Any], artefact: str, digest: str) -> Mapping[
     own = [one for one in listed if artefact in (file["sha256"] for file in one.get("artefacts", ()))]
     spec: Mapping[str, Any] = (own or listed)[0]["spec"]
     text = json.dumps(spec, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
-    if hashlib.sha256(text.encode("ascii")).hexdigest() != digest:
-        raise NotProvedError("the certificate is about another spec")
+    found = hashlib.sha256(text.encode("ascii")).hexdigest()
+    require(found == digest, "the certificate is about another spec")
     return spec
 
 

@@ -24,11 +24,10 @@ from gen_profile_recheck.__main__ import main
 from gen_profile_recheck.axes import quintic
 from gen_profile_recheck.boxes import Expansion
 from gen_profile_recheck.check import check
-from gen_profile_recheck.enclosure import NotProvedError
 from gen_profile_recheck.halving import keeps
 from gen_profile_recheck.jets import along, inverse, moved, sine_cosine
 from gen_profile_recheck.machines import MACHINES
-from gen_profile_recheck.reading import read_setpoints
+from gen_profile_recheck.reading import NotProvedError, read_setpoints
 
 KINDS = [
     "double-pendulum-crane",
