@@ -110,6 +110,40 @@ def terms_fewer(document):
     document["terms"][0] -= 1
 
 
+def quanta_uneven(document):
+    document["motions"][0]["quanta"][0] *= 1.0 + 2.0**-50
+
+
+def number_as_text(document):
+    bounds = document["bounds_m"]
+    bounds[next(iter(bounds))] = str(bounds[next(iter(bounds))])
+
+
+def part_of_a_part(document):
+    document["parts"][0] = [[0.5, 0.25]]
+
+
+def terms_fractional(document):
+    document["terms"][0] += 0.5
+
+
+def shape_fractional(document):
+    document["motions"][0]["shape"][0] += 0.5
+
+
+def hidden_beside_an_array(document):
+    document["scales"]["largest_met_m"] = 0.0
+
+
+def hidden_behind_an_array(document):
+    packed = document["motions"][0]
+    packed["zlib"] = base64.b64encode(base64.b64decode(packed["zlib"]) + b"more").decode()
+
+
+def hidden_among_axes(document):
+    document["axes"]["jerk"] = []
+
+
 def another_file(document):
     document["artefact_sha256"] = "0" * 64
 
@@ -146,5 +180,13 @@ FORGERIES = (
     sums_inexact,
     quanta_odd,
     terms_fewer,
+    quanta_uneven,
+    number_as_text,
+    part_of_a_part,
+    terms_fractional,
+    shape_fractional,
+    hidden_beside_an_array,
+    hidden_behind_an_array,
+    hidden_among_axes,
     another_file,
 )

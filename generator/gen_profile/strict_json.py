@@ -1,4 +1,4 @@
-"""JSON from outside: finite numbers only, and nested no deeper than Python takes."""
+"""JSON from outside: finite numbers only, every key once, and nested no deeper than Python takes."""
 
 from __future__ import annotations
 
@@ -8,17 +8,25 @@ from typing import Any
 
 
 def parse_json(text: str | bytes) -> Any:
-    """Read JSON as RFC 8259 has it: without NaN and Infinity, which Python takes.
+    """Read JSON that every reader takes alike: no NaN and Infinity, and no key twice, which Python allows.
 
     Raises
     ------
     ValueError
-        It is none, nested too deeply, or holds a number that is not finite.
+        It is none, nested too deeply, or holds a number that is not finite or a key that stands twice.
     """
     try:
-        return json.loads(text, parse_constant=_finite, parse_float=_finite)
+        return json.loads(text, parse_constant=_finite, parse_float=_finite, object_pairs_hook=_once)
     except RecursionError as error:
         raise ValueError("arrays or objects nested too deeply") from error
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document = dict(pairs)
+    if len(document) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"{next(key for key in keys if keys.count(key) > 1)[:40]!r} stands there twice")
+    return document
 
 
 def _finite(text: str) -> float:

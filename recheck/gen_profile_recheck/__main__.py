@@ -22,7 +22,7 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         from gen_profile_recheck.check import TRUST, check  # noqa: PLC0415
-        from gen_profile_recheck.enclosure import NotProvedError  # noqa: PLC0415
+        from gen_profile_recheck.reading import NotProvedError  # noqa: PLC0415
     except ImportError:
         print(MISSING, file=sys.stderr)
         return 2

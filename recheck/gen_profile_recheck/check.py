@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import signal
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from fractions import Fraction
 from itertools import combinations, pairwise, product
-from math import pi, prod
+from math import inf, pi, prod
 from multiprocessing import get_all_start_methods, get_context
 from typing import Any
 
@@ -16,23 +16,30 @@ from flint import acb_mat, arb, ctx
 
 from gen_profile_recheck.axes import axis_pieces, quintic
 from gen_profile_recheck.boxes import MachineBox, MotionPiece
-from gen_profile_recheck.enclosure import NotProvedError, SwayClaim, require
+from gen_profile_recheck.enclosure import SwayClaim, prove
 from gen_profile_recheck.jets import derivatives
 from gen_profile_recheck.machines import MACHINES
 from gen_profile_recheck.reading import (
     FORMAT,
     KEYS,
+    NotProvedError,
     ProofMaterial,
     ranges_of,
     read_json,
     read_setpoints,
+    require,
     spec_of,
 )
 
 PRECISION = 64  # bits of balls
 SAME = 1e-9  # relative, by which what is stated may be off for rounding
+NEAR, STANDING = 1e-6, 1e-7  # of a move, within which an axis is at its ends and travel, and stands
 OVERSHOOT = {"velocity": 0.02, "acceleration": 0.4}  # beyond limits of the axes, beside rounding
 KINDS = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}
+OF_AXIS = {*KINDS, "travel"}
+OF_SPEC = {"name", "plant", "move", "actuator", "robustness", "cost", "solver", "limits", "check", "axis"}
+OF_SPEC |= {"export", "can", "planner"}
+OF_CHECK = {"residual_sway", "uncertain", "spans", "samples", "seed", "path", "wind"}
 ALLOWED = 1.01  # of limits.sway
 SHORTEST_WATCH = 4.0  # s; or two of the slowest periods
 
@@ -63,15 +70,15 @@ def check(
         Why it is not.
     """
     ctx.prec = PRECISION
-    document = read_json(certificate)
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise NotProvedError(f"the certificate is none of the kind {FORMAT!r}")
-    if wrong := sorted(KEYS ^ document.keys()):
-        raise NotProvedError(f"the certificate lacks {', '.join(wrong)}, or should not have it")
-    if hashlib.sha256(artefact).hexdigest() != document["artefact_sha256"]:
-        raise NotProvedError("the certificate is about another artefact")
+    document, digest = read_json(certificate), hashlib.sha256(artefact).hexdigest()
+    known = isinstance(document, dict) and document.get("format") == FORMAT
+    require(known, f"the certificate is none of the kind {FORMAT!r}")
+    wrong = sorted(KEYS ^ document.keys())
+    require(not wrong, f"the certificate lacks {', '.join(wrong)}, or should not have it")
+    require(digest == document["artefact_sha256"], "the certificate is about another artefact")
     try:
-        case = Case(artefact, spec_of(read_json(spec), document["spec_sha256"]), document)
+        case = Case(artefact, spec_of(read_json(spec), digest, document["spec_sha256"]), document)
+        case.require_move()
         case.require_setpoints()
         case.require_times()
         case.require_cover()
@@ -92,17 +99,21 @@ class Case:
     """
 
     def __init__(self, artefact: bytes, spec: Mapping[str, Any], document: Mapping[str, Any]) -> None:
-        machine = MACHINES.get(spec["plant"].get("type"))
-        if machine is None:
-            raise NotProvedError("not covered: machines other than those in machines.py")
-        if spec["actuator"]["type"] != "ideal":
-            raise NotProvedError("not covered: drives that lag behind their setpoints")
-        if "foreign" in spec["check"] or "fmu" in spec["check"]:
-            raise NotProvedError("not covered: a foreign model of the machine (check.fmu)")
-        self.machine, self.spec, self.document, ranges = machine, spec, document, ranges_of(spec)
-        if {name: tuple(ends) for name, ends in document["ranges"].items()} != ranges:
-            raise NotProvedError("the certificate is about other ranges")
-        self.ranges = {name: ranges[name] for name in document["ranges"]}
+        require(spec["plant"].get("type") in MACHINES, "not covered: machines that are not in machines.py")
+        require(spec["actuator"] == {"type": "ideal"}, "not covered: drives that lag behind their setpoints")
+        machine, limits, initial = MACHINES[spec["plant"]["type"]], spec["limits"], spec["move"]["initial"]
+        tables: list[tuple[Any, Container[str]]] = [
+            (spec, OF_SPEC),
+            (spec["check"], OF_CHECK),
+            (limits, OF_AXIS | {"sway", "axis"}),
+        ]
+        tables += [(limits["axis"], machine.axes), (initial, machine.states)]
+        tables += [(one, OF_AXIS) for one in limits["axis"].values()]
+        more = [key for table, known in tables for key in table if key not in known]
+        require(not more, f"not covered: {', '.join(more)} in the spec")
+        self.machine, self.spec, self.document, self.ranges = machine, spec, document, ranges_of(spec)
+        claimed = {name: tuple(ends) for name, ends in document["ranges"].items()}
+        require(claimed == self.ranges, "the certificate is about other ranges")
         self.parameters = {name: one for name, one in spec["plant"].items() if isinstance(one, (int, float))}
         self.setpoints = read_setpoints(artefact, spec, machine.axes)
         self.proof = ProofMaterial(document, 2 * len(machine.coordinates), len(machine.axes))
@@ -117,31 +128,51 @@ class Case:
         machines = f"Proved of all machines with {named or 'nominal parameters'}"
         return f"{machines}: {times} at most {bounds}{on_the_way}."
 
+    def _limits(self, axis: str) -> Mapping[str, Any]:
+        limits = self.spec["limits"]
+        return {**limits, **limits["axis"].get(axis, {})}
+
+    def require_move(self) -> None:
+        """Require the move that the spec asks for: its ends, its time and its travel."""
+        move, setpoints = self.spec["move"], self.setpoints
+        times, cycle, speeds = setpoints.times, setpoints.cycle, move["final_velocity"]
+        due = times[-1] if (shortest := move["duration"] == "minimum") else move["duration"]
+        sizes = [abs(end - start) for start, end in zip(move["start"], move["target"], strict=True)]
+        longest, arrived = max(sizes) or 1.0, 0
+        for n, (name, size, speed) in enumerate(zip(self.machine.axes, sizes, speeds, strict=True)):
+            positions, resolution = setpoints.positions[n], setpoints.resolution[n]
+            near, end = NEAR * (size or longest) + resolution, move["target"][n] + (times[-1] - due) * speed
+            off = max(abs(positions[0] - move["start"][n]), abs(positions[-1] - end))
+            fits = off <= near + shortest * cycle * abs(speed)
+            require(fits, f"the setpoints do not move {name} from where to where the spec asks")
+            low, high = self._limits(name).get("travel", (-inf, inf))
+            fits = low - near <= min(positions) and max(positions) <= high + near
+            require(fits, f"the setpoints take {name} beyond its travel")
+            onward = (positions[-1] + (time - times[-1]) * speed for time in times)
+            away = (abs(one - other) for one, other in zip(positions, onward, strict=True))
+            still = STANDING * longest + resolution / 2
+            arrived = max([arrived, *(row for row, one in enumerate(away, start=1) if not one <= still)])
+        late, early = times[max(arrived - 1, 0)] >= due * (1 - SAME), times[-1] + cycle <= due * (1 + SAME)
+        require(not (late or early), "the setpoints arrive at another time than the spec asks")
+
     def require_setpoints(self) -> None:
         """Require what is said of velocity, acceleration and jerk, where the spec limits them only."""
-        limits, said = self.spec["limits"], self.document["setpoints"]
-        asked: dict[str, dict[str, Any]] = {}
+        said, asked = self.document["setpoints"], dict[str, dict[str, Any]]()
         for number, name in enumerate(self.machine.axes):
-            own = {**limits, **limits.get("axis", {}).get(name, {})}
-            for order, (kind, unit) in enumerate(KINDS.items(), start=1):
+            length, own = "rad" if name in ("slew", "hub") else "m", self._limits(name)
+            for order, (kind, per) in enumerate(KINDS.items(), start=1):
                 if (limit := own.get(kind)) is None:
                     continue
                 rounding = 2 ** (order - 1) * self.setpoints.resolution[number] / self.setpoints.cycle**order
-                claim, length = said[name][kind], "rad" if name in ("slew", "hub") else "m"
-                asked.setdefault(name, {})[kind] = {
-                    "bound": claim["bound"],
-                    "limit": limit,
-                    "rounding": claim["rounding"],
-                    "unit": f"{length}/{unit}",
-                }
-                if not self._difference(number, order) <= claim["bound"] * (1 + SAME):
-                    raise NotProvedError(f"the setpoints ask {name} for more {kind} than is said")
-                if kind in OVERSHOOT and claim["bound"] > (1 + OVERSHOOT[kind]) * limit + rounding:
-                    raise NotProvedError(f"the setpoints break the limit of {kind} of {name}")
-                if abs(claim["rounding"] - rounding) > SAME * rounding:
-                    raise NotProvedError(f"the rounding of {kind} of {name} is another")
-        if said != asked:
-            raise NotProvedError("something else is said of setpoints than the spec limits")
+                claim = {**said[name][kind], "limit": limit, "unit": f"{length}/{per}"}
+                asked.setdefault(name, {})[kind] = claim
+                most = (1 + OVERSHOOT.get(kind, inf)) * limit + rounding
+                fits = self._difference(number, order) <= claim["bound"] * (1 + SAME)
+                require(fits, f"the setpoints ask {name} for more {kind} than is said")
+                require(claim["bound"] <= most, f"the setpoints break the limit of {kind} of {name}")
+                fits = abs(claim["rounding"] - rounding) <= SAME * rounding and len(claim) == 4
+                require(fits, f"the rounding of {kind} of {name} is another")
+        require(said == asked, "something else is said of setpoints than the spec limits")
 
     def _difference(self, axis: int, order: int) -> float:
         """Bound an axis' difference quotients, with those before the first and after the last setpoint."""
@@ -158,27 +189,23 @@ class Case:
         begin, until, knots = self.document["from_s"], self.document["until_s"], self.proof.knots
         times = self.setpoints.times
         moving = {knot for knot in knots if knot <= times[-1]}
-        if begin != times[-1] or knots[0] != times[0] or times[-1] not in moving or not moving <= set(times):
-            raise NotProvedError("the certificate's motion of the axes does not belong to the setpoints")
+        ends = begin == times[-1] and knots[0] == times[0] and times[-1] in moving
+        fits = ends and moving <= set(times)
+        require(fits, "the certificate's motion of the axes does not belong to the setpoints")
         corners = [dict(zip(self.ranges, ends, strict=True)) for ends in product(*self.ranges.values())]
         corners = corners if len(self.ranges) <= 3 else [corners[0], corners[-1]]
         changes = [{}, *corners, *({name: end} for name, ends in self.ranges.items() for end in ends)]
         slowest = min(self._frequency(self.parameters | change) for change in changes)
         watched = max(SHORTEST_WATCH, 4 * pi / slowest)
-        if not (watched * (1 - SAME) <= until - begin and until <= knots[-1]):
-            raise NotProvedError("the sway is not bounded for as long as the check watches it")
+        fits = watched * (1 - SAME) <= until - begin and until <= knots[-1]
+        require(fits, "the sway is not bounded for as long as the check watches it")
 
     def _frequency(self, parameters: Mapping[str, float]) -> float:
         """Find the slowest frequency at the target in rad/s, which bounds nothing but how long to watch."""
-        still, axes = (
-            [arb(0)] * len(self.machine.coordinates),
-            [arb(one) for one in self.spec["move"]["target"]],
-        )
-        k, rest = (
-            self.machine.constants({name: arb(value) for name, value in parameters.items()}),
-            [arb(0)] * len(axes),
-        )
-        pulls = derivatives(lambda q: self.machine.drift(q, still, axes, rest, k), still)
+        axes, still = [arb(one) for one in self.spec["move"]["target"]], [arb(0)] * self.proof.coordinates
+        k = self.machine.constants({name: arb(value) for name, value in parameters.items()})
+        q, dq, v = still[::2], still[::2], [arb(0)] * len(axes)
+        pulls = derivatives(lambda q: self.machine.drift(q, dq, axes, v, k), q)
         values = acb_mat([[-arb(one) for one in row] for row in pulls]).eig(algorithm="approx")
         return float(min(float(one.real.mid()) for one in values) ** 0.5)
 
@@ -190,28 +217,30 @@ class Case:
         )
         volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in parts), Fraction(0))
         apart = (not all(map(_meet, *pair)) for pair in combinations(parts, 2))
-        if not (inside and volume == 1 and all(apart)):
-            raise NotProvedError("the boxes are not all machines of the ranges, each of them once")
+        require(
+            inside and volume == 1 and all(apart),
+            "the boxes are not all machines of the ranges, each of them once",
+        )
 
     def claims(self) -> list[SwayClaim]:
         """List the bounds that are claimed, which must be all that the spec asks, and keep its limits."""
         limits, bounds, way = (self.document[name] for name in ("limits_m", "bounds_m", "on_the_way"))
         loads, sway = self.machine.loads, self.spec["limits"].get("sway")
-        if limits != self.spec["check"]["residual_sway"] or not set(loads) == limits.keys() == bounds.keys():
-            raise NotProvedError("the certificate is about other limits than the spec's, or other loads")
+        fits = limits == self.spec["check"]["residual_sway"] and set(loads) == limits.keys() == bounds.keys()
+        require(fits, "the certificate is about other limits than the spec's, or other loads")
         arrived = self.proof.knots.index(self.setpoints.times[-1])
         claims = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
-        kept = [bounds[load] <= limits[load] for load in loads]
-        name, both = self.machine.end_load
-        if way != (
-            None if sway is None else {"load": name, "bound_m": way["bound_m"], "limit_m": ALLOWED * sway}
-        ):
-            raise NotProvedError("the certificate says something else of the sway on the way than the spec")
-        if way is not None:
-            kept.append(way["bound_m"] <= way["limit_m"])
+        kept, asked, (name, both) = (
+            [bounds[load] <= limits[load] for load in loads],
+            None,
+            self.machine.end_load,
+        )
+        if sway is not None:
+            asked = {"load": name, "bound_m": way["bound_m"], "limit_m": ALLOWED * sway}
+            kept.append(way["bound_m"] <= asked["limit_m"])
             claims.append(SwayClaim(both, 0, way["bound_m"]))
-        if not all(kept):
-            raise NotProvedError("a bound is above its limit")
+        require(way == asked, "the certificate says something else of the sway on the way than the spec")
+        require(all(kept), "a bound is above its limit")
         return claims
 
     def prove(self, progress: Progress, processes: int) -> None:
@@ -223,14 +252,13 @@ class Case:
         ):
             smooth = [quintic(half, *one) for half, one in zip(halves, ends, strict=True)]
             axes.append(list(axis_pieces(proof.knots, smooth, setpoints.times, positions, velocity)))
-        names = [name + of for of in ("", ".rate") for name in self.machine.coordinates]
-        start = [self.spec["move"].get("initial", {}).get(name, 0.0) for name in names]
+        start = [self.spec["move"]["initial"].get(name, 0.0) for name in self.machine.states]
         claims, numbers = self.claims(), range(len(proof.parts))
 
         def prove_box(number: int) -> None:
             box = MachineBox(self.machine, self.parameters, self.ranges, proof.parts[number], proof.terms)
             motion = zip(halves, zip(*axes, strict=True), proof.motion(number), strict=True)
-            require([MotionPiece(box, *one) for one in motion], list(proof.scales(number)), start, claims)
+            prove([MotionPiece(box, *one) for one in motion], list(proof.scales(number)), start, claims)
 
         if processes == 1 or len(numbers) == 1 or "fork" not in get_all_start_methods():
             for done, _ in enumerate(map(prove_box, numbers), start=1):

@@ -17,10 +17,11 @@ from gen_profile_recheck.boxes import MachineState, MotionPiece, Values, wide
 from gen_profile_recheck.disturbance import Disturbance
 from gen_profile_recheck.halving import keeps
 from gen_profile_recheck.jets import derivatives
+from gen_profile_recheck.reading import NotProvedError, require
 from gen_profile_recheck.scales import ScaleMatrix, multiplied, norm
 
 TERMS, FEW_TERMS = 16, 8  # of power series in time: for the defect and sway, and for μ
-MORE = (2, 6)  # nodes than terms in each parameter, for the defect, and where that is not enough
+FEWER, MORE = 2, 6  # nodes than terms in each parameter, for the defect, and where that is not enough
 ATTEMPTS, WIDER = 12, 2
 
 
@@ -33,11 +34,7 @@ class SwayClaim:
     bound: float
 
 
-class NotProvedError(Exception):
-    """A sentence that says why nothing is proved."""
-
-
-def require(
+def prove(
     pieces: Sequence[MotionPiece], scales: Sequence[Any], start: Sequence[float], claims: Sequence[SwayClaim]
 ) -> None:
     """Prove the bounds of all sways of the machines of a box, piece after piece.
@@ -46,17 +43,13 @@ def require(
     ------
     NotProvedError
     """
-    for more in MORE:
-        try:
-            _require(pieces, scales, start, claims, more)
-        except NotProvedError:
-            if more == MORE[-1]:
-                raise
-        else:
-            return
+    try:
+        _prove(pieces, scales, start, claims, FEWER)
+    except NotProvedError:
+        _prove(pieces, scales, start, claims, MORE)
 
 
-def _require(
+def _prove(
     pieces: Sequence[MotionPiece], scales: Any, start: Sequence[float], claims: Sequence[SwayClaim], more: int
 ) -> None:
     error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
@@ -104,8 +97,8 @@ class PieceProof:
         for claim, sway in zip(self.claims, outputs[2 * self.n :], strict=True):
             away = self._away(claim.loads, off, greatest)
             room = claim.bound - norm(away)
-            if not (room > 0 and keeps(sway, (room if len(away) == 1 else room * room).lower())):
-                raise NotProvedError(f"a sway is not bounded by {1e3 * claim.bound:.6g} mm")
+            kept = room > 0 and keeps(sway, (room if len(away) == 1 else room * room).lower())
+            require(kept, f"a sway is not bounded by {1e3 * claim.bound:.6g} mm")
         return error
 
     def _defect_and_sways(self, s: MachineState) -> Values:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import flint
 
@@ -32,6 +33,11 @@ class Machine:
     drift: Callable[[Values, Values, Values, Values, SimpleNamespace], list[Scalar]]
     sway: Callable[[Values, Values, SimpleNamespace], list[Scalar]]
     constants: Callable[[Mapping[str, Scalar]], SimpleNamespace] = lambda p: SimpleNamespace(**p)
+
+    @property
+    def states(self) -> list[str]:
+        """Name all coordinates, and then their rates."""
+        return [name + of for of in ("", ".rate") for name in self.coordinates]
 
     def speed(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give dq of x = (q, w), where w = dq − D v does not leap when v does."""
@@ -99,9 +105,17 @@ def _two_ropes_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
 # One rope of length l = L0 + hoist: l φ̈ = −g sin φ − 2 l̇ φ̇ − c φ̇/(m l) + ÿ cos φ.
 
 
+def _one_rope_inputs(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
+    return [[sine_cosine(q[0])[1] / (k.L0 + a[1]), 0]]
+
+
 def _one_rope_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     length = k.L0 + a[1]
     return [-(k.g * sine_cosine(q[0])[0] + (2 * v[1] + k.c / (k.m * length)) * dq[0]) / length]
+
+
+def _one_rope_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
+    return [(k.L0 + a[1]) * sine_cosine(q[0])[0]]
 
 
 # A rope on a universal joint: the load lies at (x − L sin θx cos θy, y − L sin θy, −L cos θx cos θy).
@@ -156,17 +170,25 @@ def _chain_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace
     return [(pull(i + 1) - pull(i)) / getattr(k, f"m{i + 1}") for i in range(len(q))]
 
 
+def _pushed(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
+    return [[1]] * len(q)
+
+
 def _chain(masses: int) -> Machine:
-    names = tuple(f"mass{i + 1}" for i in range(masses))
-    return Machine(
-        axes=("axis",),
-        coordinates=tuple(f"d{i + 1}" for i in range(masses)),
-        loads=names,
-        end_load=(names[-1], slice(masses - 1, masses)),
-        input_matrix=lambda q, a, k: [[1]] * len(q),
-        drift=_chain_drift,
-        sway=lambda q, a, k: list(q),
-    )
+    loads, coordinates = (" ".join(f"{one}{i + 1}" for i in range(masses)) for one in ("mass", "d"))
+    names = f"axis, {coordinates}, {loads}, mass{masses}"
+    return _machine(names, 1, _pushed, _chain_drift, lambda q, a, k: list(q))
+
+
+# An arm behind a hub, of inertia J, on a spring: J (α̈ − ÿ) = −k α − c α̇, with α positive behind the hub.
+
+
+def _arm_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+    return [-(k.k * q[0] + k.c * dq[0]) / k.J]
+
+
+def _arm_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
+    return [k.R * q[0]]
 
 
 # Liquid in a tank: modes n = 1, 2 as pendulums of length 1/(κ tanh κh), κ = (2n − 1) π/a, damped by ζ of
@@ -193,65 +215,34 @@ def _tank_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace)
     return [-(k.g * sine_cosine(one)[0]) / length - loss * rate for one, rate, length, loss in modes]
 
 
-_JOINT = ("payload-x", "payload-y")
-_JIB = ("payload-radial", "payload-tangential")
+def _tank_inputs(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
+    return [[sine_cosine(one)[1] / length] for one, length in zip(q, k.L, strict=True)]
+
+
+def _tank_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
+    return [_product(k.rise, [sine_cosine(one)[0] for one in q])]
+
+
+def _machine(names: str, directions: int, *equations: Callable[..., Any]) -> Machine:
+    """Take names of axes, coordinates, loads and the end load: the last loads, so many directions."""
+    axes, coordinates, loads, (end_load,) = (tuple(each.split()) for each in names.split(","))
+    end = end_load, slice(len(loads) - directions, len(loads))
+    return Machine(axes, coordinates, loads, end, *equations)
+
+
+_JOINT = "theta_x theta_y, payload-x payload-y, load"
+_JIB = "theta_r theta_t, payload-radial payload-tangential, load"
+_TANK = "tank, theta1 theta2, surface, surface"
 MACHINES: Mapping[str, Machine] = {
-    "double-pendulum-crane": Machine(
-        axes=("cart",),
-        coordinates=("theta1", "theta2"),
-        loads=("hook", "payload"),
-        end_load=("payload", slice(1, 2)),
-        input_matrix=_two_ropes_inputs,
-        drift=_two_ropes_drift,
-        sway=_two_ropes_sway,
+    "double-pendulum-crane": _machine(
+        "cart, theta1 theta2, hook payload, payload", 1, _two_ropes_inputs, _two_ropes_drift, _two_ropes_sway
     ),
-    "single-pendulum-crane": Machine(
-        axes=("cart", "hoist"),
-        coordinates=("phi",),
-        loads=("payload",),
-        end_load=("payload", slice(0, 1)),
-        input_matrix=lambda q, a, k: [[sine_cosine(q[0])[1] / (k.L0 + a[1]), 0]],
-        drift=_one_rope_drift,
-        sway=lambda q, a, k: [(k.L0 + a[1]) * sine_cosine(q[0])[0]],
+    "single-pendulum-crane": _machine(
+        "cart hoist, phi, payload, payload", 1, _one_rope_inputs, _one_rope_drift, _one_rope_sway
     ),
-    "gantry-crane": Machine(
-        axes=("x", "y"),
-        coordinates=("theta_x", "theta_y"),
-        loads=_JOINT,
-        end_load=("load", slice(0, 2)),
-        input_matrix=_joint_inputs,
-        drift=_joint_drift,
-        sway=_joint_sway,
-    ),
-    "tower-crane": Machine(
-        axes=("slew", "trolley"),
-        coordinates=("theta_r", "theta_t"),
-        loads=_JIB,
-        end_load=("load", slice(0, 2)),
-        input_matrix=_jib_inputs,
-        drift=_jib_drift,
-        sway=_joint_sway,
-    ),
-    "flexible-joint": Machine(
-        axes=("hub",),
-        coordinates=("alpha",),
-        loads=("tip",),
-        end_load=("tip", slice(0, 1)),
-        input_matrix=lambda q, a, k: [[1]],
-        drift=lambda q, dq, a, v, k: [-(k.k * q[0] + k.c * dq[0]) / k.J],
-        sway=lambda q, a, k: [k.R * q[0]],
-    ),
-    "slosh-tank": Machine(
-        axes=("tank",),
-        coordinates=("theta1", "theta2"),
-        loads=("surface",),
-        end_load=("surface", slice(0, 1)),
-        input_matrix=lambda q, a, k: [
-            [sine_cosine(one)[1] / length] for one, length in zip(q, k.L, strict=True)
-        ],
-        drift=_tank_drift,
-        sway=lambda q, a, k: [k.rise[0] * sine_cosine(q[0])[0] + k.rise[1] * sine_cosine(q[1])[0]],
-        constants=_tank,
-    ),
+    "gantry-crane": _machine(f"x y, {_JOINT}", 2, _joint_inputs, _joint_drift, _joint_sway),
+    "tower-crane": _machine(f"slew trolley, {_JIB}", 2, _jib_inputs, _jib_drift, _joint_sway),
+    "flexible-joint": _machine("hub, alpha, tip, tip", 1, _pushed, _arm_drift, _arm_sway),
+    "slosh-tank": _machine(_TANK, 1, _tank_inputs, _tank_drift, _tank_sway, _tank),
     **{f"mass-spring-chain-{masses}": _chain(masses) for masses in range(1, 25)},
 }

@@ -6,7 +6,6 @@ import base64
 import csv
 import hashlib
 import json
-import math
 import re
 import struct
 import zlib
@@ -15,22 +14,36 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import reduce
 from itertools import pairwise
-from math import isfinite, prod
+from math import frexp, isfinite, pi, prod
+from operator import index
 from typing import Any
 
 from flint import arb_mat
 
-from gen_profile_recheck.enclosure import NotProvedError
-
 FORMAT = "gen-profile certificate 1"
 CLAIMS = {"bounds_m", "limits_m", "on_the_way", "setpoints", "ranges", "from_s", "until_s"}
 KEYS = CLAIMS | {"format", "spec_sha256", "artefact_sha256", "axes", "parts", "terms", "motions", "scales"}
-PER_SI = {"m": 1.0, "mm": 1e3, "um": 1e6, "rad": 1.0, "deg": 180.0 / math.pi}
-MOST_BYTES = 1 << 30
+PER_SI = {"m": 1.0, "mm": 1e3, "um": 1e6, "rad": 1.0, "deg": 180.0 / pi}
+QUANTITIES = {"position": "", "velocity": "_per_s", "acceleration": "_per_s2", "jerk": "_per_s3"}
+NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+COMMENTS = re.compile(r"\(\*.*?\*\)|//[^\n]*|\{.*?\}", re.DOTALL)
+SAME_TIME = 1e-9  # relative, by which a time in a table may be off its cycle
+GREATEST = 1 << 45  # whole number that is a coefficient
+MOST, MOST_CYCLES = 1 << 27, 1 << 21  # numbers of an array, and cycles of a block
+
+
+class NotProvedError(Exception):
+    """A sentence that says why nothing is proved."""
+
+
+def require(fits: bool, why_not: str) -> None:
+    """Raise a `NotProvedError` where something is not as it should be."""
+    if not fits:
+        raise NotProvedError(why_not)
 
 
 def read_json(text: bytes) -> Any:
-    """Read JSON of finite numbers.
+    """Read JSON of finite numbers, in which no key stands twice.
 
     Raises
     ------
@@ -38,12 +51,15 @@ def read_json(text: bytes) -> Any:
     """
 
     def finite(number: str) -> float:
-        if not isfinite(value := float(number)):
-            raise ValueError(f"{number} is no finite number")
+        require(isfinite(value := float(number)), f"a file is no JSON of finite numbers ({number[:20]})")
         return value
 
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        require(len(dict(pairs)) == len(pairs), "a key stands twice in a file")
+        return dict(pairs)
+
     try:
-        return json.loads(text, parse_float=finite, parse_constant=finite)
+        return json.loads(text, parse_float=finite, parse_constant=finite, object_pairs_hook=once)
     except (ValueError, RecursionError) as error:
         raise NotProvedError(f"a file is no JSON of finite numbers ({error})") from error
 
@@ -58,20 +74,23 @@ class TimedSetpoints:
     resolution: Sequence[float]
 
 
-def spec_of(document: Mapping[str, Any], digest: str) -> Mapping[str, Any]:
-    """Find the spec with a hash: a manifest's, or the document itself.
+def spec_of(document: Mapping[str, Any], artefact: str, digest: str) -> Mapping[str, Any]:
+    """Take the spec that a manifest has of an artefact, or of its latest motion, or the document itself.
 
     Raises
     ------
     NotProvedError
+        It has another hash.
     """
-    listed = [document, *document.get("earlier", ())] if "spec" in document else [{"spec": document}]
-    for one in listed:
-        text = json.dumps(one["spec"], sort_keys=True, separators=(",", ":"), ensure_ascii=True)
-        if hashlib.sha256(text.encode("ascii")).hexdigest() == digest:
-            spec: Mapping[str, Any] = one["spec"]
-            return spec
-    raise NotProvedError("the certificate is about another spec")
+    listed = list[Mapping[str, Any]]([{"spec": document}])
+    if "spec" in document:
+        listed = [document, *document.get("earlier", ())]
+    own = [one for one in listed if artefact in (file["sha256"] for file in one.get("artefacts", ()))]
+    spec: Mapping[str, Any] = (own or listed)[0]["spec"]
+    text = json.dumps(spec, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    found = hashlib.sha256(text.encode("ascii")).hexdigest()
+    require(found == digest, "the certificate is about another spec")
+    return spec
 
 
 def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
@@ -83,59 +102,55 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
         It is of another format, for which nothing is written here.
     """
     try:
-        text = content.decode("utf-8")
-        setpoints = (
-            _of_block(text, spec, axes) if "END_FUNCTION_BLOCK" in text else _of_table(text, spec, axes)
-        )
+        text = content.decode("utf-8-sig")
+        read = _of_block if "END_FUNCTION_BLOCK" in text else _of_table
+        cycle, layout, columns = read(text, spec, axes)
+        finite = cycle > 0 and all(isfinite(one) for column in columns for one in column)
+        require(finite and min(map(len, columns)) > 1, "no motion, or none of finite numbers")
     except (ValueError, IndexError, ArithmeticError) as error:
         raise NotProvedError(f"not covered, or damaged: an artefact of another format ({error})") from error
-    if len(setpoints.times) < 2 or not all(isfinite(one) for row in setpoints.positions for one in row):
-        raise NotProvedError("the artefact holds a number that is not finite, or no motion")
-    return setpoints
-
-
-def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
-    if spec["export"]["csv_dialect"] != "rfc4180" or "position" not in spec["export"]["csv_columns"]:
-        raise ValueError("tables of other dialects, or without positions")
-    header, *rows = csv.reader(text.splitlines())
-    prefixes = [f"{name}_" if len(axes) > 1 else "" for name in axes]
-    names = [
-        f"{prefix}position_{spec['axis'][name]['unit']}" for prefix, name in zip(prefixes, axes, strict=True)
-    ]
-    times = [Decimal(row[header.index("time_s")]) for row in rows]
-    cycle = float(times[1] - times[0])
-    over, under = Decimal(repr(cycle)).as_integer_ratio()
-    if any(time * under != number * over for number, time in enumerate(times)):
-        raise ValueError("times that are not even")
-    return _setpoints(cycle, [[float(row[header.index(name)]) for row in rows] for name in names], spec, axes)
-
-
-def _setpoints(
-    cycle: float,
-    columns: Sequence[Sequence[float]],
-    spec: Mapping[str, Any],
-    axes: Sequence[str],
-    layout: str = "",
-) -> TimedSetpoints:
-    """Take positions in an axis' units, or in its counts, for those in m (or rad)."""
     (over, under), positions, resolution = Decimal(repr(cycle)).as_integer_ratio(), [], []
     for column, axis in zip(columns, (spec["axis"][name] for name in axes), strict=True):
         counted = layout == "counts" or axis["unit"] == "counts"
         per_si = axis["sign"] * (axis["counts_per_metre"] if counted else PER_SI[axis["unit"]])
         positions.append([one / per_si for one in column])
         resolution.append(1 / abs(per_si) if counted and layout != "segments" else 0.0)
-    return TimedSetpoints(
-        [number * over / under for number in range(len(columns[0]))], cycle, positions, resolution
-    )
+    times = [number * over / under for number in range(len(columns[0]))]
+    return TimedSetpoints(times, cycle, positions, resolution)
 
 
-def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
+Table = tuple[
+    float, str, Sequence[Sequence[float]]
+]  # cycle in s, layout, positions in an axis' units or counts
+
+
+def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Table:
+    quantities, units = spec["export"]["csv_columns"], [spec["axis"][name]["unit"] for name in axes]
+    require(spec["export"]["csv_dialect"] == "rfc4180" and "position" in quantities, "another dialect")
+    require(text.endswith(("\n", "\r")), "a table without its last line end")
+    header, *rows = ([cell.strip() for cell in row] for row in csv.reader(text.rstrip().splitlines()))
+    prefixes = [f"{name}_" if len(axes) > 1 else "" for name in axes]
+    named = list(zip(prefixes, units, strict=True))
+    due = [f"{prefix}{one}_{unit}{QUANTITIES[one]}" for prefix, unit in named for one in quantities]
+    require(sorted(header) == sorted(["time_s", *due]), "other columns")
+    require(all(NUMBER.fullmatch(cell) for row in rows for cell in row), "cells that are no numbers")
+    columns = dict(zip(header, zip(*(map(float, row) for row in rows), strict=True), strict=True))
+    times, cycle = columns["time_s"], columns["time_s"][1]
+    uneven = (abs(time - number * cycle) > SAME_TIME * number * cycle for number, time in enumerate(times))
+    require(not any(uneven), "times that are not even")
+    return cycle, "", [columns[f"{prefix}position_{unit}"] for prefix, unit in named]
+
+
+def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Table:
     """Play a block at full rate: positions of every cycle, or powers of the time since a segment began."""
-    bare, m, layout = re.sub(r"\(\*.*?\*\)", "", text, flags=re.S), len(axes), spec["export"]["plc_layout"]
+    bare, m, layout = COMMENTS.sub("", text), len(axes), spec["export"]["plc_layout"]
+    whole = bare.lstrip().startswith("FUNCTION_BLOCK") and bare.rstrip().endswith("END_FUNCTION_BLOCK")
+    require(whole and bare.count("FUNCTION_BLOCK") == 2, "more or less than a function block")
 
     def constant(name: str) -> list[float]:
-        array_of = r"(?:ARRAY\s*\[[0-9.]+\]\s*OF\s*)?"
-        (values,) = re.findall(rf"\b{name}\s*:\s*{array_of}[A-Z]+\s*:=\s*\[?([^\];]*)", bare)
+        declared = rf"\b{name}\s*:\s*(?:ARRAY\s*\[[0-9.]+\]\s*OF\s*)?[A-Z]+\s*:=\s*\[?([^\];]*)"
+        (values,) = re.findall(declared, bare, re.IGNORECASE)
+        require(all(map(NUMBER.fullmatch, values.split(","))), f"{name} that is no list of numbers")
         return [float(one) for one in values.split(",")]
 
     names = ["cPosition"] if layout != "segments" else [f"cPower{power}" for power in range(6)]
@@ -147,15 +162,15 @@ def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
     else:
         columns, (last,) = [constant(name) for name in names], constant("cLast")
         starts, target = (constant("cFirst"), constant("cTarget")) if layout == "segments" else ([], [])
+    require(last.is_integer() and 0 < last < MOST_CYCLES, "another number of cycles")
     (cycle,), flat, segment = constant("cCycleTime"), list[float](), 0
     for number in range(int(last) if layout == "segments" else 0):
         segment += segment + 1 < len(starts) and number >= starts[segment + 1]
         time = (number - starts[segment]) * cycle
         flat += [_horner([one[segment * m + axis] for one in columns], time) for axis in range(m)]
     flat = [*flat, *target] if layout == "segments" else columns[0]
-    if len(flat) != m * (int(last) + 1):
-        raise ValueError("a table of another length")
-    return _setpoints(cycle, [flat[axis::m] for axis in range(m)], spec, axes, layout)
+    require(len(flat) == m * (int(last) + 1), "a table of another length")
+    return cycle, layout, [flat[axis::m] for axis in range(m)]
 
 
 def _horner(powers: Sequence[float], time: float) -> float:
@@ -164,15 +179,13 @@ def _horner(powers: Sequence[float], time: float) -> float:
 
 
 def ranges_of(spec: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """List the ranges of the check that are wider than nothing."""
+    """List the ranges of the check that are wider than nothing, in alphabetical order."""
     check, plant = spec["check"], spec["plant"]
     shares = check["uncertain"] if "uncertain" in check else spec["robustness"].get("uncertain", {})
-    ranges = {
-        name: (plant[name] * (1.0 - fraction), plant[name] * (1.0 + fraction))
-        for name, fraction in shares.items()
-    }
+    ranges = {name: (plant[name] * (1.0 - one), plant[name] * (1.0 + one)) for name, one in shares.items()}
     ranges |= {name: (low, high) for name, (low, high) in check.get("spans", {}).items()}
-    return {name: ends for name, ends in ranges.items() if ends[1] > ends[0]}
+    require(all(low <= high for low, high in ranges.values()), "a range that ends before it begins")
+    return {name: (low, high) for name, (low, high) in sorted(ranges.items()) if high > low}
 
 
 class ProofMaterial:
@@ -185,29 +198,31 @@ class ProofMaterial:
     """
 
     def __init__(self, document: Mapping[str, Any], coordinates: int, axes: int) -> None:
-        motion = document["axes"]
-        self.knots, self.terms = motion["knots"], tuple(document["terms"])
+        motion, self.terms = document["axes"], tuple(map(index, document["terms"]))
+        require(motion.keys() == {"knots", "position", "velocity", "acceleration"}, "axes of another kind")
+        self.knots, self.coordinates = motion["knots"], coordinates
         position, velocity = (list(zip(*motion[name], strict=True)) for name in ("position", "velocity"))
         begin, end = (list(zip(*column, strict=True)) for column in zip(*motion["acceleration"], strict=True))
         self.ends = [  # of each axis and piece: both of each derivative
             list(zip(pairwise(p), pairwise(v), zip(b, c, strict=True), strict=True))
             for p, v, b, c in zip(position, velocity, begin, end, strict=True)
         ]
-        self.parts = [[(int(level), int(index)) for level, index in box] for box in document["parts"]]
-        self.motions, self.pieces, self.coordinates = document["motions"], len(self.knots) - 1, coordinates
-        (boxes, pieces, *rest), self._scales = _unpacked(document["scales"], "d")
-        self._scale_shape = boxes, pieces, rest[2]
-        _require(sorted(set(self.knots)) == self.knots and self.pieces > 0, "knots")
-        _require(len(self.ends) == axes and all(len(one) == self.pieces for one in self.ends), "axes")
-        _require(all(0 < count <= 32 for count in self.terms), "terms")
-        _require(len(self.motions) == len(self.parts) == boxes, "motions")
-        _require(pieces in (1, self.pieces) and rest[:2] == [coordinates] * 2, "scales")
-        _require(rest[2:] in ([1], [prod(min(3, count) for count in self.terms)]), "scales")
-        _require(all(map(isfinite, self._scales)), "scales")
+        self.parts = [[(index(level), index(number)) for level, number in box] for box in document["parts"]]
+        self.motions, self.pieces = document["motions"], len(self.knots) - 1
+        boxes, pieces, rows, columns, terms = self._scale_shape = document["scales"]["shape"]
+        require(sorted(set(self.knots)) == self.knots and self.pieces > 0, "knots that do not rise")
+        require(len(self.ends) == axes and all(len(one) == self.pieces for one in self.ends), "other axes")
+        require(all(0 < count <= 32 for count in self.terms), "another number of terms")
+        require(len(self.motions) == len(self.parts) == boxes, "another number of motions")
+        fits = pieces in (1, self.pieces) and rows == columns == coordinates
+        fits = fits and terms in (1, prod(min(3, count) for count in self.terms))
+        require(fits, "scales that do not fit")
+        self._scales = _unpacked(document["scales"], "d")
+        require(all(map(isfinite, self._scales)), "scales that are not finite")
 
     def scales(self, box: int) -> Iterator[list[list[Sequence[float]]]]:
         """Give S of a box for every piece, or once for all: rows of entries, which are coefficients."""
-        (boxes, pieces, terms), n = self._scale_shape, self.coordinates
+        boxes, pieces, n, _, terms = self._scale_shape
         for place in range(box * pieces, (box + 1) * pieces):
             own = self._scales[place :: boxes * pieces]
             entries = [own[first : first + terms] for first in range(0, len(own), terms)]
@@ -215,31 +230,29 @@ class ProofMaterial:
 
     def motion(self, box: int) -> Iterator[list[arb_mat]]:
         """Give the series of every coordinate, (time terms × parameter terms), piece by piece."""
-        packed = self.motions[box]
-        (pieces, n, times, terms), whole = _unpacked(packed, "q")
-        quanta = [float(one) for one in packed["quanta"]]
-        _require((pieces, n, terms) == (self.pieces, self.coordinates, prod(self.terms)), "motions")
-        _require(len(quanta) == n and all(map(isfinite, quanta)) and times <= 16, "motions")
+        packed = dict(self.motions[box])
+        quanta, (pieces, n, times, terms) = packed.pop("quanta"), packed["shape"]
+        fits = (pieces, n, terms) == (self.pieces, self.coordinates, prod(self.terms)) and 0 < times <= 16
+        require(fits, "motions that do not fit")
+        whole = _unpacked(packed, "q")
+        require(max(map(abs, whole)) < GREATEST, "coefficients whose sums are not exact")
+        require(
+            len(quanta) == n and all(frexp(one)[0] == 0.5 for one in quanta),
+            "quanta that are no powers of two",
+        )
         each = times * terms
         for piece in range(pieces):
             own = whole[piece::pieces]
             columns = (own[first : first + each] for first in range(0, n * each, each))
-            yield [
-                arb_mat(times, terms, list(column)) * unit
-                for column, unit in zip(columns, quanta, strict=True)
-            ]
+            yield [arb_mat(times, terms, list(one)) * unit for one, unit in zip(columns, quanta, strict=True)]
 
 
-def _require(fits: bool, what: str) -> None:
-    if not fits:
-        raise ValueError(f"{what} that do not fit")
-
-
-def _unpacked(packed: Mapping[str, Any], kind: str) -> tuple[list[int], Sequence[Any]]:
+def _unpacked(packed: Mapping[str, Any], kind: str) -> Sequence[Any]:
     """Decompress little-endian numbers."""
-    shape = [int(size) for size in packed["shape"]]
-    size = prod(shape) * 8
-    _require(0 < size <= MOST_BYTES and min(shape) > 0, "arrays")
-    content = zlib.decompressobj().decompress(base64.b64decode(packed["zlib"], validate=True), size)
-    _require(len(content) == size, "arrays")
-    return shape, struct.unpack(f"<{prod(shape)}{kind}", content)
+    count, inflater = prod(map(index, packed["shape"])), zlib.decompressobj()
+    require(packed.keys() == {"shape", "zlib"} and 0 < count <= MOST, "arrays of another kind")
+    content = inflater.decompress(base64.b64decode(packed["zlib"], validate=True), 8 * count + 1)
+    require(
+        len(content) == 8 * count and inflater.eof and not inflater.unused_data, "arrays of another length"
+    )
+    return struct.unpack(f"<{count}{kind}", content)

@@ -119,6 +119,14 @@ TAMPERED = {
     forgeries.sums_inexact: "sums are not exact",
     forgeries.terms_fewer: "is damaged",
     forgeries.quanta_odd: "is damaged",
+    forgeries.quanta_uneven: "no powers of two",
+    forgeries.number_as_text: "is damaged",
+    forgeries.part_of_a_part: "is damaged",
+    forgeries.terms_fractional: "is damaged",
+    forgeries.shape_fractional: "is damaged",
+    forgeries.hidden_beside_an_array: "is damaged",
+    forgeries.hidden_behind_an_array: "is damaged",
+    forgeries.hidden_among_axes: "is damaged",
     forgeries.another_file: "about another file",
 }
 
@@ -156,6 +164,33 @@ def test_limits_that_the_file_breaks_are_not_proved_by_a_certificate_that_is_sil
     beside.write_text(json.dumps(silent))
     with pytest.raises(CertificateError, match=r"ask cart for 1\.468 m/s"):
         gp.check_certificate(artefact, beside, stricter)
+
+
+def test_a_file_that_does_not_make_the_move_is_not_certified(copied):
+    """One that stands still leaves no sway."""
+    artefact, _ = copied
+    rows = artefact.read_text().splitlines()
+    still = [rows[0], *(",".join([row.split(",")[0], *rows[1].split(",")[1:]]) for row in rows[1:])]
+    artefact.write_text("\n".join(still) + "\n")
+    with pytest.raises(CertificateError, match=r"Axis cart ends at 0 m, and the spec asks for 12 m\."):
+        gp.certify_artefact(artefact)
+
+
+def test_a_file_that_leaves_the_travel_is_not_certified(copied):
+    artefact, beside = copied
+    rows = artefact.read_text().splitlines()
+    cells = rows[800].split(",")
+    cells[1] = str(float(cells[1]) + 9000.0)
+    artefact.write_text("\n".join([*rows[:800], ",".join(cells), *rows[801:]]) + "\n")
+    spec = gp.preset_spec(PRESET, [CYCLE, "limits.axis.cart.travel=[-0.1, 12.1]"])
+    for certified_again in (gp.certify_artefact, lambda path, spec: gp.check_certificate(path, beside, spec)):
+        with pytest.raises(
+            CertificateError, match=r"cart is at 1\d\.\d+ m at 7\.99 s, and limits\.axis\.cart\.travel"
+        ):
+            certified_again(artefact, spec)
+    assert any(
+        "limits.axis.cart.travel allows" in fault for fault in gp.check_artefact(artefact, spec).check.faults
+    )
 
 
 def test_ranges_that_are_too_wide_for_a_certificate_are_refused(copied):

@@ -71,8 +71,11 @@ def held_to_its_peaks(spec, command):
         {name: greatest(command, order, column) or None for order, name in enumerate(names, start=1)}
         for column in range(command.axes)
     ]
+    reached = sample(command, 1e-4).position
+    travels = zip(reached.min(axis=0).tolist(), reached.max(axis=0).tolist(), strict=True)
     limits = {
-        axis: attrs.evolve(spec.limits.of(0), **peak) for axis, peak in zip(spec.axis, peaks, strict=True)
+        axis: attrs.evolve(spec.limits.of(0), **peak, travel=travel)
+        for axis, peak, travel in zip(spec.axis, peaks, travels, strict=True)
     }
     return attrs.evolve(spec, limits=LimitsSpec(axis=limits))
 

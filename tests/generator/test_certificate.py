@@ -13,6 +13,7 @@ from scipy import signal
 
 import gen_profile as gp
 from gen_profile.certificate import certify, theorem
+from gen_profile.certificate.boxes import covers
 from gen_profile.certificate.certify import attempt
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.verification.batch import on_processors
@@ -259,11 +260,20 @@ def test_how_many_processors_there_are_changes_nothing(monkeypatch):
 def test_what_interpolation_misses_over_a_wide_box_is_what_is_not_linear():
     """Bounds are close though the machines of the box differ by radians, where all counted they were not."""
     spec, setpoints = planned("double-pendulum-crane", "robustness.uncertain={L1=0.2, m2=0.25}")
-    theorem, spans = certify._prepared(spec, setpoints)
-    (box, *_) = certify._first_boxes(theorem, spans, 100)
-    (made,) = certify._integrated(theorem, [box])
+    theorem, boxes = certify._prepared(spec, setpoints)
+    (made,) = certify._integrated(theorem, boxes[:1])
     _, (proof,), met = certify._prove(theorem, np.zeros(2), made)
     assert (met <= proof.bound).all() and (proof.bound <= 1.03 * met).all()
+
+
+def test_parts_of_ranges_are_wide_where_phases_turn_little():
+    spec, setpoints = planned("double-pendulum-crane", "robustness.uncertain={L1=0.4, m2=0.5}")
+    theorem, boxes = certify._prepared(spec, setpoints)
+    assert covers(boxes) and theorem.ranges.names == ("L1", "m2")
+    lightest, heaviest = (
+        [box[1][0] for box in boxes if box[1][1] == (end * (2 ** box[1][0] - 1))] for end in (0, 1)
+    )
+    assert min(lightest) > max(heaviest)  # the frequency changes more with a light load
 
 
 @pytest.mark.slow

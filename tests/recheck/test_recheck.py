@@ -24,11 +24,10 @@ from gen_profile_recheck.__main__ import main
 from gen_profile_recheck.axes import quintic
 from gen_profile_recheck.boxes import Expansion
 from gen_profile_recheck.check import check
-from gen_profile_recheck.enclosure import NotProvedError
 from gen_profile_recheck.halving import keeps
 from gen_profile_recheck.jets import along, inverse, moved, sine_cosine
 from gen_profile_recheck.machines import MACHINES
-from gen_profile_recheck.reading import read_setpoints
+from gen_profile_recheck.reading import NotProvedError, read_setpoints
 
 KINDS = [
     "double-pendulum-crane",
@@ -208,6 +207,80 @@ def test_a_spec_with_other_limits_is_refused_though_its_hash_is_written_into_the
             check(artefact.read_bytes(), json.dumps(other.to_dict()).encode(), forged)
         with pytest.raises(NotProvedError, match="about another spec"):
             check(artefact.read_bytes(), json.dumps(other.to_dict()).encode(), json.dumps(document).encode())
+
+
+def test_what_is_not_the_move_of_the_spec_is_refused(genuine, tmp_path):
+    """A file that stands still leaves no sway; one may leave the travel, or swing at the start."""
+    artefact, manifest, certificate = contents(*genuine)
+    spec, document = json.loads(manifest)["spec"], json.loads(certificate)
+
+    def refused(artefact=artefact, message="the setpoints", **changed):
+        other = json.dumps(
+            {
+                name: {**spec[name], **changed.get(name, {})} if isinstance(spec[name], dict) else spec[name]
+                for name in spec
+            }
+        )
+        digest = spec_sha(json.loads(other))
+        forged = {**document, "artefact_sha256": hashlib.sha256(artefact).hexdigest(), "spec_sha256": digest}
+        with pytest.raises(NotProvedError, match=message):
+            check(artefact, other.encode(), json.dumps(forged).encode())
+
+    header, first, *rows = artefact.decode().splitlines()
+    values = first.split(",", 1)[1]
+    still = "\n".join([header, first, *(f"{row.split(',')[0]},{values}" for row in rows)]) + "\n"
+    refused(still.encode(), "do not move cart from where")
+    refused(message="do not move cart", move={"target": [11.0, 1.0]})
+    refused(message="arrive at another time", move={"duration": 15.0})
+    refused(message="take hoist beyond its travel", limits={"axis": {"hoist": {"travel": [1.5, 7.0]}}})
+    refused(message="not covered: phi_rate", move={"initial": {"phi_rate": 0.1}})
+    refused(message="not covered: snap", limits={"snap": 1.0})
+    for change in (
+        lambda t: t[:-5],
+        lambda t: t.replace("\n0.00,", "\n٠.00,"),
+        lambda t: t.replace("\n", ",1\n"),
+    ):
+        refused(change(artefact.decode()).encode(), "not covered, or damaged")
+
+
+def spec_sha(spec):
+    return hashlib.sha256(json.dumps(spec, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def test_a_manifests_other_spec_is_none_of_the_artefacts(genuine):
+    artefact, manifest, certificate = contents(*genuine)
+    document = json.loads(manifest)
+    strict = {**document["spec"], "name": "other"}
+    later = {**document, "spec": strict, "earlier": [{**document, "artefacts": []}]}
+    with pytest.raises(NotProvedError, match="about another spec"):
+        check(artefact, json.dumps(later).encode(), certificate)
+
+
+@pytest.mark.parametrize("decoy", ["// {}", "{{ {} }}", "(* (* *) {} *)"])
+def test_a_blocks_table_is_not_read_from_comments(decoy):
+    spec = gp.preset_spec("paper", ["export.cycle_time=0.02"])
+    (file, *_) = find_exporter("plc").encode(motion("paper"), target_of(spec))
+    text = file.content.decode()
+    (line,) = (one for one in text.splitlines() if "cTarget : " in one)
+    declared = line.split("(*")[0].strip()
+    forged = text.replace(
+        line, decoy.format(declared) + "\n" + line.replace("cTarget", "CTARGET").replace(":= ", ":= 1")
+    )
+    try:
+        found = read_setpoints(forged.encode(), spec.to_dict(), list(spec.axis))
+    except NotProvedError:
+        return
+    assert found.positions[0][-1] != pytest.approx(spec.move.target[0])
+
+
+@pytest.mark.parametrize("twice", ['"bounds_m": {}, ', '"format": 1, '])
+def test_a_key_that_stands_twice_is_refused_by_both(copied, twice):
+    artefact, certificate = copied
+    certificate.write_text("{" + twice + certificate.read_text()[1:])
+    with pytest.raises(CertificateError, match="stands there twice"):
+        gp.check_certificate(artefact, certificate)
+    with pytest.raises(NotProvedError, match="a key stands twice"):
+        check(*contents(artefact, certificate))
 
 
 @pytest.mark.parametrize("text", ["[" * 200_000, '{"a": Infinity}', '{"a": 1e999}', "", "{}", "[]"])

@@ -36,6 +36,11 @@ class Ranges:
         fractions = 0.5 * (low + high) + 0.5 * (high - low) * places
         return np.asarray(self.lower + fractions * (self.upper - self.lower))
 
+    def widths(self, box: DyadicBox) -> Array:
+        """Give half of a box's width in every range, as a share of its middle, at most 1."""
+        low, high = self.values(box, np.array(-1.0)), self.values(box, np.array(1.0))
+        return np.asarray((high - low) / np.maximum(np.abs(low + high), high - low))
+
     def enclosed(self, boxes: Sequence[DyadicBox]) -> tuple[Ball, Ball]:
         """Enclose the ends of boxes, each of shape (boxes, ranges)."""
         low, high = (np.array(ends).reshape(len(boxes), -1) for ends in zip(*map(shares, boxes), strict=True))
@@ -46,13 +51,6 @@ class Ranges:
 def shares(box: DyadicBox) -> tuple[list[float], list[float]]:
     """Where a box begins and ends in every range, in shares of it, exactly."""
     return [index / 2**level for level, index in box], [(index + 1) / 2**level for level, index in box]
-
-
-def whole(levels: Sequence[int]) -> list[DyadicBox]:
-    """Cut all ranges, each so often."""
-    grids = np.meshgrid(*[np.arange(2**level) for level in levels], indexing="ij")
-    indices = np.stack([grid.ravel() for grid in grids], axis=1) if levels else np.zeros((1, 0), dtype=int)
-    return [tuple(zip(levels, row, strict=True)) for row in indices.tolist()]
 
 
 def halves(box: DyadicBox, range_: int) -> tuple[DyadicBox, DyadicBox]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from functools import partial
-from math import ceil, log2, prod
+from math import prod
 
 import attrs
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from gen_profile.certificate import approximation
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.axis_motion import fitted
-from gen_profile.certificate.boxes import DyadicBox, halves, whole
+from gen_profile.certificate.boxes import DyadicBox, halves, shares
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.packing import Motions
 from gen_profile.certificate.sway_limits import limits_of
@@ -27,7 +27,7 @@ from gen_profile.spec.model import Spec
 FEW = 16  # boxes, up to which `CertificateOptions.radians_per_box` holds
 FEWEST_TERMS = 4  # of series in parameters
 LEAST_POWER, WIDEST = 1e-6, 0.5  # what they leave out where motions change little; how wide a range counts as
-PLACES = 33  # along a range, at which phases are looked at
+PLACES = 17  # along a range, at which phases are looked at
 SLACK = 1e-3  # relative, by which a bound is stated higher than found, as other rounding could break it
 NEAR = 1e-5  # of what is allowed: a smooth motion that is as near to the axes' is near enough
 
@@ -129,11 +129,11 @@ def attempt(
     CosimulationError
         Machines cannot be integrated.
     """
-    theorem, spans = _prepared(spec, setpoints, options)
+    theorem, waiting = _prepared(spec, setpoints, options)
     most = options.max_nodes // theorem.nodes  # boxes
-    first = _first_boxes(theorem, spans, most, options)
+    deepest = max(sum(level for level, _ in box) for box in waiting) + options.max_halvings
     limits = np.array([limit.allowed for limit in theorem.limits])
-    waiting, done, tried = first, dict[DyadicBox, _Proof](), 0
+    done, tried = dict[DyadicBox, _Proof](), 0
     largest_met, fruitless, before = np.zeros(len(limits)), 0, np.inf
     while waiting:
         prove = partial(_prove, theorem, _wanted(largest_met, limits, options))
@@ -144,7 +144,6 @@ def attempt(
             progress(tried, tried + len(waiting))
         wanted = _wanted(largest_met, limits, options)
         coarse = [box for box, proof in done.items() if not (proof.bound <= wanted).all()]
-        deepest = sum(level for level, _ in first[0]) + options.max_halvings
         coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
         above = np.array([done[box].bound - wanted for box in waiting])
         proved = np.isfinite(above).all(axis=1)
@@ -159,41 +158,52 @@ def attempt(
     return _attempt(theorem, done, largest_met)
 
 
-def _first_boxes(
-    theorem: Theorem, spans: Sequence[float], most: int, options: CertificateOptions = USUAL
-) -> list[DyadicBox]:
-    """Cut ranges until phases turn little over each box.
+def _first_boxes(box: Box, most: float, options: CertificateOptions = USUAL) -> list[DyadicBox]:
+    """Halve ranges until phases turn little over each part: few boxes, or wider ones where they are many.
+
+    Of many boxes most are wider, as loads swing little in most of them; the others are halved later.
 
     Raises
     ------
     CertificateError
         There are too many.
     """
-    levels = _halvings(spans, options)
-    if 3 * 2 ** sum(levels) > most:  # with the halves of each
-        raise CertificateError(
-            f"The ranges of {', '.join(theorem.ranges.names)} are too wide for a certificate: it takes "
-            f"more than {most} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
-        )
-    return whole(levels)
+    for turn, enough in ((options.radians_per_box, FEW), (options.radians_per_wide_box, most)):
+        waiting, found = [((0, 0),) * len(box.ranges)], list[DyadicBox]()
+        while waiting and len(waiting) + len(found) <= enough:
+            part = waiting.pop()
+            turns = _turns(box, part)
+            if turns.max(initial=0.0) > turn:
+                waiting += reversed(halves(part, int(turns.argmax())))
+            else:
+                found.append(part)
+        if not waiting:
+            return found
+    raise _too_wide(box, most)
+
+
+def _too_wide(box: Box, most: float) -> CertificateError:
+    return CertificateError(
+        f"The ranges of {', '.join(box.ranges)} are too wide for a certificate: it takes "
+        f"more than {most:.0f} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
+    )
+
+
+def _turns(box: Box, part: DyadicBox) -> Array:
+    """Tell how far modes' phases at the end turn along each range of a part at most, in rad."""
+    low, high = map(np.array, shares(part))
+    turns = np.zeros(len(part))
+    for column in range(len(part)):
+        line = np.tile(0.5 * (low + high), (PLACES, 1))
+        line[:, column] = np.linspace(low[column], high[column], PLACES)
+        turns[column] = np.abs(np.diff(box.phases(line), axis=0)).sum(axis=0).max()
+    return turns
 
 
 def _wanted(largest_met: Array, limits: Array, options: CertificateOptions) -> Array:
     """Tell how low bounds should be, by the greatest sway seen."""
     wanted = np.maximum(options.close * largest_met, largest_met + options.close_to_limit * limits)
     return np.where(largest_met < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
-
-
-def _halvings(spans: Sequence[float], options: CertificateOptions) -> list[int]:
-    """Tell how often each range is halved at first, over which phases turn so far.
-
-    Of many boxes most are wider, as loads swing little in most of them; the others are halved later.
-    """
-    narrow, wide = (
-        [max(0, ceil(log2(max(span / turn, 1e-9)))) for span in spans]
-        for turn in (options.radians_per_box, options.radians_per_wide_box)
-    )
-    return narrow if 2 ** sum(narrow) <= FEW else wide
 
 
 def _terms(turn: float, width: float, truncation: float) -> int:
@@ -266,37 +276,50 @@ def _tails(motion: Array, terms: Sequence[int]) -> Array:
 
 def _prepared(
     spec: Spec, setpoints: SampledProfile, options: CertificateOptions = USUAL
-) -> tuple[Theorem, list[float]]:
-    """State the theorem, and tell how much the modes' phases vary over each range, in rad."""
+) -> tuple[Theorem, list[DyadicBox]]:
+    """State the theorem, and cut its ranges into the first boxes.
+
+    Raises
+    ------
+    CertificateError
+        There are too many.
+    """
     plant, ranges, watch = spec.machine(), ranges_of(spec), observation_time(spec)
     track = followed(spec, setpoints)
+    ends = zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True)
     box = Box(
         plant=plant,
         nominal=spec.plant.parameters,
-        ranges=dict(
-            zip(ranges.names, zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True), strict=True)
-        ),
+        ranges=dict(zip(ranges.names, ends, strict=True)),
         ends=(spec.move.start, spec.move.target),
         duration=float(track.times[-1]) + watch,
     )
-    middle = np.full((PLACES, len(ranges.names)), 0.5)
-    spans, fastest = [], float(box.phases(middle[:1]).max())
-    for column in range(len(ranges.names)):
-        line = middle.copy()
-        line[:, column] = np.linspace(0.0, 1.0, PLACES)
-        phases = box.phases(line)
-        spans.append(float(np.abs(np.diff(phases, axis=0)).sum(axis=0).max()))
-        fastest = max(fastest, float(phases.max()))
+    fastest = float(box.phases(_middles(len(ranges.names))).max())
     longest = options.radians_per_piece * box.duration / fastest
-    near = NEAR * min(limit.allowed for limit in limits_of(spec))
+    limits = limits_of(spec)
+    near = NEAR * min(limit.allowed for limit in limits)
     axes = fitted(track, max(0.6 * float(setpoints.resolution.max()), near), longest, watch)
-    middles, half = 0.5 * (ranges.upper + ranges.lower), 0.5 * (ranges.upper - ranges.lower)
-    widths = np.minimum(half / np.maximum(np.abs(middles), half), WIDEST).tolist()
-    parts = [2**level for level in _halvings(spans, options)]
-    terms = tuple(
-        _terms(span / n, width / n, options.truncation)
-        for span, width, n in zip(spans, widths, parts, strict=True)
+    theorem = Theorem(
+        spec=spec,
+        axes=axes,
+        ranges=ranges,
+        limits=limits,
+        setpoints=setpoints,
+        terms=(1,) * len(ranges.names),
     )
-    return Theorem(
-        spec=spec, axes=axes, ranges=ranges, limits=limits_of(spec), setpoints=setpoints, terms=terms
-    ), spans
+    boxes = _first_boxes(box, options.max_nodes / theorem.nodes, options)
+    turns = np.max([_turns(box, part) for part in boxes], axis=0)
+    widths = np.minimum(np.max([ranges.widths(part) for part in boxes], axis=0), WIDEST)
+    terms = [_terms(*each, options.truncation) for each in zip(turns.tolist(), widths.tolist(), strict=True)]
+    theorem = attrs.evolve(theorem, terms=tuple(terms))
+    if 3 * len(boxes) > (most := options.max_nodes / theorem.nodes):  # with the halves of each
+        raise _too_wide(box, most)
+    return theorem, boxes
+
+
+def _middles(count: int) -> Array:
+    """List places along all ranges, in the middle of the others, (places, ranges)."""
+    lines = np.full((max(count, 1), PLACES, count), 0.5)
+    for column in range(count):
+        lines[column, :, column] = np.linspace(0.0, 1.0, PLACES)
+    return lines.reshape(max(count, 1) * PLACES, count)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import binascii
 import json
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf, nan
+from operator import index
 from pathlib import Path
 from typing import Any
 
 import attrs
-import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.axis_motion import AxisMotion
 from gen_profile.certificate.axes.setpoint_limits import Asked
 from gen_profile.certificate.boxes import DyadicBox
-from gen_profile.certificate.packing import Motions, pack, unpack
+from gen_profile.certificate.packing import Motions, numbers, pack, unpack
 from gen_profile.certificate.sway_limits import ProvedSway, SwayLimit
 from gen_profile.errors import CertificateError
 from gen_profile.strict_json import parse_json
@@ -217,22 +217,22 @@ def parse(content: bytes) -> Certificate:
             raise CertificateError(f"This is no certificate that can be read here ({FORMAT!r}).")
         if wrong := sorted(KEYS ^ document.keys()):
             raise ValueError(f"{', '.join(wrong)} missing, or of no certificate")
-        axes = {name: np.array(document["axes"][name], dtype=np.float64) for name in document["axes"]}
+        axes = {name: numbers(nested) for name, nested in document["axes"].items()}
         return Certificate(
             spec_sha256=str(document["spec_sha256"]),
             artefact_sha256=str(document["artefact_sha256"]),
-            ranges={name: (float(low), float(high)) for name, (low, high) in document["ranges"].items()},
-            arrival=float(document["from_s"]),
-            until=float(document["until_s"]),
+            ranges={name: (_number(low), _number(high)) for name, (low, high) in document["ranges"].items()},
+            arrival=_number(document["from_s"]),
+            until=_number(document["until_s"]),
             sways=tuple(_sways(document)),
             asked=document["setpoints"],
             fraction=1.0,
             axes=AxisMotion(**axes),
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),
-            terms=tuple(int(count) for count in document["terms"]),
+            terms=tuple(map(index, document["terms"])),
             motions=tuple(
-                Motions(quanta=tuple(one["quanta"]), packed={key: one[key] for key in ("shape", "zlib")})
-                for one in document["motions"]
+                Motions(quanta=tuple(quanta), packed=packed)
+                for quanta, packed in map(_taken_apart, document["motions"])
             ),
             scales=unpack(document["scales"], "<f8", 2),
         )
@@ -253,10 +253,18 @@ def damaged(error: Exception) -> CertificateError:
     return CertificateError(f"The certificate is damaged ({error}); certify the file again.")
 
 
-def _part(level: int, index: int) -> tuple[int, int]:
-    if not (isinstance(level, int) and isinstance(index, int) and 0 <= level <= MOST_HALVINGS):
+def _number(value: Any) -> float:
+    return float(value + 0.0)  # which raises of a text
+
+
+def _taken_apart(motion: Mapping[str, Any]) -> tuple[Sequence[float], Mapping[str, Any]]:
+    return motion["quanta"], {name: one for name, one in motion.items() if name != "quanta"}
+
+
+def _part(level: int, number: int) -> tuple[int, int]:
+    if not 0 <= index(level) <= MOST_HALVINGS:
         raise ValueError("a box of no such kind")
-    return level, index
+    return index(level), index(number)
 
 
 def _sways(document: Mapping[str, Any]) -> Iterator[ProvedSway]:
@@ -265,8 +273,8 @@ def _sways(document: Mapping[str, Any]) -> Iterator[ProvedSway]:
     if limits.keys() != bounds.keys() or (way is not None and way.keys() != {"load", "limit_m", "bound_m"}):
         raise ValueError("bounds of other loads than the limits'")
     for load, allowed in limits.items():
-        limit = SwayLimit(load=load, allowed=float(allowed))
-        yield ProvedSway(limit=limit, bound=float(bounds[load]), largest_met=nan)
+        limit = SwayLimit(load=load, allowed=_number(allowed))
+        yield ProvedSway(limit=limit, bound=_number(bounds[load]), largest_met=nan)
     if way is not None:
-        limit = SwayLimit(load=str(way["load"]), allowed=float(way["limit_m"]), on_the_way=True)
-        yield ProvedSway(limit=limit, bound=float(way["bound_m"]), largest_met=nan)
+        limit = SwayLimit(load=str(way["load"]), allowed=_number(way["limit_m"]), on_the_way=True)
+        yield ProvedSway(limit=limit, bound=_number(way["bound_m"]), largest_met=nan)

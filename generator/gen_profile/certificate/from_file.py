@@ -26,6 +26,7 @@ from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.verification.check import spec_and_manifest
+from gen_profile.verification.plausibility import another_move
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
@@ -164,6 +165,8 @@ def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
     content = read_artefact(path)
     spec, _ = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))
+    for sentence in another_move(spec, setpoints):
+        raise CertificateError(sentence)
     return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Mapping
+from operator import index
 from typing import Any
 
 import attrs
@@ -47,7 +48,7 @@ class Motions:
         ValueError
             They are not what they should be.
         """
-        factors, whole = np.array(self.quanta, dtype=np.float64), unpack(self.packed, "<i8", 1)
+        factors, whole = numbers(self.quanta), unpack(self.packed, "<i8", 1)
         if not (np.frexp(factors)[0] == 0.5).all() or factors.shape != whole.shape[1:2]:
             raise ValueError("quanta that are no powers of two")
         if not (np.abs(whole) < GREATEST).all():
@@ -64,6 +65,19 @@ def _quantum(values: Array) -> float:
     whole = (mantissa * 2.0**53).astype(np.int64)
     zeros = np.log2((whole & -whole).astype(np.float64))  # trailing ones of the mantissa that are 0
     return float(2.0 ** int((exponent - 53 + zeros).min()))
+
+
+def numbers(nested: Any) -> Array:
+    """Take nested lists of numbers as an array; texts that look like numbers are none.
+
+    Raises
+    ------
+    ValueError
+    """
+    array = np.array(nested)
+    if array.dtype.kind not in "if":
+        raise ValueError("something that is no number")
+    return array.astype(np.float64)
 
 
 def pack(array: Any, leading: int) -> dict[str, Any]:
@@ -83,11 +97,15 @@ def unpack(packed: Mapping[str, Any], kind: str, leading: int) -> Any:
     ValueError, KeyError, TypeError, binascii.Error, zlib.error
         It is damaged.
     """
-    shape = tuple(int(size) for size in packed["shape"])
+    if packed.keys() != {"shape", "zlib"}:
+        raise ValueError("an array of another kind")
+    shape = tuple(index(size) for size in packed["shape"])
     inflater = zlib.decompressobj()
     size = int(np.prod([float(size) for size in shape])) * np.dtype(kind).itemsize
     if not 0 < size <= MOST_BYTES:
         raise ValueError("an array of such a size")
-    content = inflater.decompress(base64.b64decode(packed["zlib"], validate=True), size)
+    content = inflater.decompress(base64.b64decode(packed["zlib"], validate=True), size + 1)
+    if not inflater.eof or inflater.unused_data:
+        raise ValueError("an array of another length")
     array = np.frombuffer(content, dtype=kind).reshape(*shape[leading:], *shape[:leading])
     return np.moveaxis(array, range(-leading, 0), range(leading)).astype(np.float64)

@@ -196,7 +196,7 @@ def followed(spec: Spec, setpoints: SampledProfile) -> Track:
 
 
 def ranges_of(spec: Spec) -> Ranges:
-    """List the parameters that the check changes."""
-    wide = {name: ends for name, ends in spec.checked_ranges().items() if ends[1] > ends[0]}
+    """List the parameters that the check changes, in alphabetical order, as JSON's objects have none."""
+    wide = {name: ends for name, ends in sorted(spec.checked_ranges().items()) if ends[1] > ends[0]}
     lower, upper = (np.array([ends[side] for ends in wide.values()]) for side in (0, 1))
     return Ranges(names=tuple(wide), lower=lower, upper=upper)

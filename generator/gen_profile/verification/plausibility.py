@@ -40,18 +40,24 @@ def implausibilities(spec: Spec, setpoints: SampledProfile) -> tuple[str, ...]:
         A sentence each.
     """
     return (
-        *_missed_ends(spec, setpoints),
-        *_missed_time(spec, setpoints),
+        *another_move(spec, setpoints),
         *_contradiction(spec, setpoints),
         *_off_their_places(spec, setpoints),
         *_exceeded_limits(spec, setpoints),
     )
 
 
+def another_move(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
+    """Say where setpoints are not the move that a spec asks for: of its ends, its time and its travel."""
+    yield from _missed_ends(spec, setpoints)
+    yield from _missed_time(spec, setpoints)
+    yield from _left_travel(spec, setpoints)
+
+
 def _missed_ends(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     """Say where the motion does not begin or end as the spec asks."""
     speed = np.array(spec.move.final_velocity)
-    allowed = TARGET_TOLERANCE * _sizes(spec) + setpoints.resolution
+    allowed = _nearby(spec, setpoints)
     beyond = spec.actuator.tau or 0.0
     if spec.move.shortest:  # the motion ends somewhere in the last cycle
         allowed += setpoints.cycle_time * np.abs(speed)
@@ -87,6 +93,24 @@ def _missed_time(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     if late or early:
         arrival = times[last + 1] if late else times[-1]
         yield f"The motion arrives at {arrival:.6g} s, and the spec asks for {asked:.6g} s (move.duration)."
+
+
+def _left_travel(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
+    """Say where an axis is beyond its travel."""
+    for column, axis in enumerate(spec.machine().actuated):
+        travel, position = spec.limits.of(column).travel, setpoints.position[:, column]
+        if travel is None:
+            continue
+        beyond = np.maximum(travel[0] - position, position - travel[1])
+        worst = int(beyond.argmax())
+        if beyond[worst] > _nearby(spec, setpoints)[column]:
+            template = (
+                "Axis {axis.name} is at {at:.9g} {axis.unit} at {time:.6g} s, and {place} allows {low:.9g} "
+                "to {high:.9g} {axis.unit}."
+            )
+            low, high = travel
+            place, time = spec.limits.place(column, "travel"), setpoints.times[worst]
+            yield Phrase(template, axis=axis, at=position[worst], time=time, place=place, low=low, high=high)
 
 
 def _contradiction(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
@@ -190,6 +214,11 @@ def _differences(spec: Spec, setpoints: SampledProfile, order: int) -> Array:
     position = setpoints.position
     onward = position[-1:] + setpoints.cycle_time * np.array(spec.move.final_velocity)
     return np.diff(np.concatenate([position[:1]] * (order - 1) + [position, onward]), order, axis=0)
+
+
+def _nearby(spec: Spec, setpoints: SampledProfile) -> Array:
+    """How far each axis may be off a place, in m (or rad)."""
+    return np.asarray(TARGET_TOLERANCE * _sizes(spec) + setpoints.resolution)
 
 
 def _sizes(spec: Spec) -> Array:
