@@ -113,11 +113,7 @@ class PlaybackTable:
             self.columns if self.first is None else self._segments().at_cycles()
         )
         return AxisTable(
-            cycle_time=self.cycle_time,
-            position=position,
-            velocity=velocity,
-            acceleration=acceleration,
-            jerk=None,
+            cycle_time=self.cycle_time, position=position, velocity=velocity, acceleration=acceleration
         )
 
     def between(self, cycle: int, fraction: float) -> Array:

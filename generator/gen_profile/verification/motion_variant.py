@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.motion.profile import Array, SampledProfile, columns_of
 from gen_profile.spec.model import Spec
 from gen_profile.suggestion import suggestion
 
@@ -74,23 +75,15 @@ def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tup
     gain, shift = variant.gain(list(spec.axis)), variant.shift(list(spec.axis))
     start = np.array(spec.move.start)
 
-    def times_gain(values: Array | None) -> Array | None:
-        return None if values is None else values * gain
-
     move = attrs.evolve(
         spec.move,
         start=tuple((start + shift).tolist()),
         target=tuple((start + shift + gain * np.array(spec.move.distance)).tolist()),
         final_velocity=tuple((gain * np.array(spec.move.final_velocity)).tolist()),
     )
-    changed = attrs.evolve(
-        setpoints,
-        position=start + shift + gain * (setpoints.position - start),
-        velocity=times_gain(setpoints.velocity),
-        acceleration=times_gain(setpoints.acceleration),
-        jerk=times_gain(setpoints.jerk),
-    )
-    return attrs.evolve(spec, move=move), changed
+    columns: dict[str, Any] = {name: values * gain for name, values in columns_of(setpoints).items()}
+    columns["position"] = start + shift + gain * (setpoints.position - start)
+    return attrs.evolve(spec, move=move), attrs.evolve(setpoints, **columns)
 
 
 def _entry(option: str, text: str, axes: Sequence[str]) -> tuple[str, float]:
