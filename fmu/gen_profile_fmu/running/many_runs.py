@@ -14,8 +14,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
-from gen_profile_fmu.running.instances import instance
+from gen_profile_fmu.running.instances import CalledFmu, called, compiled_loops, doubles, instance, unsigned
 
 
 class _PerRun(Structure):

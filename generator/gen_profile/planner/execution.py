@@ -20,7 +20,7 @@ from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import digest
 from gen_profile_fmu.running.block_run import CalledBlock
-from gen_profile_fmu.running.called_fmu import doubles
+from gen_profile_fmu.running.instances import doubles
 
 LOOP = Path(__file__).with_name("block_loop.c").read_text("ascii")  # over cycles
 

@@ -22,7 +22,7 @@ from typing import Any
 from gen_profile.errors import OutputError
 from gen_profile.sweep.case import CaseOutcome
 from gen_profile.sweep.grid import Grid
-from gen_profile.sweep.rows import case_path, row_of
+from gen_profile.sweep.table import case_path, row_of
 
 SUFFIX = ".sqlite"
 TYPES = {int: "INTEGER", float: "REAL", str: "TEXT"}

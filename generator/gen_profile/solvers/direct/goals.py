@@ -9,11 +9,10 @@ import numpy as np
 from scipy import sparse
 
 from gen_profile.motion.profile import Array
-from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.pontryagin import SNAP_TIME
 from gen_profile.problem.problem import Problem
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct.bezier import Piece, elevation, gram
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place

@@ -16,9 +16,8 @@ import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
-from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.acceleration import accelerate
 from gen_profile.solvers.direct.bezier import power_basis
