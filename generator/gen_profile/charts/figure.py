@@ -104,7 +104,7 @@ class Panel:
     """
 
     title: str
-    x_label: str
+    x_label: str = "time (s)"
     y_label: str
     lines: Sequence[Line]
     levels: Sequence[Level] = ()
