@@ -18,8 +18,6 @@ Reading takes what editors and spreadsheets do to such a file (byte-order mark, 
 blank lines at the end, columns in another order) and refuses what changes its meaning.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -33,8 +33,6 @@ on the way, and likewise what is for zones and events where there are none.
 - ``formulas/``: modes at the live parameters, complex powers, columns that a row fills, slow zones near.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """What stated errors leave, as a planner block watches it: constants, and on how many machines."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How a planner block searches for a plan: constants of its interior-point method and its first guesses."""
 
-from __future__ import annotations
-
 SEARCH_ITERATIONS = 13  # for which there is time where the axis moves already
 GIVES_UP = 4.0  # slow periods beyond the time to react, in which no motion is found for a command (3)
 

@@ -7,8 +7,6 @@ counts     the same as whole 32-bit drive counts, counts per s and counts per sÂ
 ========== ==================================================================================
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from math import ceil
 

@@ -1,7 +1,5 @@
 """What goes into an FMU, whatever FMI's version: variables, their structure, C sources and words."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 

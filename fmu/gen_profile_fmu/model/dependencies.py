@@ -4,8 +4,6 @@ FMI asks for two lists (2.0.4 section 2.2.8, 3.0 section 2.4.8): during the simu
 and time known; and at its start, with parameters, inputs and what has a start value known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import attrs

@@ -1,7 +1,5 @@
 """The variables of FMUs that hold a plant, a motion, or both."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum

@@ -1,7 +1,5 @@
 """Co-simulations of a plant that follows a controller's function block, by a compiled loop over both."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Collection, Mapping, Sequence
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p

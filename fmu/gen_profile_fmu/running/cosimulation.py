@@ -1,7 +1,5 @@
 """Co-simulation of a plant FMU that follows setpoints: by FMPy, or by FMPy's instance in a compiled loop."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, sizeof

@@ -1,7 +1,5 @@
 """An FMU of ours in memory, by FMPy, with its messages kept, and its functions for compiled loops."""
 
-from __future__ import annotations
-
 import ctypes
 import logging
 from collections.abc import Sequence

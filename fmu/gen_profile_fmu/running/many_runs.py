@@ -1,7 +1,5 @@
 """Many co-simulations of an FMU by a compiled loop over its own functions, as for Monte Carlo."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint

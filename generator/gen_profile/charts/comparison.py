@@ -1,7 +1,5 @@
 """All methods beside one another: the paper's figures 2 to 5, and their worst residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import attrs

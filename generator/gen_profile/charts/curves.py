@@ -1,7 +1,5 @@
 """Curves of a design: the motion, its spectrum, and the loads."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
 

@@ -4,8 +4,6 @@ A figure is a group of panels under one legend. Every panel is a plot of its own
 put them below one another; panels of one figure zoom together where their horizontal axis is the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 

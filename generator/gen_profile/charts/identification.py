@@ -1,7 +1,5 @@
 """A fitted swing: the log and the machine's swing, what is left, and its spectrum."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

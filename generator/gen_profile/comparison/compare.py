@@ -1,7 +1,5 @@
 """Optimal motions and shapers side by side, on the same machines, and which of them to take."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

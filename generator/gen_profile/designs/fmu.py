@@ -1,7 +1,5 @@
 """From a spec to an FMU of its plant, motion or planner, of the plant with either, or to a system of FMUs."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path

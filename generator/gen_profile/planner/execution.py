@@ -1,7 +1,5 @@
 """Executing a written planner block: its own text, translated to C, compiled and called cycle by cycle."""
 
-from __future__ import annotations
-
 import ctypes
 from ctypes import POINTER, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """A log of a sensor, cycle by cycle what a planner block is given of it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -5,8 +5,6 @@ relative to its own move, in units of the first axis: ``½ Σ (uᵢ · reach₁ 
 weight 1. Sway costs β exp((γ d)²) of eq. (26).
 """
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 

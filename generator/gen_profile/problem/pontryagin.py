@@ -17,8 +17,6 @@ Everything is dimensionless: ``x = offset + scale ∘ x̂``, ``t = T s``, ``g = 
 plant's parameters and the weights are run-time data, so one derivation serves every move of a plant.
 """
 
-from __future__ import annotations
-
 from functools import cached_property, lru_cache
 
 import attrs

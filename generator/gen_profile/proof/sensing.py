@@ -1,7 +1,5 @@
 """What a block's sensor meets in a history: a swing, gusts, its own errors and a fault; and its verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Self
 

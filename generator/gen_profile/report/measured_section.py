@@ -1,7 +1,5 @@
 """A measured move, in figures and curves beside the plan."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The keys of ``[check]`` that name an external FMU, and which of its variables are what."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path

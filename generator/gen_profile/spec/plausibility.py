@@ -4,8 +4,6 @@ What is judged here takes no solution of the move: its mean speed, the quasi-sta
 acceleration that makes it, the ropes' lengths.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from types import SimpleNamespace

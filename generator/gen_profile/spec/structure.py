@@ -3,8 +3,6 @@
 What fits is kept where other values do not, so that rules across fields find their faults beside them.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping

@@ -3,8 +3,6 @@
 Here stands how things may be stated, and whatever the machine fills in: its parameters, axes and loads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any

@@ -3,8 +3,6 @@
 A knob's words are looked up by its key in ``assets/words.json``; only a machine's parameters bring their own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from types import UnionType

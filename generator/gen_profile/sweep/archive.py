@@ -9,8 +9,6 @@ sqlar    the artefacts and manifests, as an SQLite archive (https://sqlite.org/s
 A case is one transaction, so whatever kills the writer, a case is there whole or not at all.
 """
 
-from __future__ import annotations
-
 import json
 import sqlite3
 import zlib

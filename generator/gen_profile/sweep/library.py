@@ -1,7 +1,5 @@
 """From a sweep to one PLC block that plays any of its profiles, made of the very files that passed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Looking a profile library up: the nearest profile that is safe on the machine that one has."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path

@@ -5,8 +5,6 @@ it what they made, a few cases at a time. So whatever stops them or this process
 a sweep that is started again works out the rest.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice

@@ -11,8 +11,6 @@ A case is finished when its ``case.json`` is there, which is the last of its fil
 are as it tells: the same sweep works out again what was damaged since.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

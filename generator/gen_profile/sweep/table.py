@@ -1,7 +1,5 @@
 """The table of a sweep: a Parquet file with one row per case, whichever process worked it out."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice

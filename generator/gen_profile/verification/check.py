@@ -1,7 +1,5 @@
 """Judging an artefact that lies on disk, whatever wrote it, as planned or smaller, mirrored or elsewhere."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

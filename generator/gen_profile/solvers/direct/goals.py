@@ -1,7 +1,5 @@
 """What the conic programs of the direct method minimise, and keep within bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Mapping, Sequence
 
 import attrs

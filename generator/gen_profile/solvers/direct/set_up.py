@@ -1,7 +1,5 @@
 """A problem transcribed for the direct method: mesh, machines, forms of the effort."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 

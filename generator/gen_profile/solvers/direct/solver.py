@@ -8,8 +8,6 @@ convex programming; Malyuta et al., 2022); where motions overshoot one another, 
 motion can do where angles are small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs

@@ -1,7 +1,5 @@
 """The controls of a linear machine that cost least: a convex problem, solved by damped Newton's method."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 

@@ -10,8 +10,6 @@ fast modes, the full Newton's method takes over:
    Hamiltonian drifts or the canonical equations are missed are split.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import suppress
