@@ -1,7 +1,5 @@
 """A function block taken apart: comments, variables and body, for formats that carry them one by one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 

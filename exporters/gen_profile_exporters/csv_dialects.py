@@ -14,8 +14,6 @@ The last three hold pairs of time and one quantity of one axis, and as many as t
 built after the vendors' public manuals and not tried on their tools.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterator, Sequence

@@ -18,12 +18,11 @@ Reading takes what editors and spreadsheets do to such a file (byte-order mark, 
 blank lines at the end, columns in another order) and refuses what changes its meaning.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence
 from decimal import Decimal
+from itertools import product
 
 import numpy as np
 
@@ -118,14 +117,7 @@ def _motion(
         columns["position"] = _integrated(
             columns["velocity"], cycle_time, in_axis_units(np.array(target.start), factor)
         )
-    table = AxisTable(
-        cycle_time=cycle_time,
-        position=columns["position"],
-        velocity=columns.get("velocity"),
-        acceleration=columns.get("acceleration"),
-        jerk=columns.get("jerk"),
-    )
-    return motion_of(table, target.axes)
+    return motion_of(AxisTable(cycle_time=cycle_time, **columns), target.axes)
 
 
 def _integrated(velocity: Array, cycle_time: float, start: Array) -> Array:
@@ -148,14 +140,8 @@ def _dialect(target: Target) -> CsvDialect:
 
 def _header(target: Target) -> list[str]:
     axes = target.axes
-    return [
-        TIME,
-        *(
-            _column(axis, quantity, axis.unit, len(axes))
-            for axis in axes
-            for quantity in target.export.csv_columns
-        ),
-    ]
+    by_axis = product(axes, target.export.csv_columns)
+    return [TIME, *(_column(axis, quantity, axis.unit, len(axes)) for axis, quantity in by_axis)]
 
 
 def _column(axis: AxisScale, quantity: str, unit: str, axes: int) -> str:

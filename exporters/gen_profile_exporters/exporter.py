@@ -1,7 +1,5 @@
 """What an exporter is: a profile to files, and files back to what the controller will issue."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import attrs

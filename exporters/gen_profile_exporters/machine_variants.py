@@ -14,8 +14,6 @@ the start allows shifts only. Equations are compared at a few fixed states, nume
 will do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import product
 from types import SimpleNamespace

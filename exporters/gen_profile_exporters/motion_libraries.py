@@ -3,8 +3,6 @@
 The calls follow the vendors' public manuals; they were not tried on a controller.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import attrs

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
-from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_length, sample
+from gen_profile.motion.profile import Array, Profile, SampledProfile, columns_of, grid_length, sample
 from gen_profile.spec.values import Bounds, CycleTime
 from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import Target
@@ -38,9 +38,9 @@ class AxisTable:
 
     cycle_time: float
     position: Array
-    velocity: Array | None
-    acceleration: Array | None
-    jerk: Array | None
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    jerk: Array | None = None
 
 
 def sampled(
@@ -63,21 +63,11 @@ def sampled(
 def axis_table(motion: SampledProfile, axes: tuple[AxisScale, ...]) -> AxisTable:
     """Convert a sampled motion, with all its derivatives, to axis units."""
     factor = np.array([axis.factor for axis in axes])
-    position, velocity, acceleration, jerk = (
-        in_axis_units(values, factor)
-        for values in (motion.position, motion.velocity, motion.acceleration, motion.jerk)
-        if values is not None
-    )
+    columns = {name: in_axis_units(values, factor) for name, values in columns_of(motion).items()}
     for column, axis in enumerate(axes):
         if axis.unit == COUNTS:
-            position[:, column] = counts(motion.position[:, column], axis, motion.cycle_time)
-    return AxisTable(
-        cycle_time=motion.cycle_time,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-    )
+            columns["position"][:, column] = counts(motion.position[:, column], axis, motion.cycle_time)
+    return AxisTable(cycle_time=motion.cycle_time, **columns)
 
 
 def motion_of(table: AxisTable, axes: tuple[AxisScale, ...]) -> SampledProfile:
@@ -85,10 +75,7 @@ def motion_of(table: AxisTable, axes: tuple[AxisScale, ...]) -> SampledProfile:
     factor = np.array([axis.factor for axis in axes])
     return SampledProfile(
         cycle_time=table.cycle_time,
-        position=in_si(table.position, factor),
-        velocity=None if table.velocity is None else in_si(table.velocity, factor),
-        acceleration=None if table.acceleration is None else in_si(table.acceleration, factor),
-        jerk=None if table.jerk is None else in_si(table.jerk, factor),
+        **{name: in_si(values, factor) for name, values in columns_of(table).items()},
         resolution=in_si(np.array([float(axis.unit == COUNTS) for axis in axes]), np.abs(factor)),
     )
 

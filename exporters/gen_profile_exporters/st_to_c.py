@@ -10,8 +10,6 @@ own counter, or, where only the execution shows it, one of the `FAULTS` of check
 and OR are evaluated, as by many controllers: one side is no guard for the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Declarations of a function block, as C takes them over."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Texts for controllers in files of their own, where they can be read as what they are."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from functools import cache

@@ -38,9 +38,9 @@ from .spec.reading import parse_spec as parse_spec
 from .spec.reading import preset_spec as preset_spec
 from .spec.reading import presets as presets
 from .spec.reading import read_spec as read_spec
-from .sweep.from_python import run_sweep as run_sweep
 from .sweep.library import write_library as write_library
 from .sweep.lookup import lookup as lookup
+from .sweep.run import run_sweep as run_sweep
 from .verification.check import check_artefact as check_artefact
 from .verification.from_python import cosimulate as cosimulate
 from .verification.from_python import residual_sways as residual_sways

@@ -1,7 +1,5 @@
 """Files that a user names, read up to a size: one that is huge, or never ends, is refused."""
 
-from __future__ import annotations
-
 import errno
 from functools import partial
 from itertools import islice

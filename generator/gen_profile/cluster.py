@@ -1,7 +1,5 @@
 """Dask workers: processes of this computer, or those of a scheduler that runs elsewhere."""
 
-from __future__ import annotations
-
 import logging
 import signal
 import sys

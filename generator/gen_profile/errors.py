@@ -21,8 +21,6 @@ file and line), and what to do about it. Why there is no motion stands in values
 a code, and by suggestions that were tried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, ClassVar, NamedTuple

@@ -1,7 +1,5 @@
 """Signals that come while compiled code runs, which would swallow what their handlers raise."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Matrices of a hundred rows are too small to share: threads that wait for a busy 
 to a hundredfold, and how they share the work would show in the last bits.
 """
 
-from __future__ import annotations
-
 from contextlib import ContextDecorator
 from functools import cache
 from threading import Lock

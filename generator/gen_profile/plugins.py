@@ -1,7 +1,5 @@
 """What other distributions bring along: by entry points, and libraries that extras need."""
 
-from __future__ import annotations
-
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from typing import TypeVar

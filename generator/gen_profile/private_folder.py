@@ -1,7 +1,5 @@
 """Folders that no other user may write: whether one is, and temporary ones that end with their owner."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat

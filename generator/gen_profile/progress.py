@@ -1,7 +1,5 @@
 """What long work reports of its progress."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 

@@ -1,7 +1,5 @@
 """JSON from outside: finite numbers only, every key once, and nested no deeper than Python takes."""
 
-from __future__ import annotations
-
 import json
 from math import isfinite
 from typing import Any

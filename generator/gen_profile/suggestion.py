@@ -1,7 +1,5 @@
 """What a person may have meant by a word that is not known, or by a text where a number is wanted."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Results as a line in a terminal, as a small table and a picture in a notebook, and as a table of pandas."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape

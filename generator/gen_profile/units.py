@@ -1,7 +1,5 @@
 """The only place where units are converted: SI inside, an axis's own unit and sign at the edges."""
 
-from __future__ import annotations
-
 import math
 
 import attrs

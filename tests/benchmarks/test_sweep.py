@@ -14,8 +14,7 @@ import psutil
 from gen_profile.spec.reading import preset_text
 from gen_profile.sweep.case import run_case
 from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.plan import prepare
-from gen_profile.sweep.run import sweep
+from gen_profile.sweep.run import prepare, sweep
 from gen_profile.sweep.store import opened
 
 AXES = ("move.distance=0.1:0.3:20", "plant.L1=0.4:0.5:20")

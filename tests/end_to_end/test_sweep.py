@@ -20,9 +20,8 @@ from gen_profile.designs.design import design
 from gen_profile.spec.reading import preset_spec, preset_text
 from gen_profile.sweep import run as workflow
 from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.plan import prepare
-from gen_profile.sweep.reading import swept_table, take_out
-from gen_profile.sweep.store import grid_of
+from gen_profile.sweep.run import prepare
+from gen_profile.sweep.store import grid_of, swept_table, take_out
 from gen_profile.verification.check import check_artefact
 
 pytestmark = pytest.mark.slow

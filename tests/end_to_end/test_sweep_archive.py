@@ -16,9 +16,8 @@ from gen_profile.spec.reading import preset_text
 from gen_profile.sweep.archive import read_archive
 from gen_profile.sweep.case import CaseOutcome, failed
 from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.plan import prepare
-from gen_profile.sweep.reading import swept_table, take_out
-from gen_profile.sweep.store import grid_of, opened
+from gen_profile.sweep.run import prepare
+from gen_profile.sweep.store import grid_of, opened, swept_table, take_out
 
 TABLE = b"1;2\r\n\xb5"
 ARTEFACT = {"format": "csv", "path": "paper.csv", "sha256": sha256(TABLE), "bytes": 0, "payload_sha256": "p"}

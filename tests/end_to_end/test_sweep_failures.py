@@ -19,7 +19,7 @@ from gen_profile.sweep import case as sweep_case
 from gen_profile.sweep import run as workflow
 from gen_profile.sweep.case import failed, run_case
 from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.plan import prepare
+from gen_profile.sweep.run import prepare
 from gen_profile.sweep.store import opened
 from gen_profile.sweep.table import read_table, write_table
 

@@ -20,8 +20,8 @@ from gen_profile_fmu.building import platforms
 from gen_profile_fmu.building.compiler import PACKED, Compiler, compile_library, find_compiler
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Version, sources, standard_headers
-from gen_profile_fmu.running.called_fmu import loop_sources
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
+from gen_profile_fmu.running.instances import loop_sources
 
 CRANE = find_plant("double-pendulum-crane")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")

@@ -25,10 +25,10 @@ from fmu.kinds import ALL_KINDS, INPUTS, KINDS, PAIRS, model_of
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Coordinate, Parameter
 from gen_profile.plants.registry import BUILT_IN, find_plant
+from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.building.plant_fmu import cached_fmu, plant_fmu
 from gen_profile_fmu.description.base_units import BASE_UNITS
 from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources
-from gen_profile_fmu.model.contents import identifier_of
 from gen_profile_fmu.model.variables import variable_name
 
 PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
@@ -294,7 +294,7 @@ def test_a_plant_may_have_unbounded_parameters_and_constant_outputs(version):
     [("double-pendulum-crane", "double_pendulum_crane"), ("2-axis winch", "_2_axis_winch"), ("ü", "_")],
 )
 def test_the_model_identifier_is_a_c_identifier(type_, identifier):
-    assert identifier_of(type_) == identifier
+    assert c_name(type_) == identifier
 
 
 # FMI 2.0.4, section 2.2.9, and FMI 3.0, section 2.4.7.5.1, but for arrays and quotes

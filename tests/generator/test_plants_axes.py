@@ -5,7 +5,7 @@ import pytest
 
 from gen_profile.errors import SpecError
 from gen_profile.motion.metrics import greatest, length
-from gen_profile.problem.axis_reach import axis_reach, effort_weights
+from gen_profile.problem.cost import axis_reach, effort_weights
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of

@@ -12,8 +12,8 @@ from gen_profile.solvers.collocation import LONG_GAUSS
 from gen_profile.solvers.indirect import simplified_newton
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem, independence, quintic
-from gen_profile.solvers.indirect.full_newton import solve_fully
 from gen_profile.solvers.indirect.simplified_newton import solve_simplified
+from gen_profile.solvers.indirect.solver import solve_fully
 
 
 def posed(problem):

@@ -51,6 +51,12 @@ def templates():
             match node:
                 case ast.Call(func=ast.Name(id="Phrase" | "Words"), args=[first, *_]):
                     said = first
+                case ast.Call(
+                    func=ast.Attribute(attr="add") | ast.Name(id="_odd"),
+                    args=[_, first, *_],
+                    keywords=[ast.keyword(), *_],
+                ):
+                    said = first
                 case ast.Raise(exc=ast.Call(args=[first], keywords=[ast.keyword(), *_])):
                     said = first
                 case ast.Assign(targets=[ast.Name(id="template" | "PLACED")]):

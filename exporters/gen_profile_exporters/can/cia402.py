@@ -1,7 +1,5 @@
 """The state machine of CiA 402-2: states as statuswords tell them, and the controlwords between them."""
 
-from __future__ import annotations
-
 from enum import Enum, IntEnum
 
 VOLTAGE = 1 << 4

@@ -5,8 +5,6 @@ connection set of CiA 301 (200h + n for RPDO1 of node n, 180h + n for TPDO1 …)
 others.
 """
 
-from __future__ import annotations
-
 import struct
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

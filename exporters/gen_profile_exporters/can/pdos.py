@@ -17,8 +17,6 @@ In a drive whose mapping is fixed (``can.fixed_pdos``) it may share one with the
 frame, every cycle, and a quick stop goes the same way after them.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping, Sequence
 

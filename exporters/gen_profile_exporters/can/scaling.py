@@ -4,8 +4,6 @@ A position is multiplied by the exact ratio that the spec's decimal number state
 even. Nothing is added up from cycle to cycle, so nothing drifts.
 """
 
-from __future__ import annotations
-
 from decimal import Decimal
 from fractions import Fraction
 

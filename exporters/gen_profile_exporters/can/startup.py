@@ -7,8 +7,6 @@ and the setpoints' arrival (1401h:05 if they come by RPDO2), and answers both wi
 Objects: CiA 301 (1000h to 1FFFh), CiA 402-2 (6000h and up), CiA 302-3 (concise DCF).
 """
 
-from __future__ import annotations
-
 import csv
 import struct
 from collections.abc import Iterator, Mapping, Sequence

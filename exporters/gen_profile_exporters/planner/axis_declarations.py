@@ -1,7 +1,5 @@
 """What a planner block declares of its axes, and tells of them in its header."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import attrs

@@ -5,8 +5,6 @@ An axis that fails is let go at once, the others brake, and nothing is guided ag
 rising edge: the block then takes the axes over where they stand.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 

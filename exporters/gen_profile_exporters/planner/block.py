@@ -33,8 +33,6 @@ on the way, and likewise what is for zones and events where there are none.
 - ``formulas/``: modes at the live parameters, complex powers, columns that a row fills, slow zones near.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -54,7 +52,6 @@ from gen_profile_exporters.playback.structured_text import block_name, literal
 
 Array = NDArray[np.float64]
 
-LONGEST_ON_WAY = 72  # where the axis moves already
 FUTURE = 140  # slots of a committed future
 LONGEST = 132  # of a plan; farther targets are approached by pulses, as a stick would
 MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have the same velocity
@@ -63,23 +60,12 @@ LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
 REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
-CHUNK = 45  # slots that a phase takes at once
 PULSE_WORK, ZONED_WORK = 60, 7 * ZONES  # operations of each slot of a pulse that is weighed; with zones
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
-RAMP_LEAST = 0.05  # of full speed: a change of the stick that is planned for
-RAMP_LEAST_SLOTS = 9
-MET = 1e-6  # sum of shares by which a plan may miss a condition
 HOLD = 0.2  # s, in which an input that is out of range is held
 STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
 ROUNDING = 1e-3  # of a live parameter's greatest rate
-SPARE = 0.3  # slots more than expected, by slots between two measured motions
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
-MOST_LONGER = 20  # slots by which a plan may take longer than expected before pulses are quicker
-MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
-AGAINST = 0.1  # share of full speed, below which a tap of the stick ends by itself
-FRESH = 8  # cycles, for which the machine that is followed counts as constant
-AT_ONCE = 2.0  # of full speed, from a slot's pulse to the next: no bound
-AFTER_CUT = 0.1  # of full speed, by which pulses grow from slot to slot after one was cut
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
@@ -327,13 +313,14 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cAxes": len(c.axes),
         "cModes": modes,
         "cRows": rows,
-        **({"cFresh": FRESH} if c.rates else {}),
+        # cycles, for which the machine that is followed counts as constant
+        **({"cFresh": 8} if c.rates else {}),
         "cCycleWork": _cycle_work(c),
-        "cMostLonger": MOST_LONGER,
+        "cMostLonger": 20,  # slots by which a plan may take longer than expected before pulses are quicker
         "cConditions": _conditions(c),
         **_watched(c),
         "cSlotBits": _longest_slot(c).bit_length(),
-        "cRampLeastSlots": RAMP_LEAST_SLOTS,
+        "cRampLeastSlots": 9,
         "cAhead": 2 if c.rates else 1,
         "cSeconds": np.count_nonzero(c.second_order),
         "cLives": len(c.live),
@@ -343,14 +330,14 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cMost": MOST,
         "cHalf": MOST // 2,
         "cLongest": LONGEST,
-        "cLongestOnWay": LONGEST_ON_WAY,
+        "cLongestOnWay": 72,  # where the axis moves already
         "cKernelFirst": 18,
         "cLongestKernel": _longest_kernel(c),
         "cLongKernel": min(LONG_KERNEL, _longest_kernel(c)),
         "cPulseChunk": _pulse_chunk(c),
         "cPulseWork": PULSE_WORK + ZONED_WORK * c.zones,
         "cWide": WIDE,
-        "cChunk": CHUNK,
+        "cChunk": 45,  # slots that a phase takes at once
         "cFuture": FUTURE,
         "cWork": _work(c),
         **({"cZones": ZONES} if c.zones else {}),
@@ -452,8 +439,8 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cReserve": RESERVE if c.rates else 0.0,
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
         "cCalm": c.tolerated_sway,
-        "cAtOnce": AT_ONCE,
-        "cAfterCut": AFTER_CUT,
+        "cAtOnce": 2.0,  # of full speed, from a slot's pulse to the next: no bound
+        "cAfterCut": 0.1,  # of full speed, by which pulses grow from slot to slot after one was cut
         **(
             {"cDoubt": c.stated_error}
             if c.rates
@@ -463,11 +450,12 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
                 **of_errors.real(_fine(c), c.least_decay),
             }
         ),
-        "cRampLeast": RAMP_LEAST,
-        "cMet": MET,
-        "cSpare": SPARE,
-        "cMirrorDecay": MIRROR_DECAY,
-        "cAgainst": AGAINST,
+        "cRampLeast": 0.05,  # of full speed: a change of the stick that is planned for
+        "cMet": 1e-6,  # sum of shares by which a plan may miss a condition
+        "cSpare": 0.3,  # slots more than expected, by slots between two measured motions
+        # over a motion, up to which its halves mirror each other until the last projection
+        "cMirrorDecay": 0.2,
+        "cAgainst": 0.1,  # share of full speed, below which a tap of the stick ends by itself
         **of_search.real(robust=not c.sway_share),
         **of_sensor.real(c.sensor, c.cycle),
     }

@@ -1,7 +1,5 @@
 """The planner block as C99: the same statements, between structures of inputs, outputs and state."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -1,18 +1,11 @@
 """What stated errors leave, as a planner block watches it: constants, and on how many machines."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
 
 VARIATIONS = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated errors: machines watched
-TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
-ADMITTED = 0.8  # of what an epoch may leave: no plan or pulse that leaves more, if that is more than now
-LEAST_ROOM, STOP_ROOM = 0.15, 0.4  # of the allowed sway, that an epoch may leave at least; where it stops
-KEPT_BACK = 0.15  # of what it may leave, towards its end
-BETWEEN = 1.02  # of the sway on the machines watched and halfway: those between
-FINE_BETWEEN, CLOSE = 1.05, 1.1  # likewise on finer ones; and rad, up to which that holds, between two
+CLOSE = 1.1  # rad, between two finer machines, up to which what lies between them is known
 SPREAD = 4.0  # rad, from none to the whole error: epochs end; up to a quarter later on the way
 MOST_FINE, LEAST_FINE = 128, 16  # finer machines of each mode
 FINE_WORK = 0.1  # of a cycle's operations, that they take at most
@@ -48,16 +41,17 @@ def rest_work(constants: Mapping[str, int], modes: int) -> int:
 def real(fine: int, least_decay: float) -> dict[str, float]:
     """Give the others."""
     return {
-        "cBetween": BETWEEN,
-        "cFineBetween": FINE_BETWEEN,
+        "cBetween": 1.02,  # of the sway on the machines watched and halfway: those between
+        "cFineBetween": 1.05,  # likewise on finer ones
         "cSpread": SPREAD,
         "cFineSpread": 0.5 * CLOSE * (fine - 1),
         "cFineStep": 2.0 / (fine - 1),
         "cLeastDecay": least_decay,
-        "cLeastRoom": LEAST_ROOM,
-        "cStopRoom": STOP_ROOM,
-        "cKeptBack": KEPT_BACK,
-        "cTighter": TIGHTER,
-        "cAdmitted": ADMITTED,
+        "cLeastRoom": 0.15,  # of the allowed sway, that an epoch may leave at least
+        "cStopRoom": 0.4,  # where it stops
+        "cKeptBack": 0.15,  # of what it may leave, towards its end
+        "cTighter": 20.0,  # weight of second order, where as much of it is left as plans may spend
+        # of what an epoch may leave: no plan or pulse that leaves more, if that is more than now
+        "cAdmitted": 0.8,
         "cVariationSum": float(np.sum(np.power(VARIATIONS, 4))),
     }

@@ -1,7 +1,5 @@
 """A planner block with a program and a task, as OpenPLC Runtime and others that use matiec run it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from gen_profile_exporters.block_source import BlockVariable, parse_function_block

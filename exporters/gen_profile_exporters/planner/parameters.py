@@ -10,8 +10,6 @@ are. A switch makes the block forget all that it knows: it begins as after a col
 before the load was seen to hang still.
 """
 
-from __future__ import annotations
-
 import re
 import zlib
 from collections.abc import Callable, Iterator

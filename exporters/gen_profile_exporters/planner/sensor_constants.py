@@ -1,7 +1,5 @@
 """What a planner block knows of a sensor of the load: constants, and words of its header."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import attrs

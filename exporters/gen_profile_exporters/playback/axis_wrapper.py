@@ -6,8 +6,6 @@ stop on the path, and nothing goes on before another rising edge and the check o
 The calls follow the vendors' public manuals; they were not tried on a controller.
 """
 
-from __future__ import annotations
-
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE

@@ -6,8 +6,6 @@ lines. A line that begins with ``%`` stands in blocks of several axes only. ``~`
 the axis there, and nothing where there is one axis.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache

@@ -15,8 +15,6 @@ The first checksum is over the whole buffer, with the cycle time in its own plac
 has a wrong one here. A motion's own is that of its block of constants, which follows from it.
 """
 
-from __future__ import annotations
-
 import re
 import zlib
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """The statements of the playback block that depend on how its table is laid out."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gen_profile_exporters.text_parts import text_parts

@@ -6,8 +6,6 @@ array, and the statements look these up at the motion that is selected. So every
 its own checksum, and what is known of the single block holds for the library.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from itertools import accumulate

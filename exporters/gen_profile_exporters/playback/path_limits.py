@@ -20,8 +20,6 @@ acceleration hence changes by no more than its *stop jerk* per s,
     J + 3 A Q + V W          (U ≤ W)
 """
 
-from __future__ import annotations
-
 from itertools import count
 
 import attrs

@@ -5,8 +5,6 @@ over at both ends (quintic Hermite interpolation), so the whole is twice continu
 are as long as the error at the cycles between allows; a single cycle always fits.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import attrs

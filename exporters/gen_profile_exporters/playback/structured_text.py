@@ -13,8 +13,6 @@ Each literal reads back to the same double, and the block counts cycles instead 
 - Where there are several axes, inputs and outputs are arrays, in the order of the machine's axes.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

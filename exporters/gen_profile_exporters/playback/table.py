@@ -7,8 +7,6 @@ counts     the same as whole 32-bit drive counts, counts per s and counts per sÂ
 ========== ==================================================================================
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from math import ceil
 
@@ -113,11 +111,7 @@ class PlaybackTable:
             self.columns if self.first is None else self._segments().at_cycles()
         )
         return AxisTable(
-            cycle_time=self.cycle_time,
-            position=position,
-            velocity=velocity,
-            acceleration=acceleration,
-            jerk=None,
+            cycle_time=self.cycle_time, position=position, velocity=velocity, acceleration=acceleration
         )
 
     def between(self, cycle: int, fraction: float) -> Array:

@@ -12,8 +12,6 @@ below 2⁵³, which LREAL holds exactly, however a compiler groups the operation
 operations of a CRC-32 by half bytes, and no operation on bits, in which compilers differ.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_profile.motion.profile import Array

@@ -1,7 +1,5 @@
 """Points of a time cam: the knots that a controller interpolates between."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import attrs

@@ -7,8 +7,6 @@ the profile's. The cam is a table of ``SMC_CAMXYVA``, between whose points SoftM
 quintics.
 """
 
-from __future__ import annotations
-
 from lxml import etree
 
 from gen_profile.motion.profile import Profile

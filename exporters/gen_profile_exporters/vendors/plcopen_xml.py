@@ -4,8 +4,6 @@ The same variables and statements as the Structured Text, each in its element. R
 again and reads that.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import attrs

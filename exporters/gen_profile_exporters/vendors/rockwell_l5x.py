@@ -6,8 +6,6 @@ Points are evenly spaced cycles, as many as the error allows; the error found, R
 stated in the tag's description.
 """
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -7,8 +7,6 @@ The wrapper calls ``MC_MOTIONINPOSITION`` of the S7-1500T. The data block holds 
 spline through points at a regular distance keeps within the error stated.
 """
 
-from __future__ import annotations
-
 import re
 
 import attrs

@@ -5,8 +5,6 @@ global variable list holds ``MC_MotionFunctionPoint`` (TF5050), the quintic betw
 ``MOTIONFUNCTYPE_POLYNOM5_MM``, for playing the motion as a cam over the time in s.
 """
 
-from __future__ import annotations
-
 from uuid import NAMESPACE_URL, uuid5
 
 from lxml import etree

@@ -1,7 +1,5 @@
 """XML in and out: nothing fetched, no entities, one form of bytes."""
 
-from __future__ import annotations
-
 from lxml import etree
 
 from gen_profile.errors import ExportError

@@ -1,7 +1,5 @@
 """Compiled binaries out of the cache, and whole FMUs made of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path

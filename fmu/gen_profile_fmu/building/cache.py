@@ -5,8 +5,6 @@ reproducible, so two processes that write the same entry at once write the same 
 place by a rename: a reader sees whole files only. The list of checksums comes last.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The C compiler that makes an FMU's binary: Zig's from PyPI, or the one that the environment names."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shlex

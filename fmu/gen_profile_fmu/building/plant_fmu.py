@@ -1,7 +1,5 @@
 """A plant's FMU for the check: built once per content, then taken from the cache."""
 
-from __future__ import annotations
-
 from functools import cache, partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The platforms that FMUs are built for: compiler targets, and where FMI wants their binaries."""
 
-from __future__ import annotations
-
 import sys
 from platform import machine
 

@@ -1,7 +1,5 @@
 """One binary for both processors of macOS: Mach-O files behind a common header (mach-o/fat.h)."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 

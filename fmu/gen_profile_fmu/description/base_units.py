@@ -1,7 +1,5 @@
 """SI units by their base units, as FMI wants them."""
 
-from __future__ import annotations
-
 # exponents of the SI base units; FMI also counts the radian as one
 BASE_UNITS: dict[str, dict[str, int]] = {
     "1": {},

@@ -1,7 +1,5 @@
 """The files of an FMU, as FMI 2 or 3 lays them out, and the archive they make."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import zipfile

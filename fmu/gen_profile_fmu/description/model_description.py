@@ -1,7 +1,5 @@
 """modelDescription.xml of FMI 2.0 (2.0.4, sections 2.2, 3.3, 4.3) and 3.0 (section 2.4), and build files."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from importlib.metadata import version

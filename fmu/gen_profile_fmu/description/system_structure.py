@@ -3,8 +3,6 @@
 Importers look for the names of XML elements with the prefixes that the standard writes them with.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from xml.etree import ElementTree

@@ -4,8 +4,6 @@ A terminal is an axis, with its setpoints and its motion, or the place of a body
 of a plant's have the same names and members.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from xml.etree import ElementTree
 

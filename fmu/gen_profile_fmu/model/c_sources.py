@@ -1,7 +1,5 @@
 """C sources of an FMU: CasADi's equations, the tables, and the hand-written files."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path

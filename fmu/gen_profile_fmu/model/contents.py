@@ -1,8 +1,5 @@
 """What goes into an FMU, whatever FMI's version: variables, their structure, C sources and words."""
 
-from __future__ import annotations
-
-import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
@@ -11,6 +8,7 @@ import attrs
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate
 from gen_profile.problem.dynamics import dynamics
+from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.model.c_sources import (
     equations_source,
     model_sources,
@@ -77,12 +75,7 @@ class Model:
     @property
     def identifier(self) -> str:
         """The name as C takes it: that of the binary."""
-        return identifier_of(self.name)
-
-
-def identifier_of(name: str) -> str:
-    """Make a C identifier of a name."""
-    return re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII)
+        return c_name(self.name)
 
 
 def plant_model(machine: PlantInstance, kind: InputKind, name: str | None = None) -> Model:

@@ -4,8 +4,6 @@ FMI asks for two lists (2.0.4 section 2.2.8, 3.0 section 2.4.8): during the simu
 and time known; and at its start, with parameters, inputs and what has a start value known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import attrs
@@ -47,16 +45,15 @@ def plant_structure(
     """
     states = table.states
     known: dict[int, set[int]] = {reference: {reference} for reference in states}
-    known |= _observed(equations, table, drives)
+    known |= _rows(equations, equations.outputs, table.references(*OBSERVED), table, drives)
     known |= _derivatives(equations, table, drives)
     if "DISTANCE" in table.blocks:
         known |= _motion(table)
     start = dict(zip(table.references("Q_A"), (origins[axis] for axis in sorted(origins)), strict=True))
     start |= {reference: set() for reference in table.references("DQ_A")}
     running = {*table.references_of(Kind.INPUT), *states, *table.references("TIME")}
-    starting = set(table.references_of(*(kind for kind in Kind if kind.has_start))) | {
-        *table.references("TIME")
-    }
+    given = table.references_of(*(kind for kind in Kind if kind.has_start))
+    starting = {*given, *table.references("TIME")}
     return Structure(running=_within(known, running), starting=_within(_substituted(known, start), starting))
 
 
@@ -76,12 +73,6 @@ def _motion(table: VariableTable) -> dict[int, set[int]]:
         order, axis = divmod(index, len(start))
         known[reference] = {*sources, distance[axis], *([start[axis]] if order == 0 else [])}
     return known
-
-
-def _observed(
-    equations: Dynamics, table: VariableTable, drives: Mapping[int, set[int]]
-) -> dict[int, set[int]]:
-    return _rows(equations, equations.outputs, table.references(*OBSERVED), table, drives)
 
 
 def _derivatives(

@@ -1,7 +1,5 @@
 """The page that importers show beside an FMU: equations, variables and a picture of the motion."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable, Iterable, Sequence

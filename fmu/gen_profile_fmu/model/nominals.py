@@ -1,7 +1,5 @@
 """The size of a plant's states, by which integrators weigh their errors (FMI's `nominal`)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

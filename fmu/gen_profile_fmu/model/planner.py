@@ -1,7 +1,5 @@
 """An FMU's content of a planner block, alone or with the plant that it drives: the block's own text in C."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,10 +1,9 @@
 """The variables of FMUs that hold a plant, a motion, or both."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
+from typing import Any
 
 import attrs
 
@@ -82,7 +81,7 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
     table = VariableTable(
         blocks={
             **_parameters(machine, kind),
-            "START": _at(machine.position, _per_axis(axes, "start", words, 0, Kind.FIXED_PARAMETER)),
+            "START": _at(machine.position, _each(axes, "{}.start", words, 0, Kind.FIXED_PARAMETER)),
             "INPUTS": _inputs(machine, kind),
             "PERIOD": _period(machine.period, kind),
             **_states_and_outputs(machine),
@@ -136,9 +135,9 @@ def planned_system_variables(
     left = [number for number in range(len(axes)) if number not in planned]
     others = _at(
         [machine.position[number] for number in left],
-        _per_axis([axes[number] for number in left], "setpoint", words, 0, Kind.INPUT),
+        _each([axes[number] for number in left], "{}.setpoint", words, 0, Kind.INPUT),
     )
-    start = _per_axis(axes, "start", "position at rest at the start", 0, Kind.FIXED_PARAMETER)
+    start = _each(axes, "{}.start", "position at rest at the start", 0, Kind.FIXED_PARAMETER)
     table = VariableTable(
         blocks={
             **_parameters(machine, InputKind.SETPOINT),
@@ -216,9 +215,9 @@ def _period(period: float, kind: InputKind) -> tuple[FmuVariable, ...]:
 def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
     """List the parameters that shift and scale a motion; an axis that comes back to its start only shifts."""
     start = motion.coefficients[0, 0]
-    distances = _per_axis(axes, "distance", "how far the motion leads, scaled", 0, Kind.FIXED_PARAMETER)
+    distances = _each(axes, "{}.distance", "how far the motion leads, scaled", 0, Kind.FIXED_PARAMETER)
     return {
-        "START": _at(start, _per_axis(axes, "start", "where the motion begins", 0, Kind.FIXED_PARAMETER)),
+        "START": _at(start, _each(axes, "{}.start", "where the motion begins", 0, Kind.FIXED_PARAMETER)),
         "DISTANCE": tuple(
             attrs.evolve(variable, start=float(distance))
             if abs(distance) > _STANDING
@@ -228,15 +227,15 @@ def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
     }
 
 
-def _per_axis(
-    axes: Sequence[Coordinate], suffix: str, description: str, order: int, kind: Kind
+def _each(
+    coordinates: Iterable[Coordinate], pattern: str, description: str, order: int, kind: Kind
 ) -> tuple[FmuVariable, ...]:
-    """List a quantity of every axis; `order` is that of the time derivative."""
+    """List a quantity of every coordinate; `order` is that of the time derivative."""
     return tuple(
         FmuVariable(
-            name=f"{axis.name}.{suffix}", description=description, unit=_unit(axis.unit, order), kind=kind
+            name=pattern.format(q.name), description=description, unit=_unit(q.unit, order), kind=kind
         )
-        for axis in axes
+        for q in coordinates
     )
 
 
@@ -255,12 +254,12 @@ def _inputs(machine: PlantInstance, kind: InputKind) -> tuple[FmuVariable, ...]:
     axes = machine.plant.actuated
     match kind:
         case InputKind.ACCELERATION:
-            return _per_axis(axes, "setpoint_acceleration", "acceleration of the axis", 2, Kind.INPUT)
+            return _each(axes, "{}.setpoint_acceleration", "acceleration of the axis", 2, Kind.INPUT)
         case InputKind.VELOCITY:
-            return _per_axis(axes, "setpoint_velocity", "velocity that the drive follows", 1, Kind.INPUT)
+            return _each(axes, "{}.setpoint_velocity", "velocity that the drive follows", 1, Kind.INPUT)
         case InputKind.SETPOINT:
             words = "position to reach at the end of the step"
-            return _at(machine.position, _per_axis(axes, "setpoint", words, 0, Kind.INPUT))
+            return _at(machine.position, _each(axes, "{}.setpoint", words, 0, Kind.INPUT))
 
 
 def _states_and_outputs(machine: PlantInstance) -> Blocks:
@@ -276,19 +275,21 @@ def _states_and_outputs(machine: PlantInstance) -> Blocks:
 
 def _of_plant(machine: PlantInstance) -> Blocks:
     plant, axes = machine.plant, machine.plant.actuated
-    accelerations = _per_axis(axes, "velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
-    velocities = _per_axis(axes, "position", "velocity of the axis", 1, Kind.DERIVATIVE)
+    accelerations = _each(axes, "{}.velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
+    velocities = _each(axes, "{}.position", "velocity of the axis", 1, Kind.DERIVATIVE)
     return {
-        "Q_U": _swinging(machine.initial, _unactuated(plant, "{}", "unactuated coordinate", 0, Kind.STATE)),
+        "Q_U": _swinging(
+            machine.initial, _each(plant.unactuated, "{}", "unactuated coordinate", 0, Kind.STATE)
+        ),
         "DQ_U": _swinging(
             machine.initial,
-            _unactuated(plant, "{}.rate", "rate of an unactuated coordinate", 1, Kind.STATE),
+            _each(plant.unactuated, "{}.rate", "rate of an unactuated coordinate", 1, Kind.STATE),
         ),
-        "Q_A": _per_axis(axes, "position", "position of the axis", 0, Kind.OUTPUT),
-        "DQ_A": _per_axis(axes, "velocity", "velocity of the axis", 1, Kind.OUTPUT),
+        "Q_A": _each(axes, "{}.position", "position of the axis", 0, Kind.OUTPUT),
+        "DQ_A": _each(axes, "{}.velocity", "velocity of the axis", 1, Kind.OUTPUT),
         DERIVATIVES: (
-            *_unactuated(plant, "der({})", "rate of an unactuated coordinate", 1, Kind.DERIVATIVE),
-            *_unactuated(plant, "der({}.rate)", "its acceleration", 2, Kind.DERIVATIVE),
+            *_each(plant.unactuated, "der({})", "rate of an unactuated coordinate", 1, Kind.DERIVATIVE),
+            *_each(plant.unactuated, "der({}.rate)", "its acceleration", 2, Kind.DERIVATIVE),
             *(attrs.evolve(variable, name=f"der({variable.name})") for variable in velocities),
             *(attrs.evolve(variable, name=f"der({variable.name})") for variable in accelerations),
         ),
@@ -304,33 +305,11 @@ def _swinging(initial: Mapping[str, float], states: tuple[FmuVariable, ...]) -> 
     return tuple(attrs.evolve(state, start=started.get(state.name, 0.0)) for state in states)
 
 
-def _unactuated(
-    plant: Plant, pattern: str, description: str, order: int, kind: Kind
-) -> tuple[FmuVariable, ...]:
-    return tuple(
-        FmuVariable(
-            name=pattern.format(coordinate.name),
-            description=description,
-            unit=_unit(coordinate.unit, order),
-            kind=kind,
-        )
-        for coordinate in plant.unactuated
-    )
-
-
 def _of_loads(
     plant: Plant, quantity: str, unit: str, description: str, display_unit: str
 ) -> tuple[FmuVariable, ...]:
-    return tuple(
-        FmuVariable(
-            name=f"{quantity}.{load}",
-            description=description,
-            unit=unit,
-            kind=Kind.OUTPUT,
-            display_unit=display_unit,
-        )
-        for load in plant.loads
-    )
+    words: dict[str, Any] = {"description": description, "unit": unit, "display_unit": display_unit}
+    return tuple(FmuVariable(name=f"{quantity}.{load}", kind=Kind.OUTPUT, **words) for load in plant.loads)
 
 
 def _of_bodies(plant: Plant) -> Blocks:
@@ -373,7 +352,7 @@ def _command(axes: Sequence[Coordinate]) -> Blocks:
         "COMMAND": tuple(
             variable
             for order, suffix in enumerate(suffixes)
-            for variable in _per_axis(axes, suffix, "of the motion", order, Kind.OUTPUT)
+            for variable in _each(axes, f"{{}}.{suffix}", "of the motion", order, Kind.OUTPUT)
         )
     }
 

@@ -4,8 +4,6 @@ A variable's value reference is its index in the table, and in the C code's arra
 variables lie side by side there, so that the equations can read and write them in place.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence

@@ -1,7 +1,5 @@
 """Co-simulations of a plant that follows a controller's function block, by a compiled loop over both."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Collection, Mapping, Sequence
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
@@ -15,8 +13,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
-from gen_profile_fmu.running.instances import instance
+from gen_profile_fmu.running.instances import CalledFmu, called, compiled_loops, doubles, instance, unsigned
 
 NO_NUMBER = -1  # a block's fault: a setpoint is none, or beyond all that a machine can follow
 

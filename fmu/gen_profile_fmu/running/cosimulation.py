@@ -1,7 +1,5 @@
 """Co-simulation of a plant FMU that follows setpoints: by FMPy, or by FMPy's instance in a compiled loop."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, sizeof
@@ -20,8 +18,7 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.running.called_fmu import called, compiled_loops, doubles, unsigned
-from gen_profile_fmu.running.instances import Instance, instance
+from gen_profile_fmu.running.instances import Instance, called, compiled_loops, doubles, instance, unsigned
 
 # blocks of variables that are read after every step, and what a Response calls them
 _OBSERVED = {

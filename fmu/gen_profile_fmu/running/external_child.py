@@ -3,8 +3,6 @@
 Reads job.json and motion.npz from the folder, writes result.npy, or refusal.txt with a sentence.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Mapping, Sequence, Set

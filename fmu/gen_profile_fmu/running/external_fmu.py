@@ -1,7 +1,5 @@
 """An external FMU, co-simulated in a child process: whatever its native code does, it does it there."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Many co-simulations of an FMU by a compiled loop over its own functions, as for Monte Carlo."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
@@ -14,8 +12,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops, doubles, unsigned
-from gen_profile_fmu.running.instances import instance
+from gen_profile_fmu.running.instances import CalledFmu, called, compiled_loops, doubles, instance, unsigned
 
 
 class _PerRun(Structure):

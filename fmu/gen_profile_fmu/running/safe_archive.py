@@ -1,7 +1,5 @@
 """Unpacking an archive from outside."""
 
-from __future__ import annotations
-
 import lzma
 import stat
 import zipfile

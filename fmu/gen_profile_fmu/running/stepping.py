@@ -1,7 +1,5 @@
 """A plant FMU that is led on step by step, by a caller that does not know the next setpoint yet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import attrs

@@ -1,7 +1,5 @@
 """Reading what was delivered: an artefact, and the manifest beside it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, parse_manifest, sha256

@@ -6,8 +6,6 @@ signature is of the file's BLAKE2b hash; a second one is of the first and of the
 spec, its machine's hash, and the hash of every file, so that a signed one vouches for all of them.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 from binascii import Error as NotBase64

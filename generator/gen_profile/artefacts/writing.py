@@ -1,7 +1,5 @@
 """Writing files, alone or as a folder of artefacts, so that half of it is never seen."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Approximate motions of all machines of some boxes, by integration of a few. Nothing here is rigorous."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Boxes of parameters: the whole of some ranges, halved as often as it takes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from math import prod

@@ -1,7 +1,5 @@
 """Proving a bound of every machine's sway: boxes are halved until it is close, or there are too many."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from functools import partial

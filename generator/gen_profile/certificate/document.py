@@ -1,7 +1,5 @@
 """A certificate as a file: JSON, its large arrays compressed."""
 
-from __future__ import annotations
-
 import binascii
 import json
 import zlib

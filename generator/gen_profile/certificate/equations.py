@@ -10,8 +10,6 @@ which is ẋ = f(x, q_a, v, p) for x = (q_u, w): the same motion as eq. (3)'s, a
 by D Δv at a setpoint.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any

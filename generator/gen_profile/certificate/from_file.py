@@ -1,7 +1,5 @@
 """Certificates of artefacts that lie on disk: made, and checked again."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Sequence
 from functools import partial

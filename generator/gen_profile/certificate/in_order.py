@@ -1,7 +1,5 @@
 """Work on all processors, with results in order, so that they do not depend on how many there are."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor

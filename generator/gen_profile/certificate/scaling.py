@@ -1,7 +1,5 @@
 """Norms |S(p) e| of errors: matrices that are polynomials of the parameters, and nearly their inverses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Limits of sway, where each is watched, and what is proved of it."""
 
-from __future__ import annotations
-
 import attrs
 
 from gen_profile.certificate.arithmetic.balls import Array

@@ -1,7 +1,5 @@
 """What a certificate proves, and of what: machines, setpoints, and the time in which the sway counts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from math import prod

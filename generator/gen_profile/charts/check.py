@@ -1,7 +1,5 @@
 """The machines of a check, as shares of what their loads may sway."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_profile.charts.figure import PALETTE, Bars, Figure

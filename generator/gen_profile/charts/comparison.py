@@ -1,7 +1,5 @@
 """All methods beside one another: the paper's figures 2 to 5, and their worst residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import attrs
@@ -9,7 +7,6 @@ import numpy as np
 
 from gen_profile.charts.curves import (
     ORDERS,
-    TIME,
     derivative_line,
     end_load_sway,
     extent,
@@ -84,7 +81,6 @@ def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pan
         shown = _without_outliers(visible)
         yield Panel(
             title=f"{quantity} of {first.name}",
-            x_label=TIME,
             y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
             lines=lines,
             levels=tuple(near_limits(comparison.spec, 0, order, shown or extent(visible))),
@@ -113,7 +109,6 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
             levels.append((1e3 * spec.limits.sway, (0.0, last)))
         yield Panel(
             title=f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
-            x_label=TIME,
             y_label="sway (mm)",
             lines=lines,
             levels=[

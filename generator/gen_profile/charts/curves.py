@@ -1,7 +1,5 @@
 """Curves of a design: the motion, its spectrum, and the loads."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
 
@@ -78,7 +76,6 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
             panels.append(
                 Panel(
                     title=Phrase("{quantity} of {name}", quantity=quantity, name=axis.name),
-                    x_label=TIME,
                     y_label=Phrase(
                         template, quantity=quantity.lower(), unit=unit.format(axis.unit if order else place)
                     ),
@@ -98,7 +95,6 @@ def profile_figure(profile: Profile) -> Figure:
     panels = [
         Panel(
             title=quantity,
-            x_label=TIME,
             y_label=f"{quantity.lower()} ({unit.format('m')} or {unit.format('rad')})",
             lines=[
                 derivative_line(
@@ -147,7 +143,6 @@ def sway_figure(
         panels=[
             Panel(
                 title=Phrase("Sway of the {load}", load=load),
-                x_label=TIME,
                 y_label="sway (mm)",
                 lines=[
                     Line(
@@ -175,7 +170,6 @@ def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
         panels=[
             Panel(
                 title="Hamiltonian",
-                x_label=TIME,
                 y_label="relative change",
                 lines=[Line(name="change", x=times, y=change)],
             )

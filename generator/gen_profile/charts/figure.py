@@ -4,8 +4,6 @@ A figure is a group of panels under one legend. Every panel is a plot of its own
 put them below one another; panels of one figure zoom together where their horizontal axis is the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
@@ -104,7 +102,7 @@ class Panel:
     """
 
     title: str
-    x_label: str
+    x_label: str = "time (s)"
     y_label: str
     lines: Sequence[Line]
     levels: Sequence[Level] = ()

@@ -1,12 +1,9 @@
 """A fitted swing: the log and the machine's swing, what is left, and its spectrum."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
-from gen_profile.charts.curves import TIME
 from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Line, Panel, Style
 from gen_profile.identification.identify import Identification
 from gen_profile.identification.misfit import spectrum
@@ -34,7 +31,6 @@ def identification_figure(identified: Identification) -> Figure:
         panels=[
             Panel(
                 title=Phrase("Swing of the {load}", load=log.load),
-                x_label=TIME,
                 y_label=Phrase(
                     "{quantity} of {load} ({unit})", quantity=log.quantity, load=log.load, unit=log.unit
                 ),
@@ -45,7 +41,6 @@ def identification_figure(identified: Identification) -> Figure:
             ),
             Panel(
                 title="What is left of the log",
-                x_label=TIME,
                 y_label=Phrase("left of it ({unit})", unit=log.unit),
                 lines=[Line(name="left", x=log.times, y=left, style=LEFT)],
             ),

@@ -4,8 +4,6 @@ All is found from the machine's own picture: what moves with an axis or a coordi
 with which parameter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path

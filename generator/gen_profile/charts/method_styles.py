@@ -1,7 +1,5 @@
 """How the curves of every method look: the same in all pictures, whichever others take part."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from itertools import cycle
 

@@ -1,7 +1,5 @@
 """Figures in files, drawn by Matplotlib, which is an extra."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path

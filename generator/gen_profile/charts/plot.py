@@ -1,7 +1,5 @@
 """A result as a picture, whichever result it is, in a file or in a notebook."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from tempfile import TemporaryDirectory
 

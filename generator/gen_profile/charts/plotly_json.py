@@ -1,7 +1,5 @@
 """Figures as the JSON that Plotly draws; Plotly takes texts for markup, so they are escaped."""
 
-from __future__ import annotations
-
 import math
 from html import escape
 from typing import Any

@@ -1,7 +1,5 @@
 """The proof of a planner block: one history in full, and the worst over the live parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Robustness, like a shaper's sensitivity plot: a curve of every method, or a map of each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from gen_profile.charts.figure import Band, Figure, Level, Line, Map, Panel, Style, beside_limit

@@ -1,7 +1,5 @@
 """The entry point: streams, signals, and whatever a command ends in."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 import os

@@ -1,7 +1,5 @@
 """Command groups of which one command runs when none is named."""
 
-from __future__ import annotations
-
 import click
 from click.shell_completion import CompletionItem
 

@@ -60,6 +60,8 @@ def studio(
     start = changed_start(words, text, chosen.overrides, folder)
     if not start.programs:  # else the page asks first
         chosen.spec()
+    import asyncio
+
     from gen_profile.studio.server import serve
 
     def ready(address: str, code: str) -> None:
@@ -78,7 +80,9 @@ def studio(
     with ExitStack() as stack:
         watching = None if artefact is None or access is None else _watching(artefact, access, stack)
         try:
-            serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
+            asyncio.run(
+                serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
+            )
         except KeyboardInterrupt:
             click.echo("The studio is closed.", err=True)
 

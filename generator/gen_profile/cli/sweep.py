@@ -71,7 +71,7 @@ def sweep(
     """
     from gen_profile.cli import words
     from gen_profile.sweep.grid import parse_grid
-    from gen_profile.sweep.plan import prepare
+    from gen_profile.sweep.run import prepare
     from gen_profile.sweep.run import sweep as run
 
     if scheduler is not None and workers is not None:

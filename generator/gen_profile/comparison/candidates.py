@@ -1,7 +1,5 @@
 """Who takes part in a comparison: every shaper, and variants of the optimal motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Any

@@ -1,7 +1,5 @@
 """How much sway motions leave on machines that are not as specified: over one parameter, or over two."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from io import StringIO

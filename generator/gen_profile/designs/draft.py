@@ -1,7 +1,5 @@
 """A motion for a spec, not yet held to its limits."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Mapping

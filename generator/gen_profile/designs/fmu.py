@@ -1,7 +1,5 @@
 """From a spec to an FMU of its plant, motion or planner, of the plant with either, or to a system of FMUs."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,6 +19,7 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
+from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.description.fmu_files import Version
@@ -28,7 +27,6 @@ from gen_profile_fmu.description.system_structure import Component, ssp
 from gen_profile_fmu.model.contents import (
     AUTHOR,
     Model,
-    identifier_of,
     plant_model,
     profile_model,
     system_model,
@@ -120,7 +118,7 @@ def export_fmu(
     if kind not in KINDS:
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
     systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}
-    identifier = identifier_of(systems.get(kind, f"{spec.name} {kind}"))
+    identifier = c_name(systems.get(kind, f"{spec.name} {kind}"))
     path = Path(path or f"{identifier}.{'ssp' if kind in LEADERS else 'fmu'}")
     platforms = platform_names("host") if platforms is None else platforms
 
@@ -145,7 +143,7 @@ def platform_names(choice: str) -> tuple[str, ...]:
 
 
 def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> Model:
-    name = identifier_of(f"{spec.name} {kind}")
+    name = c_name(f"{spec.name} {kind}")
     if kind in ("profile", "system"):
         evaluation = plan(spec, progress=progress).evaluation
         if kind == "profile":

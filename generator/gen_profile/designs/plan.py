@@ -1,7 +1,5 @@
 """From a spec to a motion and its figures, before anything is written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import attrs

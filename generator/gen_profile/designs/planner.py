@@ -1,7 +1,5 @@
 """From a spec to a planner block that was proved by co-simulation before anyone can take it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What would let a refused planner block pass, each change by itself, tried by the same proof."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Shaped motions for a spec: within its limits, in its duration or in the shortest."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The shortest duration within a spec's limits, after which no machine of its ranges sways too much."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 

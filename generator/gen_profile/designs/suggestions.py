@@ -4,8 +4,6 @@ A candidate is a changed spec. The least one is looked for from what the relaxat
 least, on few even intervals first, and then tried as the next run will try it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress

@@ -5,8 +5,6 @@ is, the spread, hardly depends on the motion: it is measured on one, and tried o
 depend on it, two motions tell by how much.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """What a motion asks of the drives beside what is allowed, once for terminal, report and studio."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import attrs

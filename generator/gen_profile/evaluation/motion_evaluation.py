@@ -1,7 +1,5 @@
 """A motion on the machines of a spec: what it does to them, and its figures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path

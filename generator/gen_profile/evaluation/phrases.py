@@ -1,7 +1,5 @@
 """How figures, moves and machines read, in a terminal and in a report."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 

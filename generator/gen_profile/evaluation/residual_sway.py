@@ -1,7 +1,5 @@
 """How long, and how finely, the sway after a move is looked at."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

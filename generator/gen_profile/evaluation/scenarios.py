@@ -1,7 +1,5 @@
 """What a motion is tried on: machines at the ends and corners of their ranges, drives, random draws."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 

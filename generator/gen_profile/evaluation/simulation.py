@@ -1,7 +1,5 @@
 """A plant's answer to a motion of its axes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import MappingProxyType

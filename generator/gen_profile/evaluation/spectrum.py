@@ -1,7 +1,5 @@
 """The spectrum of a motion's acceleration, and the frequencies at which machines answer to it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs

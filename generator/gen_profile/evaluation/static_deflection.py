@@ -4,8 +4,6 @@ The loads stand where the potential energy less the work of the force is station
 with s the sway that the force acts along. It is found by Newton's method, the force raised in steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 

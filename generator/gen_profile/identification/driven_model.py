@@ -1,7 +1,5 @@
 """A log of a whole run: how a machine swings that follows the setpoints that were played."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import attrs

@@ -4,8 +4,6 @@ The half-ranges hold with `CONFIDENCE` for all parameters at once (Šidák): the
 has the machine in it that often.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs

@@ -1,7 +1,5 @@
 """From measurements on site to a spec whose machine they determine, and whose uncertainty they state."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

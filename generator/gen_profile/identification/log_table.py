@@ -1,7 +1,5 @@
 """Tables that loggers write: columns between semicolons, tabs or commas, decimals with points or commas."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import errno

@@ -5,8 +5,6 @@ the swing of a wrong second mode, or of a damping that is not modelled. A line s
 the periodogram (N. R. Lomb, 1976), whose ordinates are distributed exponentially where there is none.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -4,8 +4,6 @@ phyphox.org/wiki, Remote-interface communication: ``/config`` names the buffers 
 their values, those after a time alone where it is asked to, and ``/control`` begins and ends a measurement.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import suppress

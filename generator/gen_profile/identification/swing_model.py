@@ -1,7 +1,5 @@
 """A logged swing as a function of parameters, of how it began, and of the sensor's zero."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace

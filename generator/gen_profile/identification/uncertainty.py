@@ -11,8 +11,6 @@ residuals' slopes, of which what a swing's start can make up for is taken off (G
   much worse as it should be (profile likelihood; D. M. Bates and D. G. Watts, 1988, ch. 6).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

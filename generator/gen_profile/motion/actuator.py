@@ -1,7 +1,5 @@
 """What to ask of a drive so that its axis moves as planned."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 from numpy.polynomial import polynomial

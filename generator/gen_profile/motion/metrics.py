@@ -1,7 +1,5 @@
 """Figures of arrays: peaks, root mean squares, and what swings on after a move."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

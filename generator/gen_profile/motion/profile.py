@@ -293,11 +293,7 @@ class SampledProfile(Summarised, Tabled):
 
     def records(self) -> list[dict[str, object]]:
         """List the samples: time, and what the artefact carries, in m or rad and s; axes by number from 1."""
-        carried = {
-            name: values
-            for name in ("position", "velocity", "acceleration", "jerk")
-            if (values := getattr(self, name)) is not None
-        }
+        carried = columns_of(self)
         axes = self.position.shape[1]
         names = [name if axes == 1 else f"{name}_{axis}" for name in carried for axis in range(1, axes + 1)]
         rows = np.column_stack([self.times, *carried.values()]).tolist()
@@ -311,6 +307,12 @@ class SampledProfile(Summarised, Tabled):
     def payload_hash(self) -> str:
         """SHA-256 of the position setpoints and the cycle time, in hexadecimal."""
         return _sha256(np.float64(self.cycle_time), self.position)
+
+
+def columns_of(table: Any) -> dict[str, Array]:
+    """Give position, velocity, acceleration and jerk by name, as far as a table carries them."""
+    names = ("position", "velocity", "acceleration", "jerk")
+    return {name: values for name in names if (values := getattr(table, name)) is not None}
 
 
 def sample(profile: Profile, cycle_time: float) -> SampledProfile:

@@ -1,7 +1,5 @@
 """Playing a table of commands to a written planner block, and the table of setpoints that it issues."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

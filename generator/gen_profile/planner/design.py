@@ -1,7 +1,5 @@
 """From a spec to its planner block."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Sequence

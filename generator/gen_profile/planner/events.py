@@ -1,7 +1,5 @@
 """The events that a planner block keeps for an operator's screen: from its outputs, and in words."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Executing a written planner block: its own text, translated to C, compiled and called cycle by cycle."""
 
-from __future__ import annotations
-
 import ctypes
 from ctypes import POINTER, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import lru_cache
@@ -20,7 +18,7 @@ from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import digest
 from gen_profile_fmu.running.block_run import CalledBlock
-from gen_profile_fmu.running.called_fmu import doubles
+from gen_profile_fmu.running.instances import doubles
 
 LOOP = Path(__file__).with_name("block_loop.c").read_text("ascii")  # over cycles
 

@@ -1,7 +1,5 @@
 """The files that a planner block is written to, and its text out of any of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from pathlib import Path

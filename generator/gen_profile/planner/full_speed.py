@@ -1,7 +1,5 @@
 """Whether the axes of a planner block reach the velocity that their limits allow."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 

@@ -1,7 +1,5 @@
 """The inputs and outputs of a planner block: which are an axis's, which are live parameters."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterable
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """What a motion leaves swinging on the linear machine that a block is given, and with stated errors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

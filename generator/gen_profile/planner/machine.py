@@ -1,7 +1,5 @@
 """What a planner has to know of its machine: the modes as functions of the live parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import product
 from types import SimpleNamespace

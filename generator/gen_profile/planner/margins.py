@@ -8,8 +8,6 @@ Q = H S P e^(−s age), whatever the gains were made for. Gains are those of the
 is the spec's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any

@@ -1,7 +1,5 @@
 """The planner block as an object in Python: its own text, called cycle by cycle or for whole histories."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

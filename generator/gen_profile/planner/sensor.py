@@ -5,8 +5,6 @@ y = Σ shown z (or of z') + offset. The gains are those of the steady Kalman fil
 (Kalman and Bucy 1961); they are functions of the live parameters, as the frequencies are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import product
 

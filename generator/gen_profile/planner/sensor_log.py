@@ -1,7 +1,5 @@
 """A log of sensors, cycle by cycle what a planner block is given of them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

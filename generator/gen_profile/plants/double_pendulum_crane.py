@@ -13,8 +13,6 @@ divided by L1 and the second by m2 L2, are the paper's eq. (20)–(22), its misp
 c1 and c2 are viscous moments at the cart's and the hook's joint (zero in the paper).
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

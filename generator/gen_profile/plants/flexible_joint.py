@@ -10,8 +10,6 @@ arm turns in a horizontal plane. (M. W. Spong, Modeling and control of elastic j
 motor's side driven.)
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

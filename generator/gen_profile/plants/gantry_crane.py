@@ -10,8 +10,6 @@ acceleration. Lagrange's equations with a viscous moment c on the rope's angular
 (H.-H. Lee, Modeling and control of a three-dimensional overhead crane, 1998, with angles that trail.)
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

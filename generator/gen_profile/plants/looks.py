@@ -4,8 +4,6 @@ A machine's own picture stands with its equations. One without a picture is draw
 hang are drawn as hanging, others as blocks that trail.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 

@@ -1,7 +1,5 @@
 """A machine that a user wrote: a Python file with a `PLANT`, named in a spec as ``plant.file``."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import traceback

@@ -10,8 +10,6 @@ no damping the natural frequencies are 2 √(k/m) sin((2j − 1) π / (4 n + 2))
 vibrations with one end fixed and one free).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import pairwise

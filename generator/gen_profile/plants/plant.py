@@ -9,8 +9,6 @@ Equations are written with NumPy functions on scalars. The same text then takes 
 computer algebra system that implements NumPy's protocols.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace

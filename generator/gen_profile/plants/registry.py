@@ -3,8 +3,6 @@
 A family of machines differs in a number, which ends the type: ``mass-spring-chain-3``.
 """
 
-from __future__ import annotations
-
 import re
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points

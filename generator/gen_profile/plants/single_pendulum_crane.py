@@ -11,8 +11,6 @@ hoist's acceleration acts along the rope only. (Any text on parametric pendulums
 Abdel-Rahman, A. H. Nayfeh, Z. N. Masoud, Dynamics and control of cranes: a review, 2003.)
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -18,8 +18,6 @@ there by 4 a / ((2n − 1) π)² sin θ. The same rise has the pendulum's potent
 m = 8 ρ a³ b / (((2n − 1) π)⁴ L), which is Dodge's, too; the rest of the liquid moves with the tank.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a machine from outside is what the project expects of one."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator

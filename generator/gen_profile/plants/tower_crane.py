@@ -20,8 +20,6 @@ c on the rope's angular velocity relative to the jib, gives the two equations, d
 A steady slew alone pulls the load outward, α̇² x, which only the trolley can answer.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -9,8 +9,6 @@ where r̈ follows from the accelerations that the equations give. Damping oppose
 them, and takes energy. Both are examined by differences at some states; no algebra is needed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 

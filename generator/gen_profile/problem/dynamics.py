@@ -1,7 +1,5 @@
 """A plant's equations solved for the unactuated accelerations, eq. (3), as symbols."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 

@@ -8,8 +8,6 @@ bodies have them: with the places r(q_u, q_a) of all bodies, the driven paramete
 where J = ∂r/∂q. Damping is left out, so the machine must have none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from types import SimpleNamespace

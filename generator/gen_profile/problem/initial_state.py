@@ -1,7 +1,5 @@
 """What swings when a move begins."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

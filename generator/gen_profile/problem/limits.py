@@ -1,7 +1,5 @@
 """Whether a motion keeps the limits of its spec."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """A plant's small oscillations about rest: q̈_u = −stiffness q_u − damping q̇_u + input q̈_a."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache

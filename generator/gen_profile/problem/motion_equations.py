@@ -1,7 +1,5 @@
 """A machine's equations with its axes' motion as input, and their derivatives."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import attrs

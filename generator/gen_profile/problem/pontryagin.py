@@ -8,7 +8,7 @@ Names and the paper's symbols:
 ``costate``          λ
 ``hamiltonian``      H = g + λᵀ f
 ``running_cost``     g, eq. (26): effort + β (exp((γ d)²) − 1), d the end load's sway; efforts of
-                     several axes are summed, each weighed by `gen_profile.problem.axis_reach`
+                     several axes are summed, each weighed by `gen_profile.problem.cost`
 ===================  =========================================================================
 
 The constant −β T leaves the optimum where it is, and keeps H from drowning in it.
@@ -16,8 +16,6 @@ The constant −β T leaves the optimum where it is, and keeps H from drowning i
 Everything is dimensionless: ``x = offset + scale ∘ x̂``, ``t = T s``, ``g = cost_scale ĝ``. The scales, the
 plant's parameters and the weights are run-time data, so one derivation serves every move of a plant.
 """
-
-from __future__ import annotations
 
 from functools import cached_property, lru_cache
 

@@ -1,7 +1,5 @@
 """The optimal control problem of one motion task; knows no algorithm."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal
 

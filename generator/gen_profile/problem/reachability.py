@@ -7,8 +7,6 @@ undamped modes to one rope length already is zero sensitivity to the other. Mode
 behave alike: they follow statically.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm

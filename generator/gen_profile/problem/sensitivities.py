@@ -8,8 +8,6 @@ Second-order sensitivities are the sensitivities of S: the same rule, applied to
 together. Where S is zero they are second derivatives, whatever the parametrisation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import attrs

@@ -1,7 +1,5 @@
 """Proving a planner block that lies on disk, whatever wrote or altered it, and replaying its histories."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path

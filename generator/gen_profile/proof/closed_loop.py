@@ -1,7 +1,5 @@
 """Machines of a spec that follow a written planner block, many histories side by side, or one in full."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """How operators and controllers give commands: again and again, by taps, in a rhythm, on second thoughts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from math import inf, nan
 from typing import Any

@@ -5,8 +5,6 @@ differs from them, what is commanded when, and how ropes change on the way. So h
 hypercube, corners are choices of 0 and 1, and a search moves through the same cube.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, islice, pairwise, product
 from math import ceil, inf, isfinite

@@ -1,7 +1,5 @@
 """Judging one history: which limits the block kept, and what sways on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import attrs

@@ -1,7 +1,5 @@
 """Whether a planner block did what was commanded, in time, and whether what it reported was true."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from math import inf

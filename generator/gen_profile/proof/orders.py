@@ -4,8 +4,6 @@ Beside its inputs, what a command means depends on what the block did: one that 
 and none is taken while a quick stop lasts. Before a run nothing is known of that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from math import inf

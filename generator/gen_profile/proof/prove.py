@@ -1,7 +1,5 @@
 """Proving a written planner block: all histories run, the worst sought, some of them judged by FMPy, too."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack

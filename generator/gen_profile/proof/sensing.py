@@ -1,7 +1,5 @@
 """What a block's sensors meet in a history: a swing, gusts, their own errors and a fault; and a verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Self
 

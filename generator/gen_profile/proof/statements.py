@@ -1,7 +1,5 @@
 """Whether what a planner block states of itself is true, in every cycle, and axes are where they may be."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from math import inf

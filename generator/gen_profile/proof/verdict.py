@@ -1,7 +1,5 @@
 """What the proof of a planner block found: values only, no work."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

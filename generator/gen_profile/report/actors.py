@@ -1,7 +1,5 @@
 """The machines of an evaluation as actors of an animation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The machine playing its move beside perturbed ones, as the numbers that a page's script plays."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

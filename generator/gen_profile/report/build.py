@@ -1,7 +1,5 @@
 """A design as one page that an engineer can read, send and file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -12,8 +12,6 @@ counts in its own unit, and everything else in SI units. Columns are separated b
 where not by commas, a decimal comma is understood, too. Columns of other names are left alone.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence

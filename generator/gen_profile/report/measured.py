@@ -1,7 +1,5 @@
 """What the machine really did, beside what was planned."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any

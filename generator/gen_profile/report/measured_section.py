@@ -1,12 +1,10 @@
 """A measured move, in figures and curves beside the plan."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
 
-from gen_profile.charts.curves import TIME, sway_levels
+from gen_profile.charts.curves import sway_levels
 from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel, Style
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, mm, number, place_unit
@@ -120,14 +118,12 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
         unit, factor = place_unit(spec, names.index(axis))
         yield Panel(
             title=Phrase("Position of {axis}", axis=axis),
-            x_label=TIME,
             y_label=Phrase("position ({unit})", unit=unit),
             lines=[_planned(times, factor * planned), _measured(times, factor * position)],
             bands=[arrival],
         )
         yield Panel(
             title=Phrase("Deviation of {axis}", axis=axis),
-            x_label=TIME,
             y_label=Phrase("deviation (m{unit})", unit=signal.unit),
             lines=[_measured(times, 1e3 * deviation)],
             bands=[arrival],
@@ -151,7 +147,7 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
 
 
 def _swinging(title: str, label: str, lines: list[Line], levels: list[Level], arrival: Band) -> Panel:
-    return Panel(title=title, x_label=TIME, y_label=label, lines=lines, levels=levels, bands=[arrival])
+    return Panel(title=title, y_label=label, lines=lines, levels=levels, bands=[arrival])
 
 
 def _planned(times: Array, values: Array) -> Line:

@@ -1,7 +1,5 @@
 """A page as one file that a browser shows without any other: texts escaped, scripts named by their hashes."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

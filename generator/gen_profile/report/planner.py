@@ -1,7 +1,5 @@
 """The proof of a planner block as a page: the worst history in full, and where it sways most."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shlex import quote

@@ -1,7 +1,5 @@
 """A page on paper: printed to PDF by whatever Chromium, Chrome or Edge is installed."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

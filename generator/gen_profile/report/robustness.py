@@ -1,7 +1,5 @@
 """How much sway a design, and other methods, leave on machines that are not as specified."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import attrs

@@ -1,7 +1,5 @@
 """The sections of a report, from the values that were found."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 from typing import Any

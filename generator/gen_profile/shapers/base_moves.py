@@ -1,7 +1,5 @@
 """Motions that are fed to shapers: from 0 to 1 within unit time, from rest to rest, as exact polynomials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

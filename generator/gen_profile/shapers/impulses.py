@@ -9,8 +9,6 @@ weighing its amplitudes by exp(−ζω tᵢ): every term of that sum is then wha
 keep their amplitudes and move in time instead.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Iterable, Sequence

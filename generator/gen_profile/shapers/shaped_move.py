@@ -1,7 +1,5 @@
 """A shaper applied to a base move, as exact polynomials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Which solver for which problem."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """From an optimum to a `Profile`: its highest derivative, integrated exactly."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ fall with the logarithm of the number, more or less steadily: secants lead to th
 bisection where an excess is infinite, so that only is known whether the candidate works.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """What every solver returns: the optimal motion, or the reason why there is none."""
 
-from __future__ import annotations
-
 import math
 from enum import Enum
 

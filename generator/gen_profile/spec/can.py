@@ -1,7 +1,5 @@
 """What a spec says of drives on a CAN bus."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Literal
 

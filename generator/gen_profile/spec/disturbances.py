@@ -1,7 +1,5 @@
 """What comes between a file and the load: the way of its setpoints to the axes, and wind."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import attrs

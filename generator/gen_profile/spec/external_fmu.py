@@ -1,14 +1,11 @@
 """The keys of ``[check]`` that name an external FMU, and which of its variables are what."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 from gen_profile.bounded_file import read_bounded
-from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import ExternalFmu
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
@@ -64,15 +61,11 @@ def _sha256(path: Path, stated: Any, faults: Faults) -> str:
     try:
         actual = hashlib.sha256(read_bounded(path)).hexdigest()
     except (OSError, ValueError) as error:
-        faults.add(
-            "check.fmu",
-            Phrase("{path} cannot be read ({problem})", path=path, problem=getattr(error, "strerror", error)),
-        )
+        problem = getattr(error, "strerror", error)
+        faults.add("check.fmu", "{path} cannot be read ({problem})", path=path, problem=problem)
         return ""
     if stated is not None and stated != actual:
-        faults.add(
-            "check.fmu", Phrase("{path} is not the FMU that was checked with; its SHA-256 differs", path=path)
-        )
+        faults.add("check.fmu", "{path} is not the FMU that was checked with; its SHA-256 differs", path=path)
     return actual
 
 
@@ -80,8 +73,7 @@ def _inputs(table: Any, plant: Plant, structurer: Structurer) -> tuple[str, tupl
     """Read which quantity goes in, and the variable of each axis."""
     if not isinstance(table, Mapping) or len(table) != 1 or next(iter(table)) not in INPUTS:
         template = 'must name the inputs by one of {names}, such as {{ acceleration = "u" }}'
-        problem = Phrase(template, names=", ".join(INPUTS))
-        structurer.faults.add("check.input", problem)
+        structurer.faults.add("check.input", template, names=", ".join(INPUTS))
         return INPUTS[0], ()
     ((quantity, names),) = table.items()
     axes = len(plant.actuated)

@@ -1,7 +1,5 @@
 """What a spec says of a planner block: what it is given, a sensor of the load, and what that is for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Literal
 

@@ -4,11 +4,10 @@ What is judged here takes no solution of the move: its mean speed, the quasi-sta
 acceleration that makes it, the ropes' lengths.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -39,18 +38,11 @@ FAR = 10.0  # times the load's whole way
 LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
 
 
-@attrs.frozen(kw_only=True)
-class Implausibility:
-    """A value that is implausible, or impossible: its place, what is wrong and the cure."""
+class Implausibility(NamedTuple):
+    """What is wrong with a value that is implausible, or impossible, with its place and the cure."""
 
-    place: str
-    problem: str
-    refused: bool = False
-
-    @property
-    def sentence(self) -> str:
-        """Tell the place, too."""
-        return placed(self.place, self.problem)
+    sentence: str
+    refused: bool
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -101,6 +93,11 @@ def _implausibilities(spec: Spec) -> Iterator[Implausibility]:
     yield from _drive(spec)
 
 
+def _odd(place: str, problem: str, /, *, refused: bool = False, **values: Any) -> Implausibility:
+    """Question the value at a place; the problem is a template, as `gen_profile.phrase.Phrase` takes them."""
+    return Implausibility(placed(place, Phrase(problem, **values)), refused)
+
+
 def _thousandth(value: float, what: str) -> Phrase:
     """End a sentence by what a value means if it is in thousandths, as one below 1 hardly is."""
     template = "{what}; did you mean {meant:.4g}?" if value >= 1.0 else "{what}; state less."
@@ -113,8 +110,8 @@ def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Itera
     hardly, never = FAST[unit, kind]
     if value > hardly:
         verdict = "which no such machine reaches" if value > never else "which few machines reach"
-        problem = Phrase("{problem}, {verdict}; {cure}", problem=problem, verdict=verdict, cure=cure)
-        yield Implausibility(place=place, problem=problem, refused=value > never)
+        template = "{problem}, {verdict}; {cure}"
+        yield _odd(place, template, problem=problem, verdict=verdict, cure=cure, refused=value > never)
 
 
 def _move(spec: Spec) -> Iterator[Implausibility]:
@@ -137,12 +134,12 @@ def _move(spec: Spec) -> Iterator[Implausibility]:
             if hurried:
                 continue
         if unit == "m" and distance > LONG_WAY:
-            problem = Phrase("{said}, farther than any crane's runway; {cure}", said=said, cure=cure)
-            yield Implausibility(place="move.distance", problem=problem)
+            template = "{said}, farther than any crane's runway; {cure}"
+            yield _odd("move.distance", template, said=said, cure=cure)
         elif unit == "rad" and distance > MANY_TURNS:
             turns = distance / (2.0 * math.pi)
-            problem = Phrase("{said}, which are {turns:.3g} turns; {cure}", said=said, turns=turns, cure=cure)
-            yield Implausibility(place="move.distance", problem=problem)
+            template = "{said}, which are {turns:.3g} turns; {cure}"
+            yield _odd("move.distance", template, said=said, turns=turns, cure=cure)
         statement = Phrase("{name} ends at {speed:g} {unit}/s", name=axis.name, speed=speed, unit=unit)
         cure = _thousandth(speed, Phrase("speeds are in {unit}/s", unit=unit))
         yield from _fast(speed, unit, "move.final_velocity", statement, cure)
@@ -150,8 +147,7 @@ def _move(spec: Spec) -> Iterator[Implausibility]:
     if not move.shortest and move.duration >= LONG_TIME and 0.0 < longest < SLOW * move.duration:
         cure = _thousandth(move.duration, "durations are in s")
         template = "{duration:g} s for {longest:g} m (or rad) is slow; {cure}"
-        problem = Phrase(template, duration=move.duration, longest=longest, cure=cure)
-        yield Implausibility(place="move.duration", problem=problem)
+        yield _odd("move.duration", template, duration=move.duration, longest=longest, cure=cure)
 
 
 def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
@@ -166,8 +162,8 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
             yield from _fast(value, unit, place, Phrase("allows {value:g} {per}", value=value, per=per), cure)
         if unit == "m" and kind == "travel" and (far := max(map(abs, value))) > LONG_WAY:
             cure = _thousandth(far, "lengths are in m")
-            problem = Phrase("reaches {far:g} m, farther than any crane's runway; {cure}", far=far, cure=cure)
-            yield Implausibility(place=place, problem=problem)
+            template = "reaches {far:g} m, farther than any crane's runway; {cure}"
+            yield _odd(place, template, far=far, cure=cure)
     for name, rate in spec.planner.live_rate.items():
         statement = Phrase("hoists at {rate:g} m/s", rate=rate)
         yield from _fast(
@@ -178,8 +174,8 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
         template = "the ropes' {depth:.4g} m" if depth else "{times:g} times the move"
         what = Phrase(template, depth=depth, times=FAR)
         cure = _thousandth(sway, "lengths are in m")
-        problem = Phrase("{sway:g} m are more than {what}; {cure}", sway=sway, what=what, cure=cure)
-        yield Implausibility(place="limits.sway", problem=problem, refused=True)
+        template = "{sway:g} m are more than {what}; {cure}"
+        yield _odd("limits.sway", template, sway=sway, what=what, cure=cure, refused=True)
 
 
 def _residual(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
@@ -200,22 +196,19 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
         cure = _thousandth(limit, "lengths are in m")
         if depth and limit > RESIDUAL_OF_ROPE * depth:
             template = "{limit:g} m are more than half of the {depth:.4g} m by which the {load} hangs; {cure}"
-            problem = Phrase(template, limit=limit, depth=depth, load=load, cure=cure)
-            yield Implausibility(place=place, problem=problem, refused=True)
+            yield _odd(place, template, limit=limit, depth=depth, load=load, cure=cure, refused=True)
         elif from_rest and not depth and limit > FAR * way > 0.0:
             template = (
                 "{limit:g} m are more than {times:g} times the {way:.4g} m that the move takes the "
                 "{load}; {cure}"
             )
-            problem = Phrase(template, limit=limit, times=FAR, way=way, load=load, cure=cure)
-            yield Implausibility(place=place, problem=problem, refused=True)
+            yield _odd(place, template, limit=limit, times=FAR, way=way, load=load, cure=cure, refused=True)
         elif load in ends and from_rest and limit > max(sway, RESIDUAL_OF_MOVE * way) > 0.0:
             template = (
                 "{limit:g} m are more than the {sway:.2g} m that almost any motion of this length "
                 "and time leaves, so the check tells nothing; state less."
             )
-            problem = Phrase(template, limit=limit, sway=sway)
-            yield Implausibility(place=place, problem=problem)
+            yield _odd(place, template, limit=limit, sway=sway)
         else:
             continue
         if one_limit:
@@ -230,8 +223,7 @@ def _swing(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
             "the move swings the load by some {angle:.0f}°, far beyond small angles; distances "
             "are in m and durations in s, so allow more than {duration:g} s."
         )
-        problem = Phrase(template, angle=math.degrees(angle), duration=spec.move.duration)
-        yield Implausibility(place="move.duration", problem=problem)
+        yield _odd("move.duration", template, angle=math.degrees(angle), duration=spec.move.duration)
 
 
 def _drive(spec: Spec) -> Iterator[Implausibility]:
@@ -239,15 +231,14 @@ def _drive(spec: Spec) -> Iterator[Implausibility]:
     tau = spec.actuator.tau
     if tau is not None and not spec.move.shortest and tau > spec.move.duration:
         cure = _thousandth(tau, "time constants are in s")
-        problem = Phrase("{tau:g} s are longer than the whole move; {cure}", tau=tau, cure=cure)
-        yield Implausibility(place="actuator.tau", problem=problem)
+        yield _odd("actuator.tau", "{tau:g} s are longer than the whole move; {cure}", tau=tau, cure=cure)
     longest = spec.move.longest(spec.machine()) or math.inf
     for name in ("start_tolerance", "following_error"):
         value, usual = getattr(spec.can, name), getattr(CanSpec(), name)
         if value is not None and value != usual and value > LOOSE * longest:
             cure = _thousandth(value, "tolerances are in m")
-            problem = Phrase("{value:g} m are more than half of the move; {cure}", value=value, cure=cure)
-            yield Implausibility(place=f"can.{name}", problem=problem)
+            template = "{value:g} m are more than half of the move; {cure}"
+            yield _odd(f"can.{name}", template, value=value, cure=cure)
 
 
 def _scale(spec: Spec) -> Scale:

@@ -1,7 +1,5 @@
 """From TOML files, presets and ``KEY=VALUE`` overrides to a `Spec`, with every fault in one error."""
 
-from __future__ import annotations
-
 import copy
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Rules across the fields of a spec, and between a spec and its machine."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from types import SimpleNamespace
 

@@ -3,8 +3,6 @@
 What fits is kept where other values do not, so that rules across fields find their faults beside them.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -39,13 +37,14 @@ class Faults:
     def __init__(self) -> None:
         self._sentences: dict[str, str] = {}
 
-    def add(self, place: str, problem: str, *causes: str) -> None:
+    def add(self, place: str, problem: str, /, *causes: str, **values: Any) -> None:
         """Note a problem, such as ``must be positive``, of a place such as ``plant.m1``.
 
-        It is no fault of its own where something is wrong at its causes, which are places, too.
+        With values, the problem is a template, as `gen_profile.phrase.Phrase` takes them. It is no fault of
+        its own where something is wrong at its causes, which are places, too.
         """
         if not any(self._told(one) for one in (place, *causes)):
-            self._sentences[place] = placed(place, problem)
+            self._sentences[place] = placed(place, Phrase(problem, **values) if values else problem)
 
     def _told(self, place: str) -> bool:
         """Whether something is wrong at a place, around it or inside it."""
@@ -117,10 +116,8 @@ class Structurer:
         """Leave out what has other names than these, and tell."""
         names = list(names)
         for key in sorted(set(table).difference(names)):
-            self.faults.add(
-                place(where, key),
-                Phrase("unknown {word}{hint}", word=word, hint=suggestion(key, names)),
-            )
+            hint = suggestion(key, names)
+            self.faults.add(place(where, key), "unknown {word}{hint}", word=word, hint=hint)
         return {key: value for key, value in table.items() if key in names}
 
     def _misfit(self, where: str, words: Words | None, form: str, value: Any) -> Any:

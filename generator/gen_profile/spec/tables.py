@@ -3,8 +3,6 @@
 Here stands how things may be stated, and whatever the machine fills in: its parameters, axes and loads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -58,9 +56,7 @@ def structure(document: Mapping[str, Any], folder: Path) -> Spec:
     faults = Faults()
     for key in REQUIRED:
         if key not in document:
-            faults.add(
-                key, Phrase("the spec must state [{key}]; a real machine has no default here", key=key)
-            )
+            faults.add(key, "the spec must state [{key}]; a real machine has no default here", key=key)
     plain = Structurer(faults)
     written = {key: dict(plain.fit(document.get(key, {}), Mapping, key, NONE)) for key in TABLES}
     file, plant = _machine(written["plant"], folder, faults)
@@ -105,9 +101,7 @@ def _misplaced(document: Mapping[str, Any], plant: Plant | None, faults: Faults)
             if key in parameters and table in ("robustness", "check"):
                 homes = [f"{table}.uncertain.{key}"]
             if homes and key not in (keys[table] if table else ("name", *TABLES)):
-                faults.add(
-                    place(table, key), Phrase("unknown key; did you mean {names}?", names=listed(homes))
-                )
+                faults.add(place(table, key), "unknown key; did you mean {names}?", names=listed(homes))
 
 
 def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | None, Plant | None]:
@@ -117,16 +111,17 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
         try:
             if isinstance(type_, str):
                 return None, find_plant(type_)
-            template = "must name a machine, found {found}{hint}"
-            problem = Phrase(template, found=found(type_), hint=suggestion("", plant_types()))
+            hint = suggestion("", plant_types())
+            faults.add(
+                "plant.type", "must name a machine, found {found}{hint}", found=found(type_), hint=hint
+            )
         except KeyError:
-            template = "unknown machine {name}{hint}"
-            problem = Phrase(template, name=repr(str(type_)[:60]), hint=suggestion(str(type_), plant_types()))
-        faults.add("plant.type", problem)
+            name, hint = repr(str(type_)[:60]), suggestion(str(type_), plant_types())
+            faults.add("plant.type", "unknown machine {name}{hint}", name=name, hint=hint)
     elif not isinstance(name, str):
-        faults.add("plant.file", Phrase("must name a Python file, found {found}", found=found(name)))
+        faults.add("plant.file", "must name a Python file, found {found}", found=found(name))
     elif not isinstance(sha256, str | None):
-        faults.add("plant.file_sha256", Phrase("must be text, found {found}", found=found(sha256)))
+        faults.add("plant.file_sha256", "must be text, found {found}", found=found(sha256))
     else:
         try:
             file = read_machine_file(folder / name, sha256)
@@ -136,8 +131,7 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
             return None, None
         if table.get("type", plant.type) != plant.type:
             template = "{name} holds a machine of type {type}, found {found}"
-            problem = Phrase(template, name=file.name, type=repr(plant.type), found=found(type_))
-            faults.add("plant.type", problem)
+            faults.add("plant.type", template, name=file.name, type=repr(plant.type), found=found(type_))
         return file, plant
     return None, None
 
@@ -220,16 +214,8 @@ def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec
             if not axis.lower <= value <= axis.upper:
                 cure = "; a distance begins at 0, so state start and target" * (key == "distance")
                 template = "{name} must be {form}, found {found:g}{cure}"
-                faults.add(
-                    f"move.{key}",
-                    Phrase(
-                        template,
-                        name=axis.name,
-                        form=between({"at least": axis.lower, "at most": axis.upper}, axis.unit),
-                        found=value,
-                        cure=cure,
-                    ),
-                )
+                form = between({"at least": axis.lower, "at most": axis.upper}, axis.unit)
+                faults.add(f"move.{key}", template, name=axis.name, form=form, found=value, cure=cure)
     kinds = kinds_of(MoveSpec)
     return MoveSpec(
         start=start,
@@ -251,9 +237,8 @@ def _duration(table: Table, structurer: Structurer) -> Table:
         shortest = duration == "minimum"
         near = Phrase("; did you mean {names}?", names="'minimum'") if meant(duration, ["minimum"]) else ""
         template = 'must be a number of seconds, or "minimum", found {found}{near}'
-        problem = Phrase(template, found=found(duration), near=near)
         if not shortest:
-            structurer.faults.add("move.duration", problem)
+            structurer.faults.add("move.duration", template, found=found(duration), near=near)
         duration = PLACEHOLDER_DURATION
     number = structurer.fit(duration, Duration, "move.duration", PLACEHOLDER_DURATION)
     return {"duration": number, "shortest": shortest}
@@ -266,10 +251,8 @@ def _per_axis(
     values = value if isinstance(value, list | tuple) else [value]
     harmless = (otherwise,) * len(axes or values)
     if axes is not None and len(values) != len(axes):
-        problem = Phrase(
-            "must hold one number per axis ({axes}), found {count}", axes=", ".join(axes), count=len(values)
-        )
-        structurer.faults.add(where, problem)
+        template = "must hold one number per axis ({axes}), found {count}"
+        structurer.faults.add(where, template, axes=", ".join(axes), count=len(values))
         return harmless
     numbers = [structurer.fit(one, float, where) for one in values]
     if MISFIT in numbers:
@@ -338,7 +321,7 @@ def _named(axis: str, table: Table, faults: Faults) -> Table:
     if not bare or not isinstance(own, Mapping):
         return table
     for key in sorted(bare.keys() & own.keys()):
-        faults.add(place("axis", key), Phrase("stands in axis.{axis}, too; state one of them", axis=axis))
+        faults.add(place("axis", key), "stands in axis.{axis}, too; state one of them", axis=axis)
     return {**{key: value for key, value in table.items() if key not in bare}, axis: {**bare, **own}}
 
 
@@ -347,7 +330,7 @@ def _of_several(axes: Sequence[str], table: Table, faults: Faults) -> Table:
     bare = table.keys() & {*kinds_of(AxisSpec)} - {*axes}
     for key in sorted(bare):
         places = ", ".join(place(place("axis", axis), key) for axis in axes)
-        faults.add(place("axis", key), Phrase("state it of each axis: {places}", places=places))
+        faults.add(place("axis", key), "state it of each axis: {places}", places=places)
     return {key: value for key, value in table.items() if key not in bare}
 
 

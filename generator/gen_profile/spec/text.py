@@ -1,7 +1,5 @@
 """A spec's text with some values changed, and all that its author wrote beside them kept."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import tomli_w

@@ -3,8 +3,6 @@
 A field's annotation says what it may hold; `gen_profile.spec.structure` holds every value to it.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """A planner commanded from the keyboard: keys of a terminal as the stick and buttons of a crane."""
 
-from __future__ import annotations
-
 import os
 import select
 import sys

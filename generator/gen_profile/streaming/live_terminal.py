@@ -1,7 +1,5 @@
 """A running stream as curves on a terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The machine that simulated drives move: its FMU, behind the drives' port `Load`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Self
 

@@ -1,7 +1,5 @@
 """What became of a stream, in SI units: for people, for programs, and as a table."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import attrs

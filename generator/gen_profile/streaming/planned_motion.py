@@ -1,7 +1,5 @@
 """Setpoints that a written planner block issues while they are streamed, called cycle by cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol

@@ -1,7 +1,5 @@
 """The priority of this process, lowered for work that others need not wait for."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

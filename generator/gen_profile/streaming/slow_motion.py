@@ -4,8 +4,6 @@ They are designed and checked as every motion is, so the load hangs still afterw
 motion is, with all that stops it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

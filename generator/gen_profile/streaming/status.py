@@ -1,7 +1,5 @@
 """What a planner's axes do now, in one line: where they are, how far a stop leads, and what was commanded."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from gen_profile.planner.interface import BlockAxis

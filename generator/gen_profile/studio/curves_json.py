@@ -1,7 +1,5 @@
 """Figures as a page draws them while a knob is turned: one abscissa for all curves of a panel."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a page shows once the hand rests: the spectrum, other methods, sway over parameters' errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -295,10 +295,8 @@ def _followers(spec: Spec) -> Sequence[Follower]:
         for name, (low, high) in ranges.items()
         if nominal[name] != 0.0 and name not in spec.check.spans
     }
-    if not ends:
-        return [Follower(name="nominal", off={})]
     followers = [Follower(name="nominal", off={})]
-    for side in (0, 1):
+    for side in (0, 1) if ends else ():
         off = {name: both[side] for name, both in ends.items()}
         words = ", ".join(f"{name} {100.0 * (factor - 1.0):+.3g} %" for name, factor in off.items())
         followers.append(Follower(name=machine(words), off=off))

@@ -5,8 +5,6 @@ which his browser is started, or the code that the terminal shows, typed by hand
 command lines, histories and messages show addresses to others.
 """
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import hashlib

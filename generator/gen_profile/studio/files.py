@@ -1,7 +1,5 @@
 """What a page lets one take away: artefacts that were checked, and the report."""
 
-from __future__ import annotations
-
 import io
 import queue
 import zipfile

@@ -3,8 +3,6 @@
 A knob's words are looked up by its key in ``assets/words.json``; only a machine's parameters bring their own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from types import UnionType
@@ -53,10 +51,6 @@ LEFT_OUT = {
     "move.shortest",
 }
 LEFT_OUT |= {"check.path.lag", "export.csv_columns", "plant"}
-ORDER = (
-    *("move", "plant", "robustness", "cost", "solver", "limits", "actuator"),
-    *("check", "planner", "axis", "export", "can"),
-)
 
 
 @attrs.frozen(kw_only=True)
@@ -102,9 +96,9 @@ class Knob:
 
     path: str
     index: int | None = None
-    group: str
+    group: str = attrs.field(init=False)
     kind: str
-    words: str
+    words: str = attrs.field()
     name: str = ""
     about: str = ""
     value: Any
@@ -118,6 +112,14 @@ class Knob:
     optional: bool = False
     usual: float | None = None
     choices: tuple[Any, ...] = ()
+
+    @group.default
+    def _table(self) -> str:
+        return "export" if self.path == "name" else self.path.partition(".")[0]
+
+    @words.default
+    def _key(self) -> str:
+        return self.path
 
 
 def knobs(spec: Spec, document: Mapping[str, Any], start: Spec) -> list[Knob]:
@@ -137,36 +139,28 @@ def knobs(spec: Spec, document: Mapping[str, Any], start: Spec) -> list[Knob]:
 
 
 def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
-    for table in ORDER:
-        match table:
-            case "move":
-                yield from _move(spec, document.get("move", {}))
-            case "plant":
-                yield from _parameters(spec)
-            case "robustness":
-                yield from _fields(spec.robustness, table, table)
-                yield from _intervals(spec)
-            case "limits":
-                yield from _limits(spec)
-            case "check":
-                yield from _residual_sway(spec, document.get("check", {}))
-                yield from _fields(spec.check, table, table)
-                yield from _fields(spec.check.path, "check.path", table)
-                yield from _fields(spec.check.wind, "check.wind", table)
-                for one in spec.machine().parameters:
-                    yield _range(one, "check.spans", table, spec.check.spans.get(one.name))
-            case "planner":
-                yield from _planner(spec)
-            case "can":
-                yield from _of_axes(spec, _fields(spec.can, table, table))
-            case "axis":
-                yield from _axes(spec, document.get("axis", {}))
-            case _:
-                yield from _fields(getattr(spec, table), table, table)
-    yield Knob(path="name", group="export", kind="text", words="name", value=spec.name)
+    parameters = spec.machine().parameters
+    yield from _move(spec, document.get("move", {}))
+    yield from (_of_parameter(one, "number", spec.plant.parameters[one.name]) for one in parameters)
+    yield from _fields(spec.robustness, "robustness")
+    yield from _intervals(spec)
+    yield from _fields(spec.cost, "cost")
+    yield from _fields(spec.solver, "solver")
+    yield from _limits(spec)
+    yield from _fields(spec.actuator, "actuator")
+    yield from _residual_sway(spec, document.get("check", {}))
+    yield from _fields(spec.check, "check")
+    yield from _fields(spec.check.path, "check.path")
+    yield from _fields(spec.check.wind, "check.wind")
+    yield from (_range(one, "check.spans", spec.check.spans.get(one.name)) for one in parameters)
+    yield from _planner(spec)
+    yield from _axes(spec, document.get("axis", {}))
+    yield from _fields(spec.export, "export")
+    yield from _of_axes(spec, _fields(spec.can, "can"))
+    yield Knob(path="name", kind="text", value=spec.name)
 
 
-def _fields(table: Any, place: str, group: str, *, words: str = "", name: str = "") -> Iterator[Knob]:
+def _fields(table: Any, place: str, *, words: str = "", name: str = "") -> Iterator[Knob]:
     """List the plain fields of a table: numbers, choices and switches."""
     kinds: Any = type(table)
     for key, kind in kinds_of(kinds).items():
@@ -175,14 +169,8 @@ def _fields(table: Any, place: str, group: str, *, words: str = "", name: str = 
             continue
         label = f"{words or place}.{key}"
         usual = {"unit": UNITS.get(label, ""), "usual": USUAL.get(label)}
-        yield Knob(
-            path=f"{place}.{key}",
-            group=group,
-            words=label,
-            name=name,
-            value=getattr(table, key),
-            **{**usual, **knob},
-        )
+        values = {**usual, **knob, "value": getattr(table, key)}
+        yield Knob(path=f"{place}.{key}", words=label, name=name, **values)
 
 
 def _field(kind: Any) -> dict[str, Any] | None:
@@ -215,37 +203,26 @@ def _bounds(bounds: Bounds) -> dict[str, Any]:
 
 def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
     """Tell ways in the unit of each axis, and the duration."""
-    by_distance = "target" not in stated
-    ways = (
-        {"distance": spec.move.distance}
-        if by_distance
-        else {"start": spec.move.start, "target": spec.move.target}
-    )
-    ways["final_velocity"] = spec.move.final_velocity
-    several = len(spec.axis) > 1
-    for key, values in ways.items():
+    ways = ("distance",) if "target" not in stated else ("start", "target")
+    for key in (*ways, "final_velocity"):
         for column, axis in enumerate(spec.machine().actuated):
             unit, factor = place_unit(spec, column)
             speed = key == "final_velocity"
             yield Knob(
                 path=f"move.{key}",
                 index=column,
-                group="move",
                 kind="number",
-                words=f"move.{key}",
-                name=axis.name if several else "",
-                value=values[column],
+                name=axis.name if len(spec.axis) > 1 else "",
+                value=getattr(spec.move, key)[column],
                 unit=f"{axis.unit}/s" if speed else unit,
                 factor=1.0 if speed else factor,
                 least=None if speed or not math.isfinite(axis.lower) else axis.lower,
                 most=None if speed or not math.isfinite(axis.upper) else axis.upper,
             )
-        if key == ("distance" if by_distance else "target"):
+        if key == ways[-1]:
             duration = _field(kinds_of(MoveSpec)["duration"])
             yield Knob(
                 path="move.duration",
-                group="move",
-                words="move.duration",
                 value="minimum" if spec.move.shortest else spec.move.duration,
                 unit=UNITS["move.duration"],
                 choices=("minimum",),
@@ -253,16 +230,10 @@ def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
             )
 
 
-def _parameters(spec: Spec) -> Iterator[Knob]:
-    for one in spec.machine().parameters:
-        yield _of_parameter(one, "plant", "number", spec.plant.parameters[one.name])
-
-
-def _of_parameter(one: Parameter, group: str, kind: str, value: Any) -> Knob:
+def _of_parameter(one: Parameter, kind: str, value: Any) -> Knob:
     place = "plant" if kind == "number" else "robustness.uncertain"
     return Knob(
         path=f"{place}.{one.name}",
-        group=group,
         kind=kind,
         words=place,
         name=one.name,
@@ -282,22 +253,21 @@ def _intervals(spec: Spec) -> Iterator[Knob]:
         nominal, fraction = spec.plant.parameters[one.name], spec.robustness.uncertain.get(one.name)
         if nominal > 0.0:
             ends = None if fraction is None else [nominal * (1.0 - fraction), nominal * (1.0 + fraction)]
-            yield _of_parameter(one, "robustness", "interval", ends)
+            yield _of_parameter(one, "interval", ends)
 
 
-def _range(one: Parameter, place: str, group: str, value: Any) -> Knob:
+def _range(one: Parameter, place: str, value: Any) -> Knob:
     """Tell a parameter's least and greatest value, for something else than the design."""
-    knob = _of_parameter(one, group, "pair", value)
-    return attrs.evolve(knob, path=f"{place}.{one.name}", words=place)
+    return attrs.evolve(_of_parameter(one, "pair", value), path=f"{place}.{one.name}", words=place)
 
 
 def _planner(spec: Spec) -> Iterator[Knob]:
     """Give the block's inputs at run time, and how fast they may change."""
     live, rates = spec.planner.live, spec.planner.live_rate
     for one in spec.machine().parameters:
-        yield _range(one, "planner.live", "planner", live.get(one.name))
+        yield _range(one, "planner.live", live.get(one.name))
         if one.name in live:
-            rate = _of_parameter(one, "planner", "number", rates.get(one.name))
+            rate = _of_parameter(one, "number", rates.get(one.name))
             yield attrs.evolve(
                 rate,
                 path=f"planner.live_rate.{one.name}",
@@ -312,7 +282,6 @@ def _planner(spec: Spec) -> Iterator[Knob]:
         if axis.name in live:  # a hoist
             yield Knob(
                 path=f"planner.live.{axis.name}",
-                group="planner",
                 kind="pair",
                 words="planner.live",
                 name=axis.name,
@@ -320,7 +289,7 @@ def _planner(spec: Spec) -> Iterator[Knob]:
                 unit=axis.unit,
                 optional=True,
             )
-    yield from _of_axes(spec, _fields(spec.planner, "planner", "planner"))
+    yield from _of_axes(spec, _fields(spec.planner, "planner"))
 
 
 def _of_axes(spec: Spec, listed: Iterator[Knob]) -> Iterator[Knob]:
@@ -343,14 +312,13 @@ def _limits(spec: Spec) -> Iterator[Knob]:
         name = place.rpartition(".")[2] if place != "limits" else ""
         unit = next((axis.unit for axis in axes if axis.name == name), "m" if "m" in units else "rad")
         if not name and len(units) > 1:  # no limit means the same of axes of different units
-            yield from (knob for knob in _fields(table, place, "limits") if knob.words == "limits.sway")
+            yield from (knob for knob in _fields(table, place) if knob.words == "limits.sway")
             continue
-        for knob in _fields(table, place, "limits", words="limits", name=name):
+        for knob in _fields(table, place, words="limits", name=name):
             rate = RATES.get(knob.words.rpartition(".")[2])
             yield attrs.evolve(knob, unit=f"{unit}{rate}") if rate else knob
         yield Knob(
             path=f"{place}.travel",
-            group="limits",
             kind="pair",
             words="limits.travel",
             name=name,
@@ -364,10 +332,8 @@ def _residual_sway(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
     """List what may remain of the sway: of all loads, or of each where that is stated."""
     of_each = isinstance(stated.get("residual_sway"), Mapping)
     for load, limit in spec.check.residual_sway.items():
-        path = f"check.residual_sway.{load}" if of_each else "check.residual_sway"
         yield Knob(
-            path=path,
-            group="check",
+            path=f"check.residual_sway.{load}" if of_each else "check.residual_sway",
             kind="number",
             words="check.residual_sway",
             name=load if of_each else "",
@@ -385,7 +351,7 @@ def _axes(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
     bare = len(spec.axis) == 1 and not any(isinstance(stated.get(name), Mapping) for name in spec.axis)
     for name, axis in spec.axis.items():
         place = "axis" if bare else f"axis.{name}"
-        yield from _fields(axis, place, "axis", words="axis", name="" if len(spec.axis) == 1 else name)
+        yield from _fields(axis, place, words="axis", name="" if len(spec.axis) == 1 else name)
 
 
 def _with_slider(knob: Knob, before: Any) -> Knob:

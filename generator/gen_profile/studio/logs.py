@@ -1,7 +1,5 @@
 """What was measured on the machine: a swing that tells its parameters, or a move beside the plan."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a page asks a worker for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

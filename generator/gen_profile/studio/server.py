@@ -365,7 +365,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         return {"name": name, "bytes": len(content), "link": f"made/{key}"}
 
 
-def serve(
+async def serve(
     start: WrittenSpec,
     port: int,
     *,
@@ -395,18 +395,6 @@ def serve(
     OutputError
         The port is taken.
     """
-    asyncio.run(_serve(start, port, browser, ready, renew, watching=watching))
-
-
-async def _serve(
-    start: WrittenSpec,
-    port: int,
-    browser: bool,
-    ready: Callable[[str, str], None],
-    renew: Callable[[str], None],
-    *,
-    watching: Watching | None,
-) -> None:
     with ExitStack() as stack:
         workers = Workers()
         stack.callback(workers.close)

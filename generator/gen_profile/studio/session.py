@@ -1,7 +1,5 @@
 """What one page asks, and who answers: the newest question only, however fast a hand is."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from contextlib import suppress

@@ -4,8 +4,6 @@ Every part is a mapping of plain values with its name under ``"part"``. What tak
 `gen_profile.studio.depth`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 from typing import Any

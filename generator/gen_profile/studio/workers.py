@@ -1,7 +1,5 @@
 """Processes that answer questions, one each; one that is overtaken can be ended, for another is ready."""
 
-from __future__ import annotations
-
 import gc
 import json
 import multiprocessing

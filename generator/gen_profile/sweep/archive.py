@@ -9,8 +9,6 @@ sqlar    the artefacts and manifests, as an SQLite archive (https://sqlite.org/s
 A case is one transaction, so whatever kills the writer, a case is there whole or not at all.
 """
 
-from __future__ import annotations
-
 import json
 import sqlite3
 import zlib
@@ -22,7 +20,7 @@ from typing import Any
 from gen_profile.errors import OutputError
 from gen_profile.sweep.case import CaseOutcome
 from gen_profile.sweep.grid import Grid
-from gen_profile.sweep.rows import case_path, row_of
+from gen_profile.sweep.table import case_path, row_of
 
 SUFFIX = ".sqlite"
 TYPES = {int: "INTEGER", float: "REAL", str: "TEXT"}

@@ -4,8 +4,6 @@ Nothing is shared with the workers but the program: what a case needs comes with
 back as bytes.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 from pathlib import Path

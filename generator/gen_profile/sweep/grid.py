@@ -1,7 +1,5 @@
 """What a sweep varies: axes of values, and all their combinations."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib

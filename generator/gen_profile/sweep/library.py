@@ -1,7 +1,5 @@
 """From a sweep to one PLC block that plays any of its profiles, made of the very files that passed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,8 +13,7 @@ from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, no_progress
 from gen_profile.sweep.case import PASSED
-from gen_profile.sweep.reading import case_files, case_folder, case_spec, swept_table
-from gen_profile.sweep.store import grid_of
+from gen_profile.sweep.store import case_files, case_folder, case_spec, grid_of, swept_table
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import Target, target_of
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library

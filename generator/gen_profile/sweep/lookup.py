@@ -1,7 +1,5 @@
 """Looking a profile library up: the nearest profile that is safe on the machine that one has."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,10 +16,8 @@ from gen_profile.spec.model import Spec
 from gen_profile.suggestion import number_meant, suggestion
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.grid import Grid, GridAxis, overrides
-from gen_profile.sweep.reading import case_folder, case_spec, swept_table, take_out
-from gen_profile.sweep.rows import cell
-from gen_profile.sweep.store import grid_of
-from gen_profile.sweep.table import Table
+from gen_profile.sweep.store import case_folder, case_spec, grid_of, swept_table, take_out
+from gen_profile.sweep.table import Table, cell
 from gen_profile.verification.check import Judgement, check_artefact
 
 TRIES = 64

@@ -1,32 +1,91 @@
-"""Sweeps: all cases of a grid designed, checked and exported, on as many processes as there are.
+"""Sweeps: what makes sense to sweep, and all its cases designed, checked and exported on many processes.
 
 The cases run on Dask workers, those of this computer or of a cluster. This process alone writes: workers hand
 it what they made, a few cases at a time. So whatever stops them or this process, what was written stays, and
 a sweep that is started again works out the rest.
 """
 
-from __future__ import annotations
-
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
 import attrs
+import numpy as np
+import tomli_w
 from dask.system import CPU_COUNT
 from distributed import Client, Future, KilledWorker, as_completed
 
+from gen_profile.artefacts.manifest import versions
 from gen_profile.cluster import client_of, processes, unable
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.progress import Progress, no_progress
-from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_cases
-from gen_profile.sweep.reading import swept_table
-from gen_profile.sweep.store import Keeper, Store, opened
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
+from gen_profile.sweep.grid import Grid, grid_of_values
+from gen_profile.sweep.store import Keeper, Store, opened, swept_table
+from gen_profile_exporters.registry import find_exporter
 
 STAGE = "designing cases"
 CASES_PER_TASK = 8  # at most; Dask's work for a task is a fifth of that for a case
 TASKS_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
+
+
+def prepare(
+    spec_text: tuple[str, str, Path],
+    overrides: Sequence[str],
+    grid: Grid,
+    formats: Sequence[str],
+    folder: Path,
+) -> Store:
+    """Say what is to be swept, once it makes sense.
+
+    Parameters
+    ----------
+    spec_text : (str, str, Path)
+        TOML of the spec, where it comes from, and the folder that its files are relative to.
+    overrides : sequence of str
+        Of the spec, the same in all cases.
+    grid : Grid
+    formats : sequence of str
+    folder : Path
+        To write to.
+
+    Raises
+    ------
+    SpecError
+        The spec is faulty, or no value of some axis fits it.
+    """
+    for name in formats:
+        find_exporter(name)
+    text, source, spec_folder = spec_text
+    recipe = Recipe(
+        text=text,
+        overrides=tuple(overrides),
+        source=source,
+        folder=str(spec_folder.absolute()),
+        formats=tuple(dict.fromkeys(formats)),
+        versions=versions(),
+    )
+    spec = recipe.spec({})
+    for axis in grid.axes:
+        _require_some(recipe, axis.key, axis.values)
+    return Store(folder=folder, name=spec.name, grid=grid, recipe=recipe, spec_sha256=spec.sha256())
+
+
+def _require_some(recipe: Recipe, key: str, values: Sequence[Any]) -> None:
+    """Tell a mistyped key from values of which some do not do."""
+    faults = []
+    for value in values:
+        try:
+            recipe.spec({key: value})
+        except SpecError as error:
+            faults.append(error)
+        else:
+            return
+    raise faults[0]
 
 
 @attrs.frozen(kw_only=True)
@@ -182,3 +241,49 @@ def _outcomes(future: Future) -> list[CaseOutcome]:
         raise
     except Exception as error:
         raise SpecError(f"{unable(error)} What is finished is kept: sweep again.") from error
+
+
+def run_sweep(
+    spec: Spec | Path | str,
+    vary: Mapping[str, Sequence[Any]],
+    formats: Sequence[str] | str,
+    folder: Path | str,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Sweep:
+    """Design, export and check all combinations of values, or go on where such a sweep was interrupted.
+
+    Parameters
+    ----------
+    spec : Spec, or the path of one
+    vary : mapping of str to sequence
+        Values by key of the spec, such as ``{"plant.L1": [0.4, 0.5]}``.
+    formats : sequence of str, or str
+        To export, such as ``["plc"]``.
+    folder : Path or str
+        To write to.
+    workers : int, optional
+        Processes of this computer; by default one for each of its processors.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers to use instead.
+
+    Raises
+    ------
+    SpecError
+        A key or all of its values make no sense, or the scheduler does not answer.
+    OutputError
+        Dask or PyArrow are not installed, or the folder holds another sweep or cannot be written.
+
+    Examples
+    --------
+    >>> sweep = gp.run_sweep(gp.preset_spec("paper"), {"plant.L1": [0.45, 0.5]}, "plc", "ropes", workers=1)
+    >>> sweep.statuses
+    {'passed': 2}
+    """
+    spec = as_spec(spec)
+    grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
+    text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
+    return sweep(
+        prepare(text, (), grid, as_names(formats), Path(folder)), scheduler=scheduler, workers=workers
+    )

@@ -1,7 +1,5 @@
 """Co-simulation of replayed setpoints on the plant FMU, and the verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 

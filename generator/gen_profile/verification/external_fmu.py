@@ -1,7 +1,5 @@
 """A check by an external FMU."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import groupby
 

@@ -1,7 +1,5 @@
 """Co-simulation of setpoints on machines of one's choice."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

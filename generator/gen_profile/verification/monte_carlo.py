@@ -1,7 +1,5 @@
 """The scenarios of a check beyond its machines: other drives, random draws, faults of timing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs

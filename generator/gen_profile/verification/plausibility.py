@@ -1,7 +1,5 @@
 """Whether replayed setpoints are the move that a spec asks for, before anything swings from them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

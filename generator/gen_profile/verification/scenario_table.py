@@ -1,7 +1,5 @@
 """All scenarios of a check as a table on disk, with what each of them was given and left."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from io import StringIO

@@ -1,7 +1,5 @@
 """The way of setpoints from the artefact to the axes: what the drives make of them, and what goes wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs

@@ -1,7 +1,5 @@
 """What a check found: values only, no work."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Every machine that the search looks at is a co-simulation of the plant's FMU, to
 integration steps that are only as close as the modes need. What it finds is then co-simulated in full.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import attrs

@@ -10,8 +10,6 @@
 Frames of one cycle carry the stamp of its SYNC; they are sent in the file's order.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 

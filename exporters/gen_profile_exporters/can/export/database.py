@@ -1,7 +1,5 @@
 """DBC of the bus: what the frames mean, for analysers and loggers."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 

@@ -5,8 +5,6 @@ Between two SYNCs a drive interpolates over its interpolation period 60C2h, whic
 `gen_profile_exporters.can.frames` for the frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import pairwise

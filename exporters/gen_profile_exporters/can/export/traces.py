@@ -1,7 +1,5 @@
 """The same frames for bus analysers: Vector's text format ASC and binary format BLF."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from io import BytesIO
 

@@ -1,7 +1,5 @@
 """The clock as the streamer sees it: a port, so that tests can hold it, and the machine's own."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Protocol

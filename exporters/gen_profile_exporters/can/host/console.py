@@ -1,7 +1,5 @@
 """The terminal that a stream was started from: its signals stop the axes, and nothing waits for it."""
 
-from __future__ import annotations
-
 import queue
 import signal
 from collections.abc import Callable, Iterator

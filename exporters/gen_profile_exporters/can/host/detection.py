@@ -1,7 +1,5 @@
 """Which CAN channels this computer has, and what each interface needs; no bus is touched for it."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

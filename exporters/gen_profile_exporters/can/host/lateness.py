@@ -1,7 +1,5 @@
 """How punctual cycles were: figures of lateness, and a rehearsal of this machine."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import attrs

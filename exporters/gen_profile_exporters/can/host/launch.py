@@ -4,8 +4,6 @@ It takes a queue that keeps instants (``tc qdisc replace dev can0 root fq``) and
 pass them on (SO_TXTIME, see tc-fq(8)). Whether both are there is found by trying.
 """
 
-from __future__ import annotations
-
 import socket
 import struct
 import sys

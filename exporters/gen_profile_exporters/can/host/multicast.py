@@ -4,8 +4,6 @@ python-can's own hears everything it sends. On a CAN bus no node does, and a fra
 another master's that commands our drives.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 
 import can

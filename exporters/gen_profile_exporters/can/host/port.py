@@ -1,7 +1,5 @@
 """CAN interfaces by name."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

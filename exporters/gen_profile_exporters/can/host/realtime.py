@@ -1,7 +1,5 @@
 """Ask the operating system for punctuality, as far as it permits."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

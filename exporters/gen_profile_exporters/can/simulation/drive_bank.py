@@ -1,7 +1,5 @@
 """Simulated drives on one bus, which together move one load."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Sequence
 from contextlib import suppress

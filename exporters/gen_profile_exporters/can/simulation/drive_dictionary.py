@@ -1,7 +1,5 @@
 """Object dictionary of the simulated drive, its EDS, and what may not be written to it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from io import StringIO
 from typing import Any

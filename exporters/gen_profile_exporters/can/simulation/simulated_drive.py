@@ -5,8 +5,6 @@ drives in csp and ip do; a velocity, in csv, is kept for that period. Without SY
 clock.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -6,8 +6,6 @@ with a tenth of the motion's greatest velocity and acceleration at most. The loa
 the axis stood off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import ceil
 

@@ -5,8 +5,6 @@ period, what it does when setpoints cease, the window of the following error, li
 axis stands.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

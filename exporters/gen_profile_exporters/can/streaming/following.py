@@ -1,7 +1,5 @@
 """Whether drives take the setpoints: what each tells of its way, held against the motion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs

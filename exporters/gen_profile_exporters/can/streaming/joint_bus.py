@@ -1,7 +1,5 @@
 """Several CAN buses as one: a drive's frames go by its own, SYNC and our heartbeat by all, back to back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 

@@ -15,8 +15,6 @@ ahead. The heartbeat (CiA 301, 1017h) goes out with a cycle, at least three time
 for it.
 """
 
-from __future__ import annotations
-
 import can
 
 from gen_profile_exporters.can import frames, pdos, startup

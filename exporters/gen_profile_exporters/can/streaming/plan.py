@@ -1,7 +1,5 @@
 """What a stream sends cycle by cycle: the setpoints of a log, or of any other source."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property

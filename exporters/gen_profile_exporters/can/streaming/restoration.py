@@ -1,7 +1,5 @@
 """What the drives were set to before they were set up for a motion, kept to be put back afterwards."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 

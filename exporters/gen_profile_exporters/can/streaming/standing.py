@@ -1,7 +1,5 @@
 """Whether an axis stands: measured by the positions that its drive tells, and never taken for granted."""
 
-from __future__ import annotations
-
 import attrs
 
 from gen_profile.units import AxisScale

@@ -8,8 +8,6 @@ does not after its time-out, our heartbeat ends, and it stops by itself, as it w
 given by a value, to be reported afterwards.
 """
 
-from __future__ import annotations
-
 import itertools
 import struct
 from collections.abc import Mapping

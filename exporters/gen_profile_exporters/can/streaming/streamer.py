@@ -5,8 +5,6 @@ Before each cycle the drives' answers to the one before are judged. Whatever is 
 Only who asks for a stop while all is well gets one without sway first, where the setpoints' source plans it.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """What the drives say on the bus, and which of it must end a stream."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
 from functools import partial

@@ -1,7 +1,5 @@
 """A host for the C form of a planner block: a real-time loop, and an OPC UA server beside it."""
 
-from __future__ import annotations
-
 from gen_profile_exporters.exporter import File
 from gen_profile_exporters.planner.c_source import c_files, c_name
 from gen_profile_exporters.playback.structured_text import literal

@@ -9,8 +9,6 @@ theorem 8.2; S. N. Bernstein, 1912; T. J. Rivlin, The Chebyshev polynomials, 197
 Arrays have an axis for each variable, after others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

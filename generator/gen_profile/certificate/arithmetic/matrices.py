@@ -1,7 +1,5 @@
 """Matrices of balls, and bounds on what matrices make of vectors."""
 
-from __future__ import annotations
-
 from functools import reduce
 from operator import add
 from typing import Any

@@ -4,8 +4,6 @@ Pieces are quintic polynomials through position, velocity and acceleration at bo
 cycles. The motion and its velocity are continuous by construction, whatever rounding made of these values.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
 

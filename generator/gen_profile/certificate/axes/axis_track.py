@@ -5,8 +5,6 @@ Where those have the slope v, it trails by y − r = −τ v + (y₀ − r₀ + 
 integrals of y need nothing else. So the axes' motion is known, however the machine swings.
 """
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 

@@ -5,8 +5,6 @@ cycle to the next, per cycle, is the acceleration that a drive finds, and of tha
 motion through the setpoints has at least as much somewhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ remains of the step (Walker and Ni, Anderson acceleration for fixed-point iterat
 iterations that overshoot, back and forth, and would never end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

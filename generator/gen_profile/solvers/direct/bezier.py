@@ -4,8 +4,6 @@ A polynomial stays within the hull of its Bézier coefficients: what bounds the 
 at every instant, not only at samples. (Farin, Curves and Surfaces for CAGD, chapter 5.)
 """
 
-from __future__ import annotations
-
 import math
 
 import attrs

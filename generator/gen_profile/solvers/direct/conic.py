@@ -1,7 +1,5 @@
 """Conic quadratic programs: a thin typed layer over the solver Clarabel."""
 
-from __future__ import annotations
-
 from enum import Enum
 from itertools import count
 from typing import Any

@@ -1,7 +1,5 @@
 """What the conic programs of the direct method minimise, and keep within bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Mapping, Sequence
 
 import attrs
@@ -9,11 +7,10 @@ import numpy as np
 from scipy import sparse
 
 from gen_profile.motion.profile import Array
-from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.pontryagin import SNAP_TIME
 from gen_profile.problem.problem import Problem
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct.bezier import Piece, elevation, gram
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place

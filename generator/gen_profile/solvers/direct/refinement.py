@@ -4,8 +4,6 @@ There the control bends or jumps, which no polynomial does; elsewhere, those of 
 as exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A problem transcribed for the direct method: mesh, machines, forms of the effort."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
@@ -10,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
-from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.dynamics import parameter_column
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.motion_equations import motion_equations
 from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
 from gen_profile.problem.problem import Problem
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.bezier import Piece
 from gen_profile.solvers.direct.condensing import axes_map

@@ -8,17 +8,14 @@ convex programming; Malyuta et al., 2022); where motions overshoot one another, 
 motion can do where angles are small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
-from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.acceleration import accelerate
 from gen_profile.solvers.direct.bezier import power_basis

@@ -1,7 +1,5 @@
 """Sway on the way: how great it is, and how programs that see it at points keep it between them, too."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import attrs

@@ -7,8 +7,6 @@ and K. O. Kortanek, Semi-infinite programming, SIAM Rev. 35, 1993). Among the mo
 as the best, the one of least cost is taken.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array
-from gen_profile.problem.axis_reach import axis_reach, effort_weights
+from gen_profile.problem.cost import SwayCost, axis_reach, effort_weights
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import Linearization
 from gen_profile.problem.linearization import linearize as linearized_machine
 from gen_profile.problem.pontryagin import OptimalitySystem, RuntimeParameters, StateLayout
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.problem.reachability import independent_states
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.collocation import Scheme, Trajectory, linearize, sampled
 
 # Shares of a state's response outside the span of the others', below which its end condition is implied.

@@ -1,7 +1,5 @@
 """What came of the canonical equations: judged, and in SI units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_profile.problem.problem import Problem

@@ -1,12 +1,10 @@
 """The controls of a linear machine that cost least: a convex problem, solved by damped Newton's method."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
-from gen_profile.problem.sway_cost import SwayCost
+from gen_profile.problem.cost import SwayCost
 
 CLOSE = 0.1  # change of the logarithm of the sway's cost, which a parabola follows well
 STEEP = 3.0  # growth of the same, beyond which it misleads

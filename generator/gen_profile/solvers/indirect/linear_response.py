@@ -5,8 +5,6 @@ eliminated. Where it is the same everywhere, as a crane that does not hoist, one
 costates' equations are the transposed ones of the states: they belong to the discretised problem exactly.
 """
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 

@@ -6,8 +6,6 @@ least the simplified one, which the old Jacobian gives (the natural monotonicity
 Methods for Nonlinear Problems, 2004, section 3.3).
 """
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 

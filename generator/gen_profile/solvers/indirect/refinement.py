@@ -1,7 +1,5 @@
 """Mesh refinement: split the intervals on which a collocated solution is not accurate enough."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 

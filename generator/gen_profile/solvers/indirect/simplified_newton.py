@@ -17,8 +17,6 @@ faster the iteration converges: its error shrinks by a nearly constant factor, w
 that differs from place to place, as a crane that hoists, is linearised anew in every iteration.
 """
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 from numpy.typing import NDArray

@@ -1,12 +1,11 @@
-"""How far each axis goes, as the unit in which its own motion is measured.
+"""What a motion costs: the effort of its axes, and sway on the way.
 
 Axes may move in metres and radians, or by very different distances. The cost weighs the effort of each
 relative to its own move, in units of the first axis: ``½ Σ (uᵢ · reach₁ / reachᵢ)²``. One axis alone has
-weight 1.
+weight 1. Sway costs β exp((γ d)²) of eq. (26).
 """
 
-from __future__ import annotations
-
+import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
@@ -40,3 +39,30 @@ def axis_reach(problem: Problem) -> Array:
 def effort_weights(reach: Array) -> Array:
     """Weigh the square of every axis' effort, shape (m,)."""
     return np.asarray((reach[0] / reach) ** 2)
+
+
+STEEPEST = 50.0  # exponent beyond which the cost is steep enough
+
+
+@attrs.frozen(kw_only=True)
+class SwayCost:
+    """β and γ, resolved; sways are arrays (points, directions) in m."""
+
+    beta: float
+    gamma: float
+
+    def exponents(self, sway: Array) -> Array:
+        """(γ d)², shape (points,)."""
+        with np.errstate(over="ignore"):  # of an iterate that diverges
+            return np.asarray(self.gamma**2 * (sway**2).sum(axis=1))
+
+    def values(self, sway: Array) -> Array:
+        """Evaluate the cost, shape (points,)."""
+        return np.asarray(self.beta * np.exp(np.minimum(self.exponents(sway), STEEPEST)))
+
+    def derivatives(self, sway: Array) -> tuple[Array, Array]:
+        """Differentiate it once and twice: (points, directions) and (points, directions, directions)."""
+        steepness = 2.0 * self.gamma**2 * self.values(sway)[:, None]
+        with np.errstate(over="ignore"):
+            square = np.eye(sway.shape[1]) + 2.0 * self.gamma**2 * sway[:, :, None] * sway[:, None]
+            return steepness * sway, steepness[..., None] * square
