@@ -75,4 +75,4 @@ export = {{ cycle_time = {CYCLE} }}
     )
     assert max(ratios) <= 1.10
     assert np.mean(ratios) <= 1.06
-    assert latest <= 20
+    assert latest <= 24

@@ -70,7 +70,9 @@ RESERVE = 0.1  # share of the limits that only calming takes up, where live para
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
 AXIS_LOOP = re.compile(r"(?ms)^( *)FOR (\w+) := 0 TO cAxes - 1 DO[^\n]*\n(.*?)^\1END_FOR;[^\n]*\n")
-FIRST = re.compile(r"\b0(?: \* c\w+)+( \+ )?")  # of the first axis: how many of something there are before
+FIRST = re.compile(
+    r"(?<![\w.])0(?: \* c\w+)+( \+ )?"
+)  # of the first axis: how many of something there are before
 WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")
@@ -447,6 +449,8 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
             else {
                 "cSwayShare": c.sway_share / c.sway_limit / len(c.axes),
                 "cSwayLimit": c.sway_limit,
+                # m of an axis, that a plan from rest may leave by its slope, however much is left already
+                "cLeastAdded": 0.02 * c.sway_limit / len(c.axes),
                 **of_errors.real(_fine(c), c.least_decay),
             }
         ),
