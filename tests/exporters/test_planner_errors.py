@@ -23,18 +23,18 @@ check = {{ residual_sway = 0.01 }}
 export = {{ cycle_time = {CYCLE} }}
 """
 ORDERS = (  # s until the next, target in m: what a search found that leaves much of the block without
-    (2.74, 1.63),
-    (0.08, 1.413),
-    (0.07, 0.82),
-    (4.0, 1.99),
-    (0.04, 1.349),
+    (2.65, 1.81),
+    (0.03, 1.537),
+    (0.03, 1.052),
+    (3.66, 1.755),
+    (0.1, 0.306),
     (1.11, 1.233),
-    (1.72, 1.99),
-    (0.36, 0.092),
-    (0.04, 1.451),
-    (1.7, 0.634),
-    (0.09, 1.528),
-    (20.0, 0.103),
+    (2.2, 1.99),
+    (0.3, 0.235),
+    (0.03, 1.884),
+    (1.61, 1.183),
+    (0.11, 1.443),
+    (20.0, 0.075),
 )
 
 
@@ -63,7 +63,7 @@ def left(out, L1, m1=0.192, m2=0.183, L2=0.391, g=9.81):
 
 
 def test_stated_errors_leave_less_of_new_targets_in_time_with_the_fast_mode():
-    """Rope and load are some per cent off: 13 mm in the fast mode where the block knows of no errors."""
+    """Rope and load are some per cent off: 12 mm in the fast mode where the block knows of no errors."""
     unaware = left(played("{}", ORDERS, 2.0), 0.382)
     aware = left(played("{L1=0.05, m2=0.1}", ORDERS, 2.0), 0.382)
     assert unaware[1] > 0.01
@@ -85,7 +85,7 @@ def refusing():
     """A block whose allowed sway gives no room to any way back after 44 m, and its patience."""
     allowed = ["check.residual_sway=0.004", "check.uncertain={L1=0.1}", "limits.travel=[0.0, 90.0]"]
     text = planner_block(parse_spec(BAY, allowed)).text
-    block = CountedBlock(compile_counting(text), fL1=6.8, fm2=500.0, fActPosition=1.0)
+    block = CountedBlock(compile_counting(text), fL1=6.8, fm2=1000.0, fActPosition=1.0)
     block.hold(500)
     assert block.hold(20_000, bExecute=1.0, fTarget=45.0)["bDone"][-1]
     patience = float(re.search(r"cGivesUp : LREAL := ([^;]+);", text)[1])
