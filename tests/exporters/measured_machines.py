@@ -170,19 +170,19 @@ class MeasuredGantry:
             for axis, value in self.shows().items():
                 self.inputs |= {f"fSensor_{axis}": sensor(axis, value), f"bSensorValid_{axis}": 1.0}
             self.block.inputs |= self.inputs
-            told = {name: float(values[0]) for name, values in self.block.play_on(1).items()}
-            velocity = np.array([told["fVelocity_x"], told["fVelocity_y"]])
-            felt = np.array([*(self.velocity - velocity) / self.cycle - self.gust, -G])
+            outputs = {name: float(values[0]) for name, values in self.block.play_on(1).items()}
+            velocity = np.array([outputs["fVelocity_x"], outputs["fVelocity_y"]])
+            push = np.array([*(self.velocity - velocity) / self.cycle - self.gust, -G])
             self.velocity, steps = velocity, 4
             for _ in range(steps):  # Störmer-Verlet, back on the sphere and its tangent each time
                 h = self.cycle / steps
-                self.speed = self.speed + h * (felt + self._pull(felt) * self.place)
+                self.speed = self.speed + h * (push + self._pull(push) * self.place)
                 self.place = self.place + h * self.speed
                 self.place *= self.length / np.linalg.norm(self.place)
                 self.speed -= self.place * (self.speed @ self.place) / self.length**2
-            self.rows.append(told | {"sway_x": -self.place[0], "sway_y": -self.place[1]})
+            self.rows.append(outputs | {"sway_x": -self.place[0], "sway_y": -self.place[1]})
         return {name: np.array([row[name] for row in self.rows]) for name in self.rows[0]}
 
-    def _pull(self, felt):
+    def _pull(self, push):
         """Of the rod, by the load's mass and the rod's vector."""
-        return -(self.speed @ self.speed + felt @ self.place) / self.length**2
+        return -(self.speed @ self.speed + push @ self.place) / self.length**2

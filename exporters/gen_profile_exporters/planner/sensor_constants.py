@@ -180,6 +180,7 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cDampFrom": sensor.begin,
         "cDampAgain": sensor.again,
         "cDampRoused": sensor.roused,
+        "cDampOnWay": 2.0 * sensor.roused,
         "cDampTo": sensor.end,
         "cDampRoom": sensor.room,
         "cDampLength": KERNEL_PERIODS,

@@ -14,7 +14,7 @@ ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
 STATES = ("bBusy", "bPromise", "nErrorId", "bEnabled")
 LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs that the first blocks had not
 SENSOR = ("fSensor", "bSensorValid", "fSensorAge")  # of axes with one
-SENSED = {  # what is told of such an axis, by the columns of a table
+SENSED = {  # what the block tells of such an axis, by the columns of a table
     "sway_estimated_m": "fSwayEstimated",
     "sway_uncertainty_m": "fSwayUncertainty",
     "sensor_used": "bSensorUsed",

@@ -43,7 +43,7 @@ NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cyc
 LIGHT = 0.02  # damping that modes are taken to have at least, so that one that is not shown is no obstacle
 ROOM = 1.25  # of the stated swing: how far damping may lead
 # Of the allowed sway: where damping begins on arrival, later at rest, and after a period of that; and ends.
-BEGIN, AGAIN, ROUSED, END = 0.4, 0.7, 0.85, 0.3
+BEGIN, AGAIN, ROUSED, END = 0.4, 0.7, 0.85, 0.27
 SURE = 4.0  # standard deviations of what is estimated, that lie between the first two
 NOISES = 8.0  # standard deviations of the noise that no value is off by
 STUCK = 4.0  # of them, by which what is expected may change while the value stays the same
