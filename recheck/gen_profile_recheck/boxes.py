@@ -104,9 +104,9 @@ def node_values(terms: tuple[int, ...], counts: tuple[int, ...]) -> arb_mat:
 
 
 @cache
-def interpolation(counts: tuple[int, ...]) -> arb_mat:
-    """Matrix from values at nodes (in rows) to coefficients."""
-    return kronecker(node_values((count,), (count,)).inv() for count in counts)
+def interpolation(count: int) -> arb_mat:
+    """Matrix from values at nodes to coefficients."""
+    return node_values((count,), (count,)).inv().transpose()
 
 
 def kronecker(matrices: Any) -> arb_mat:
@@ -222,16 +222,20 @@ class MotionPiece:
             factor = amplified * (arb(2) ** (1 - count) if variable else 1)
             rests = [rest + abs(one) * factor for rest, one in zip(rests, late, strict=True)]
             amplified *= 1 + 2 / pi * log(count) + 1e-9
+        tables = ([row[output] for row in rows] for output in range(len(rests)))
         return [
-            Expansion(
-                from_powers(terms)
-                * arb_mat([row[output] for row in rows]).transpose()
-                * interpolation(counts),
-                (terms, *counts),
-                rest.abs_upper(),
-            )
-            for output, rest in enumerate(rests)
+            Expansion(_interpolated(table, terms, counts), (terms, *counts), rest.abs_upper())
+            for table, rest in zip(tables, rests, strict=True)
         ]
+
+
+def _interpolated(table: Values, terms: int, counts: tuple[int, ...]) -> arb_mat:
+    """Take powers of time at nodes for coefficients, one variable after the other, the last one first."""
+    entries = [one for row in table for one in row]
+    for matrix in (from_powers(terms), *map(interpolation, reversed(counts))):
+        columns = arb_mat(len(entries) // matrix.ncols(), matrix.ncols(), entries).transpose()
+        entries = (matrix * columns).entries()  # the last variable's index comes first
+    return arb_mat(len(table), terms, entries).transpose()
 
 
 def _coefficients(value: Any, terms: int) -> list[arb]:

@@ -107,7 +107,7 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
         cycle, layout, columns = read(text, spec, axes)
         finite = cycle > 0 and all(isfinite(one) for column in columns for one in column)
         require(finite and min(map(len, columns)) > 1, "no motion, or none of finite numbers")
-    except (ValueError, IndexError, ArithmeticError) as error:
+    except (NotProvedError, ValueError, IndexError, ArithmeticError) as error:
         raise NotProvedError(f"not covered, or damaged: an artefact of another format ({error})") from error
     (over, under), positions, resolution = Decimal(repr(cycle)).as_integer_ratio(), [], []
     for column, axis in zip(columns, (spec["axis"][name] for name in axes), strict=True):

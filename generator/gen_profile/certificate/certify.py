@@ -166,9 +166,9 @@ def _first_boxes(box: Box, most: float, options: CertificateOptions = USUAL) -> 
     CertificateError
         There are too many.
     """
-    for turn, enough in ((options.radians_per_box, FEW), (options.radians_per_wide_box, most)):
+    for turn, allowed in ((options.radians_per_box, FEW), (options.radians_per_wide_box, most)):
         waiting, found = [((0, 0),) * len(box.ranges)], list[DyadicBox]()
-        while waiting and len(waiting) + len(found) <= enough:
+        while waiting and len(waiting) + len(found) <= allowed:
             part = waiting.pop()
             turns = _turns(box, part)
             if turns.max(initial=0.0) > turn:
