@@ -72,7 +72,7 @@ def test_a_stop_while_turning_round_passes_no_end_that_was_stated(text):
 def test_a_stop_comes_soon_where_the_axis_is_to_turn_round_anyway(text, away, back):
     """It took 13 to 15 s, as the stop was sought that ends farthest ahead of where the motion would end."""
     driver = standing(text, 17.0, fL1=6.0, fm2=2000.0)
-    driver.hold(away, bExecute=1, fTarget=2.0).hold(back, bExecute=1, fTarget=19.0).hold(9.0, bStop=1)
+    driver.hold(away, bExecute=1, fTarget=2.0).hold(back, bExecute=1, fTarget=19.0).hold(11.0, bStop=1)
     assert (last(driver, "bBusy"), last(driver, "fVelocity")) == (0, 0.0)
 
 

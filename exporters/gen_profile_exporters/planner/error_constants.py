@@ -51,7 +51,6 @@ def real(fine: int, least_decay: float) -> dict[str, float]:
         "cStopRoom": 0.4,  # where it stops
         "cKeptBack": 0.15,  # of what it may leave, towards its end
         "cTighter": 20.0,  # weight of second order, where as much of it is left as plans may spend
-        "cCurveShare": 0.3,  # of what an epoch may leave, beside which that of second order counts, from rest
         # of what an epoch may leave: no plan or pulse that leaves more, if that is more than now
         "cAdmitted": 0.8,
         "cVariationSum": float(np.sum(np.power(VARIATIONS, 4))),
