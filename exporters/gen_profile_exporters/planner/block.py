@@ -173,6 +173,7 @@ def block_text(constants: PlannerConstants) -> str:
         "events": constants.events,
         "ramped": not constants.rates,
         "varied": constants.stated_error > 0.0 and not constants.rates,
+        "several_varied": len(constants.axes) > 1 and constants.stated_error > 0.0 and not constants.rates,
         "measured": constants.sensor is not None,
         "measured_varied": constants.sensor is not None and constants.stated_error > 0.0,
     }

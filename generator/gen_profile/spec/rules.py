@@ -268,16 +268,15 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
             missing, of = ("disturbance", "sensor") if disturbance is None else ("sensor", "disturbance")
             yield f"planner.{missing}", Phrase("required by planner.{of}", of=of), f"planner.{of}"
         return
-    known = [coordinate.name for coordinate in plant.unactuated]
-    what = "coordinate that swings"
-    if sensor.quantity == "sway":
-        known, what = list(plant.loads), "load of the machine"
+    of_load = sensor.quantity == "sway"
+    known = list(plant.loads) if of_load else [coordinate.name for coordinate in plant.unactuated]
     if not sensor.names:
-        yield "planner.sensor.of", Phrase("must name a {what}", what=what)
+        template = "must name a load of the machine" if of_load else "must name a coordinate that swings"
+        yield "planner.sensor.of", template
     for name in sensor.names:
         if name not in known:
-            problem = Phrase("no {what}{hint}", what=what, hint=suggestion(name, known))
-            yield "planner.sensor.of", problem
+            template = "no load of the machine{hint}" if of_load else "no coordinate that swings{hint}"
+            yield "planner.sensor.of", Phrase(template, hint=suggestion(name, known))
     if not disturbance.swing:
         yield "planner.disturbance.swing", "must name a load"
     for name in ("live_rate", "zones"):
