@@ -235,3 +235,45 @@ def test_short_slots_leave_no_cycle_more_work():
     parts = [block.hold(cycles, bExecute=1.0, fTarget_x=x, fTarget_y=y) for cycles, x, y in ways]
     assert max(part["operations"].max() for part in parts) <= 3000
     assert parts[-1]["fVelocity_x"][2200] < -0.1
+
+
+def test_an_axis_that_has_left_much_moves_on_beside_another():
+    """x stood for 92 s while y crept: its share of what may be left was used up, that of y was not."""
+    spec = parse_spec("""
+plant = { type = "gantry-crane", m = 2000.0, L = 5.0 }
+move = { distance = [12.0, 4.0], duration = 16.0 }
+robustness = { uncertain = { L = 0.05 } }
+check = { residual_sway = 0.05 }
+export = { cycle_time = 0.004 }
+limits.axis.x = { velocity = 1.2, acceleration = 0.4, jerk = 2.0, travel = [0.0, 40.0] }
+limits.axis.y = { velocity = 1.0, acceleration = 0.4, jerk = 2.0, travel = [0.0, 20.0] }
+planner = { live = { L = [3.0, 9.0] } }
+""")
+    places = {"fActPosition_x": 21.31370246703929, "fActPosition_y": 9.300723183119427}
+    block = CountedBlock(compile_counting(planner_block(spec).text), fL=7.012614402715599, **places)
+    block.hold(500, bEnable=1.0)
+
+    def go(x, y, seconds, override=1.0, limits=(0.0, 0.0)):
+        slower = {"rOverride": override, "fVelocityLimit_x": limits[0], "fVelocityLimit_y": limits[1]}
+        block.hold(1, bStop=0.0, bVelocity=0.0, bExecute=0.0, **slower)
+        return block.hold(round(seconds / 0.004) - 1, bExecute=1.0, fTarget_x=x, fTarget_y=y)
+
+    def stick(x, y, seconds, override=1.0, limits=(0.0, 0.0)):
+        slower = {"rOverride": override, "fVelocityLimit_x": limits[0], "fVelocityLimit_y": limits[1]}
+        speeds = {"fVelocityCommand_x": x, "fVelocityCommand_y": y}
+        block.hold(1, bExecute=0.0, bVelocity=1.0, fVelocityCommand_x=0.0, fVelocityCommand_y=0.0, **slower)
+        block.hold(round(seconds / 0.004) - 1, **speeds)
+
+    go(10.42292262255703, 2.745268938513687, 0.349)
+    stick(0.51814, -0.79457, 0.2234, 0.34)
+    block.hold(367, bVelocity=0.0, bStop=1.0, rOverride=0.4019)
+    go(38.597, 13.188, 0.6043)
+    go(3.6911, 1.97157, 19.55, limits=(0.5715, 0.47625))
+    go(3.6911, 1.97157, 1.1153, limits=(0.5715, 0.47625))
+    go(12.9037, 20.0, 0.3287, limits=(0.36218, 0.3018))
+    stick(-1.2, -0.4264, 4.629, limits=(1.09, 0.9086))
+    block.hold(408, bVelocity=0.0, bStop=1.0, fVelocityLimit_x=0.3757, fVelocityLimit_y=0.3131)
+    go(1.607, 0.0, 40.6, 0.7434)
+    out = go(40.0, 4.677, 45.0)
+    assert out["fSwayLeft"][0] > 0.028
+    assert out["bDone"][-1] and out["bPromise"].all()
