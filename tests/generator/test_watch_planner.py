@@ -133,6 +133,11 @@ def test_another_state_than_a_block_has_is_refused(table):
     assert isinstance(found.fault, DeploymentError) and "holds no state of a block" in str(found.fault)
 
 
+def test_a_command_that_no_block_has_ends_nothing(table):
+    found, events = seen(table, Machine(table, [READY], altered(shifted(8, 5.0), phase=1)), 2.0)
+    assert found.fault is None and any("an event that is not known here" in event for event in events)
+
+
 def test_a_controller_that_was_started_anew_is_noticed(table):
     def restart(machine):
         machine.block = SimulatedBlock(table)

@@ -126,7 +126,8 @@ class PlannerJudge(Judge[PlannerState]):
             if before.command == state.command == TO_POSITION and (before.target != state.target).any():
                 new.append(COMMAND + TO_POSITION)
         value = {COMMAND + TO_POSITION: state.target, COMMAND + AT_VELOCITY: state.speed}
-        return [WORDS[code].format(float(value.get(code, state.position)[0])) for code in new]
+        unknown = "an event that is not known here"
+        return [WORDS.get(code, unknown).format(float(value.get(code, state.position)[0])) for code in new]
 
 
 def _codes(state: PlannerState) -> tuple[int, ...]:
