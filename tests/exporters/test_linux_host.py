@@ -133,7 +133,8 @@ def test_it_stops_where_nobody_changes_b_alive_and_at_a_second_signal_at_once(ho
             put(bAlive=1.0 - image.given[0], **changed)
             return image.rows(-1)[1 + place[name]] == value
 
-        assert image.rows(-1)[1 + place["bStop"]] == 1.0
+        first_row = until(lambda: image.rows(-1)[1:])
+        assert first_row[place["bStop"]] == 1.0
         assert until(lambda: shows("bEnabled", 1.0, bEnable=1.0))
         assert until(lambda: shows("bInVelocity", 1.0, bVelocity=1.0))
         assert until(lambda: shows("bInVelocity", 0.0, fVelocityCommand=0.5))
