@@ -143,7 +143,7 @@ class SensedHistory:
                     )
         shares_and_phases = zip([swing, *more[0]], [phase, *more[1]], strict=True)
         return cls(
-            starts=_starts(
+            starts=stated_swing(
                 spec, [(max(0.0, _stretched(a)), 2.0 * np.pi * b) for a, b in shares_and_phases], *machine
             ),
             gusts=tuple(gusts),
@@ -363,13 +363,16 @@ def _coming_and_going(lost: float, cycles: int, random: np.random.Generator) -> 
     return np.concatenate(pieces)[:cycles]
 
 
-def _starts(
+def stated_swing(
     spec: Spec,
     swings: Sequence[tuple[float, float]],
     parameters: Mapping[str, float],
     places: Sequence[float],
 ) -> dict[str, float]:
-    """Let the slowest mode swing along each axis with a sensor by a share of what is stated, at a phase."""
+    """Let the slowest mode swing along each axis with a sensor by a share of what is stated, at a phase.
+
+    Coordinates that swing by name, and their rates as ``NAME.rate``.
+    """
     plant, (_, disturbance) = spec.machine(), _stated(spec)
     at, found = linearize(plant, parameters, places), np.zeros((2, len(plant.unactuated)))
     for axis, (share, phase) in zip(sensed_directions(spec), swings, strict=True):
