@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.st_tokens import LITERALS, NO_BLOCK, Token, refused, tokens
+from gen_profile_exporters.st_tokens import LITERALS, NO_BLOCK, StToken, refused, tokens
 from gen_profile_exporters.st_variables import (
     StVariable,
     c_constants,
@@ -188,7 +188,7 @@ class _Translator:
         self.variables: dict[str, StVariable] = {}
         self.parts: list[list[str]] = []
 
-    def _found(self, *kinds: str) -> Token | None:
+    def _found(self, *kinds: str) -> StToken | None:
         """Go on if the next token is one of these; the token."""
         token = self._token
         if token.kind not in kinds:
@@ -196,7 +196,7 @@ class _Translator:
         self._token = next(self._tokens, token)
         return token
 
-    def _take(self, *kinds: str) -> Token:
+    def _take(self, *kinds: str) -> StToken:
         token = self._found(*kinds)
         if token is None:
             _, _, line, begin = self._token
@@ -218,7 +218,7 @@ class _Translator:
         return self._name, body
 
     def _declaration(self, section: str) -> None:
-        name, bounds, literals, listed = self._take("NAME"), list[int](), list[tuple[str, Token]](), False
+        name, bounds, literals, listed = self._take("NAME"), list[int](), list[tuple[str, StToken]](), False
         self._take(":")
         if self._found("ARRAY"):
             for before in ("[", ".."):
@@ -238,7 +238,7 @@ class _Translator:
         if self.variables.setdefault(name.text.lower(), variable) is not variable:
             raise refused(name, f"{name.text} is declared twice")
 
-    def _literal(self) -> tuple[str, Token]:
+    def _literal(self) -> tuple[str, StToken]:
         sign = self._found("+", "-")
         return sign.text if sign else "", self._take(*LITERALS)
 
@@ -275,7 +275,7 @@ class _Translator:
         self._take(")")
         return code
 
-    def _place(self, name: Token) -> _Code:
+    def _place(self, name: StToken) -> _Code:
         index = None
         if self._found("["):
             index = self._expression()
@@ -293,7 +293,7 @@ class _Translator:
         place = f"AT({text}, {variable.length})" if self._checked else text
         return _Code(f"{owned}[{place}]", variable.type, name.line, index.work)
 
-    def _written(self) -> tuple[Token, _Code]:
+    def _written(self) -> tuple[StToken, _Code]:
         """Read a variable that is written: no input, no constant, and no counter of a loop around."""
         name = self._take("NAME")
         code = self._place(name)
@@ -312,7 +312,7 @@ class _Translator:
     def _counted(self, work: int) -> list[str]:
         return [f"OPERATIONS({work});"] if work and self._checked else []
 
-    def _applied(self, operator: Token, *operands: _Code) -> _Code:
+    def _applied(self, operator: StToken, *operands: _Code) -> _Code:
         name, types = operator.text.upper(), [operand.type for operand in operands]
         template = self._templates.get((name, *types))
         if template is None:

@@ -39,7 +39,7 @@ _KINDS = {
 }
 
 
-class Token(NamedTuple):
+class StToken(NamedTuple):
     """A word, number or mark: its kind, its text, its line, and where in the whole text it begins.
 
     Words of the language and marks are kinds of their own. Others are ``NAME``, ``TYPE``, ``FUNCTION``,
@@ -52,7 +52,7 @@ class Token(NamedTuple):
     begin: int
 
 
-def tokens(text: str) -> Iterator[Token]:
+def tokens(text: str) -> Iterator[StToken]:
     """Divide a text, without its comments; the last token is ``END``."""
     line = 1
     for found in _PATTERN.finditer(text):
@@ -64,11 +64,11 @@ def tokens(text: str) -> Iterator[Token]:
             kind = _KINDS.get(word.upper(), "NAME")
         elif kind == "mark":
             kind = word
-        yield Token(kind, word, line, found.start())
-    yield Token("END", "", line, len(text))
+        yield StToken(kind, word, line, found.start())
+    yield StToken("END", "", line, len(text))
 
 
-def refused(place: Token | int, words: str) -> ExportError:
+def refused(place: StToken | int, words: str) -> ExportError:
     """Say what cannot be executed, and in which line."""
-    line = place.line if isinstance(place, Token) else place
+    line = place.line if isinstance(place, StToken) else place
     return ExportError(f"{NO_BLOCK}: line {line}: {words}.")

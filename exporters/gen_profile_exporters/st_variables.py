@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from gen_profile_exporters.st_tokens import LITERALS, Token, refused
+from gen_profile_exporters.st_tokens import LITERALS, StToken, refused
 
 MOST_DINT = 2**31 - 1
 _TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
@@ -39,10 +39,10 @@ class StVariable(NamedTuple):
 
 def declared(
     section: str,
-    name: Token,
+    name: StToken,
     bounds: Sequence[int],
     scalar: str,
-    literals: Sequence[tuple[str, Token]],
+    literals: Sequence[tuple[str, StToken]],
     *,
     listed: bool,
 ) -> StVariable:
@@ -52,12 +52,12 @@ def declared(
     ----------
     section : str
         ``VAR CONSTANT`` with constants.
-    name : Token
+    name : StToken
     bounds : sequence of int
         First and last index of an array; of a scalar none.
     scalar : str
         Type of an element.
-    literals : sequence of (str, Token)
+    literals : sequence of (str, StToken)
         Signs and initial values.
     listed : bool
         Whether those stand in brackets.
@@ -81,18 +81,18 @@ def declared(
     return StVariable(section, name.text, type_, length, values, lower)
 
 
-def _initial(name: Token, type_: str, sign: str, value: Token) -> str:
+def _initial(name: StToken, type_: str, sign: str, value: StToken) -> str:
     if LITERALS[value.kind] != type_ or (sign and type_ == "BOOL"):
         raise refused(value, f"{name.text} : {type_} cannot begin as {sign}{value.text}")
     return sign + c_literal(value, spare=int(sign == "-"))
 
 
-def c_literal(value: Token, spare: int = 0) -> str:
+def c_literal(value: StToken, spare: int = 0) -> str:
     """Write a literal in C: without the leading zeros of an integer, by which C counts in eights.
 
     Parameters
     ----------
-    value : Token
+    value : StToken
     spare : int
         What may be added to the greatest DINT.
 
