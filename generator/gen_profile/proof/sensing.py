@@ -5,7 +5,6 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
@@ -324,6 +323,8 @@ def _misstated(
             yield f"{uncertainty} is too small by {apart[at]:.3g} m, at {at * cycle:.2f} s"
     if fault not in SHOWS or disturbance.gust is None:
         return
+    from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
+
     cycles = np.arange(len(used))
     used[[min(round(time / cycle), len(used) - 1) for time in resets]] = False  # it forgets
     first = one.fails if fault else 0.0

@@ -1,0 +1,23 @@
+"""Points in the unit cube are those of SciPy, to the last bit."""
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from gen_profile.problem.sampling import halton, latin_hypercube
+
+
+@pytest.mark.parametrize(("points", "dimensions"), [(1, 1), (7, 3), (200, 90)])
+def test_a_latin_hypercube_is_scipy_s_and_leaves_its_generator_where_scipy_does(points, dimensions):
+    ours, theirs = np.random.default_rng(4), np.random.default_rng(4)
+    drawn = latin_hypercube(points, dimensions, ours)
+    assert np.array_equal(drawn, qmc.LatinHypercube(dimensions, seed=theirs).random(points))
+    assert ours.random() == theirs.random()
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 9])
+def test_halton_s_sequence_is_scipy_s(dimensions):
+    due = qmc.Halton(dimensions, scramble=False).random(500)
+    assert np.array_equal(halton(500, dimensions), due)
+    assert np.array_equal(halton(100, dimensions, begin=400), due[400:])
+    assert halton(0, dimensions).shape == (0, dimensions)
