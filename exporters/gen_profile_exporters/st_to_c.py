@@ -10,12 +10,16 @@ own counter, or, where only the execution shows it, one of the `FAULTS` of check
 and OR are evaluated, as by many controllers: one side is no guard for the other.
 """
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from lark import Lark, Token, Transformer
+from lark.exceptions import UnexpectedInput, VisitError
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.st_tokens import LITERALS, NO_BLOCK, StToken, refused, tokens
 from gen_profile_exporters.st_variables import (
+    NO_BLOCK,
     StVariable,
     c_constants,
     c_initials,
@@ -23,8 +27,9 @@ from gen_profile_exporters.st_variables import (
     c_member,
     declared,
     elements,
+    refused,
 )
-from gen_profile_exporters.text_parts import filled, indented
+from gen_profile_exporters.text_parts import FOLDER, filled, indented
 
 FAULTS = (
     "",
@@ -63,20 +68,6 @@ _CHECKED = {  # macros in their place
     ("ABS", "DINT"): "ROUNDED(fabs({}))",
     ("SQRT", "LREAL"): "ROOT({})",
     ("LREAL_TO_DINT", "LREAL"): "ROUNDED({})",
-}
-_RANKS = {
-    "OR": 1,
-    "AND": 2,
-    "=": 3,
-    "<>": 3,
-    "<": 4,
-    "<=": 4,
-    ">": 4,
-    ">=": 4,
-    "+": 5,
-    "-": 5,
-    "*": 6,
-    "/": 6,
 }
 _GIVES = {"LREAL_TO_DINT": "DINT", "DINT_TO_LREAL": "LREAL"}  # others but comparisons what they take
 _SAME = ("+", "-", "*", "/", "ABS", "SQRT")
@@ -168,141 +159,88 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     ExportError
         It is no function block of this subset of the language.
     """
-    translator = _Translator(text, owners, checked)
     try:
-        name, body = translator.block()
+        tree = _parser().parse(text)
+        variables = declared(tree)
+        _require_writable(tree, variables)
+        translator = _Translator(str(tree.children[0]), variables, owners, checked)
+        translated: Any = translator.transform(tree)
+    except UnexpectedInput as error:
+        place = f"line {error.line}, column {error.column}"
+        raise ExportError(f"{NO_BLOCK}: {place} is not understood.") from error
+    except VisitError as error:
+        raise error.orig_exc from error
     except RecursionError as error:
         raise ExportError("The text is nested too deeply to be executed here.") from error
-    return Statements(name, list(translator.variables.values()), body, translator.parts)
+    name, *_, body = translated.children
+    return Statements(str(name), list(variables.values()), body, translator.parts)
 
 
-class _Translator:
-    """Reads tokens one by one; expressions become `_Code`, statements lines of C."""
+@cache
+def _parser() -> Lark:
+    grammar = (FOLDER / "structured_text.lark").read_text("ascii")
+    return Lark(grammar, parser="lalr", propagate_positions=False)
 
-    def __init__(self, text: str, owners: Mapping[str, str], checked: bool) -> None:
-        self._text, self._tokens = text, tokens(text)
-        self._token = next(self._tokens)
-        self._owners, self._checked = {"VAR CONSTANT": "", **owners}, checked
+
+def _require_writable(tree: Any, variables: Mapping[str, StVariable]) -> None:
+    """Refuse that inputs and constants are written, and counters within their loops."""
+    for name in _written(tree):
+        variable = variables.get(name.lower())
+        if variable is not None and variable.section not in ("VAR", "VAR_OUTPUT"):
+            raise refused(name, f"{name} is {variable.section}, which is not written")
+    for loop in tree.find_data("count"):
+        counter, *_, body = loop.children
+        for name in _written(body):
+            if name.lower() == counter.lower():
+                raise refused(name, f"{name} counts the loop around it, which must not write it")
+
+
+def _written(tree: Any) -> Iterator[Token]:
+    """Find the names of variables that statements write."""
+    yield from (assignment.children[0].children[0] for assignment in tree.find_data("assignment"))
+    yield from (loop.children[0] for loop in tree.find_data("count"))
+
+
+class _Translator(Transformer[Token, object]):
+    """Expressions become `_Code`, statements lines of C."""
+
+    def __init__(
+        self, name: str, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool
+    ) -> None:
+        super().__init__()
+        self._name, self._variables, self._checked = name, variables, checked
+        self._owners = {"VAR CONSTANT": "", **owners}
         self._templates = _PLAIN | _CHECKED if checked else _PLAIN
-        self._name, self._counters = "", list[str]()
-        self.variables: dict[str, StVariable] = {}
         self.parts: list[list[str]] = []
 
-    def _found(self, *kinds: str) -> StToken | None:
-        """Go on if the next token is one of these; the token."""
-        token = self._token
-        if token.kind not in kinds:
-            return None
-        self._token = next(self._tokens, token)
-        return token
+    def real(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(c_literal(parts[0]), "LREAL", parts[0].line)
 
-    def _take(self, *kinds: str) -> StToken:
-        token = self._found(*kinds)
-        if token is None:
-            _, _, line, begin = self._token
-            column = begin - self._text.rfind("\n", 0, begin)
-            raise ExportError(f"{NO_BLOCK}: line {line}, column {column} is not understood.")
-        return token
+    def whole(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(c_literal(parts[0]), "DINT", parts[0].line)
 
-    def block(self) -> tuple[str, list[str]]:
-        """Read all; the block's name, and its statements in C."""
-        self._take("FUNCTION_BLOCK")
-        self._name = self._take("NAME").text
-        while kind := self._found("VAR_INPUT", "VAR_OUTPUT", "VAR"):
-            section = "VAR CONSTANT" if self._found("CONSTANT") else kind.kind
-            while not self._found("END_VAR"):
-                self._declaration(section)
-        body = self._body()
-        self._take("END_FUNCTION_BLOCK")
-        self._take("END")
-        return self._name, body
+    def truth(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(c_literal(parts[0]), "BOOL", parts[0].line)
 
-    def _declaration(self, section: str) -> None:
-        name, bounds, literals, listed = self._take("NAME"), list[int](), list[tuple[str, StToken]](), False
-        self._take(":")
-        if self._found("ARRAY"):
-            for before in ("[", ".."):
-                self._take(before)
-                bounds.append(int(c_literal(self._take("INTEGER"))))
-            self._take("]")
-            self._take("OF")
-        scalar = self._take("TYPE").text.upper()
-        if self._found(":="):
-            listed = self._found("[") is not None
-            literals.append(self._literal())
-            while listed and not self._found("]"):
-                self._take(",")
-                literals.append(self._literal())
-        self._take(";")
-        variable = declared(section, name, bounds, scalar, literals, listed=listed)
-        if self.variables.setdefault(name.text.lower(), variable) is not variable:
-            raise refused(name, f"{name.text} is declared twice")
+    def grouped(self, parts):  # type: ignore[no-untyped-def]
+        return parts[0]._replace(text=f"({parts[0].text})")
 
-    def _literal(self) -> tuple[str, StToken]:
-        sign = self._found("+", "-")
-        return sign.text if sign else "", self._take(*LITERALS)
+    def variable(self, parts):  # type: ignore[no-untyped-def]
+        return self._place(*parts)
 
-    def _expression(self, rank: int = 1) -> _Code:
-        """Read an expression of operators that bind at least so tightly."""
-        left = self._operand()
-        while _RANKS.get(self._token.kind, 0) >= rank:
-            operator = self._take(*_RANKS)
-            right = self._expression(_RANKS[operator.kind] + 1)
-            code = self._applied(operator, left, right)
-            left = code._replace(work=code.work + (left.type == "LREAL"))
-        return left
-
-    def _operand(self) -> _Code:
-        if operator := self._found("NOT", "+", "-"):
-            operand = self._operand()
-            if operand.text.startswith(operator.text):  # C has -- and ++, too
-                operand = operand._replace(text=f"({operand.text})")
-            return self._applied(operator, operand)
-        if literal := self._found(*LITERALS):
-            return _Code(c_literal(literal), LITERALS[literal.kind], literal.line)
-        if function := self._found("FUNCTION"):
-            given = self._grouped()
-            code = self._applied(function, given)
-            return code._replace(work=code.work + ("LREAL" in (code.type, given.type)))
-        if self._token.kind == "(":
-            code = self._grouped()
-            return code._replace(text=f"({code.text})")
-        return self._place(self._take("NAME"))
-
-    def _grouped(self) -> _Code:
-        self._take("(")
-        code = self._expression()
-        self._take(")")
-        return code
-
-    def _place(self, name: StToken) -> _Code:
-        index = None
-        if self._found("["):
-            index = self._expression()
-            self._take("]")
-        variable = self.variables.get(name.text.lower())
+    def _place(self, name: Token, index: _Code | None = None) -> _Code:
+        variable = self._variables.get(name.lower())
         if variable is None:
-            raise refused(name, f"{name.text} is not declared")
+            raise refused(name, f"{name} is not declared")
         if (index is None) != (variable.length == 0):
-            raise refused(name, f"{name.text} is {'an array' if variable.length else 'no array'}")
-        owned = self._owners.get(variable.section, "fb->") + variable.name
+            raise refused(name, f"{name} is {'an array' if variable.length else 'no array'}")
+        owned, line = self._owners.get(variable.section, "fb->") + variable.name, name.line or 0
         if index is None:
-            return _Code(owned, variable.type, name.line)
-        self._require(index, "DINT", f"an index of {name.text}")
+            return _Code(owned, variable.type, line)
+        self._require(index, "DINT", f"an index of {name}")
         text = f"{index.text} - {variable.lower}" if variable.lower else index.text
         place = f"AT({text}, {variable.length})" if self._checked else text
-        return _Code(f"{owned}[{place}]", variable.type, name.line, index.work)
-
-    def _written(self) -> tuple[StToken, _Code]:
-        """Read a variable that is written: no input, no constant, and no counter of a loop around."""
-        name = self._take("NAME")
-        code = self._place(name)
-        section = self.variables[name.text.lower()].section
-        if section not in ("VAR", "VAR_OUTPUT"):
-            raise refused(name, f"{name.text} is {section}, which is not written")
-        if name.text.lower() in self._counters:
-            raise refused(name, f"{name.text} counts the loop around it, which must not write it")
-        return name, code
+        return _Code(f"{owned}[{place}]", variable.type, line, index.work)
 
     @staticmethod
     def _require(code: _Code, type_: str, what: str) -> None:
@@ -312,8 +250,8 @@ class _Translator:
     def _counted(self, work: int) -> list[str]:
         return [f"OPERATIONS({work});"] if work and self._checked else []
 
-    def _applied(self, operator: StToken, *operands: _Code) -> _Code:
-        name, types = operator.text.upper(), [operand.type for operand in operands]
+    def _applied(self, operator: Token, *operands: _Code) -> _Code:
+        name, types = operator.upper(), [operand.type for operand in operands]
         template = self._templates.get((name, *types))
         if template is None:
             raise refused(operator, f"{name} does not take {' and '.join(types)}")
@@ -321,111 +259,85 @@ class _Translator:
         texts, work = [o.text for o in operands], sum(o.work for o in operands)
         return _Code(template.format(*texts), gives, operands[0].line, work)
 
-    def _condition(self) -> _Code:
-        condition = self._expression()
-        self._require(condition, "BOOL", "a condition")
-        return condition
+    def prefixed(self, parts):  # type: ignore[no-untyped-def]
+        operator, operand = parts
+        if operand.text.startswith(operator):  # C has -- and ++, too
+            operand = operand._replace(text=f"({operand.text})")
+        return self._applied(operator, operand)
 
-    def _body(self) -> list[str]:
-        """Read statements up to a word or number that begins none."""
-        lines = list[str]()
-        while self._token.kind in ("NAME", "IF", "CASE", "FOR", "WHILE"):
-            if self._found("IF"):
-                lines += self._choice()
-            elif self._found("CASE"):
-                lines += self._switch()
-            elif self._found("FOR"):
-                lines += self._count()
-            elif self._found("WHILE"):
-                lines += self._repeat()
-            else:
-                lines += self._assignment()
-            self._take(";")
-        return lines
+    def binary(self, parts):  # type: ignore[no-untyped-def]
+        left, operator, right = parts
+        code = self._applied(operator, left, right)
+        return code._replace(work=code.work + (left.type == "LREAL"))
 
-    def _assignment(self) -> list[str]:
-        _, target = self._written()
-        self._take(":=")
-        value = self._expression()
+    def call(self, parts):  # type: ignore[no-untyped-def]
+        code = self._applied(*parts)
+        return code._replace(work=code.work + ("LREAL" in (code.type, parts[1].type)))
+
+    def assignment(self, parts):  # type: ignore[no-untyped-def]
+        target, value = parts
         self._require(value, target.type, "what is assigned here")
         return [*self._counted(target.work + value.work), f"{target.text} = {value.text};"]
 
-    def _otherwise(self) -> list[str]:
-        return self._body() if self._found("ELSE") else []
+    def body(self, statements):  # type: ignore[no-untyped-def]
+        return [line for statement in statements for line in statement]
 
-    def _choice(self) -> list[str]:
-        branches = list[tuple[_Code, list[str]]]()
-        while not branches or self._found("ELSIF"):
-            condition = self._condition()
-            self._take("THEN")
-            branches.append((condition, self._body()))
-        otherwise = self._otherwise()
-        self._take("END_IF")
+    def otherwise(self, parts):  # type: ignore[no-untyped-def]
+        return parts[0]
+
+    def branch(self, parts):  # type: ignore[no-untyped-def]
+        return parts
+
+    def label(self, parts):  # type: ignore[no-untyped-def]
+        return parts[:-1], parts[-1]
+
+    def choice(self, parts):  # type: ignore[no-untyped-def]
+        *branches, otherwise = parts
         lines = self._counted(sum(condition.work for condition, _ in branches))
         word = "if"
         for condition, body in branches:
+            self._require(condition, "BOOL", "a condition")
             lines += [f"{word} ({condition.text}) {{", *self._within(body)]
             word = "} else if"
         return [*lines, *(["} else {", *self._within(otherwise)] if otherwise else []), "}"]
 
-    def _switch(self) -> list[str]:
-        selector = self._expression()
+    def switch(self, parts):  # type: ignore[no-untyped-def]
+        selector, *labels, otherwise = parts
         self._require(selector, "DINT", "what CASE takes")
-        self._take("OF")
-        labels, known = list[tuple[list[str], list[str]]](), set[str]()
-        while not labels or self._token.kind == "INTEGER":
-            labels.append((self._label(known), self._body()))
-        otherwise = self._otherwise()
-        self._take("END_CASE")
-        lines = [*self._counted(selector.work), f"switch ({selector.text}) {{"]
-        for cases, body in labels:
-            lines += [*cases, *self._within(body), "    break;"]
-        return [*lines, "default:", *self._within(otherwise), "    break;", "}"]
+        lines, known = [*self._counted(selector.work), f"switch ({selector.text}) {{"], set()
+        for numbers, body in labels:
+            for number in numbers:
+                if (case := c_literal(number)) in known:
+                    raise refused(number, f"CASE has {case} twice")
+                known.add(case)
+                lines.append(f"case {case}:")
+            lines += [*self._within(body), "    break;"]
+        return [*lines, "default:", *self._within(otherwise or []), "    break;", "}"]
 
-    def _label(self, known: set[str]) -> list[str]:
-        """Read the numbers before a branch of CASE, which must not be known yet."""
-        lines, after = list[str](), ","
-        while after == ",":
-            number = self._take("INTEGER")
-            if (case := c_literal(number)) in known:
-                raise refused(number, f"CASE has {case} twice")
-            known.add(case)
-            lines.append(f"case {case}:")
-            after = self._take(",", ":").kind
-        return lines
-
-    def _count(self) -> list[str]:
-        name, counter = self._written()
-        self._take(":=")
-        first = self._expression()
-        self._take("TO")
-        last = self._expression()
-        self._take("DO")
+    def count(self, parts):  # type: ignore[no-untyped-def]
+        name, first, last, body = parts
+        counter = self._place(name)
         for code in (counter, first, last):
             self._require(code, "DINT", "what FOR counts")
-        self._counters.append(name.text.lower())
-        body = self._within(self._body())
-        self._counters.pop()
-        self._take("END_FOR")
-        end = f"last_{name.text}_"  # a name that the language does not have
+        end = f"last_{name}_"  # a name that the language does not have
         goes_on = f"{counter.text} <= {end}{self._turn}"
         next_ = f"{counter.text} = SUM({counter.text}, 1)" if self._checked else f"++{counter.text}"
         return [
             *self._counted(first.work + last.work),
             "{",
             f"    const int32_t {end} = {last.text};",
-            *_indented([f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *body, "}"]),
+            *_indented(
+                [f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *self._within(body), "}"]
+            ),
             "}",
         ]
 
-    def _repeat(self) -> list[str]:
-        condition = self._condition()
-        self._take("DO")
-        body = self._within(self._body())
-        self._take("END_WHILE")
+    def repeat(self, parts):  # type: ignore[no-untyped-def]
+        condition, body = parts
+        self._require(condition, "BOOL", "a condition")
         counted = f"OPERATIONS({condition.work}), " if condition.work and self._checked else ""
         test = f"({counted}{condition.text}){self._turn}" if self._checked else condition.text
-        return [f"while ({test}) {{", *body, "}"]
+        return [f"while ({test}) {{", *self._within(body), "}"]
 
     def _within(self, body: list[str]) -> list[str]:
         """Indent a branch or a loop's body, or call it as a part."""

@@ -2,14 +2,18 @@
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
-from gen_profile_exporters.st_tokens import LITERALS, StToken, refused
+from lark import Token
 
+from gen_profile.errors import ExportError
+
+NO_BLOCK = "The text is no function block that can be executed here"
 MOST_DINT = 2**31 - 1
 _TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
 _AS = {"INT": "DINT"}  # as wide here as what it is mixed with
+_LITERALS = {"REAL": "LREAL", "INTEGER": "DINT", "TRUTH": "BOOL"}
 _WORDS_OF_C = re.compile(
     "auto|bool|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|"
     "long|register|restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|"
@@ -37,62 +41,62 @@ class StVariable(NamedTuple):
         return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
 
 
-def declared(
-    section: str,
-    name: StToken,
-    bounds: Sequence[int],
-    scalar: str,
-    literals: Sequence[tuple[str, StToken]],
-    *,
-    listed: bool,
-) -> StVariable:
-    """Read a declaration.
+def refused(place: Token | int, words: str) -> ExportError:
+    """Say what cannot be executed, and in which line."""
+    line = place.line if isinstance(place, Token) else place
+    return ExportError(f"{NO_BLOCK}: line {line}: {words}.")
 
-    Parameters
-    ----------
-    section : str
-        ``VAR CONSTANT`` with constants.
-    name : StToken
-    bounds : sequence of int
-        First and last index of an array; of a scalar none.
-    scalar : str
-        Type of an element.
-    literals : sequence of (str, StToken)
-        Signs and initial values.
-    listed : bool
-        Whether those stand in brackets.
+
+def declared(tree: Any) -> dict[str, StVariable]:
+    """Read all declarations of a block; by their names in lower case.
 
     Raises
     ------
     ExportError
-        The name means something in C, or initial values are not of the type, or not as many.
+        A name is declared twice or means something in C, or initial values are not of its type.
     """
-    lower, upper = bounds or (0, -1)
-    if bounds and upper < lower:
-        raise refused(name, f"{name.text} has no elements")
-    length = upper - lower + 1
-    counts = {max(1, length), max(1, length) * (section == "VAR CONSTANT")}
-    if (literals and listed != bool(bounds)) or len(literals) not in counts:
-        raise refused(name, f"{name.text} has not as many initial values as it takes")
-    if _WORDS_OF_C.fullmatch(name.text):
-        raise refused(name, f"{name.text} is a word of C; name it differently")
-    type_ = _AS.get(scalar, scalar)
-    values = tuple(_initial(name, type_, sign, value) for sign, value in literals)
-    return StVariable(section, name.text, type_, length, values, lower)
+    variables: dict[str, StVariable] = {}
+    for section in tree.find_data("section"):
+        for name, variable in _section(section):
+            if variables.setdefault(name.lower(), variable) is not variable:
+                raise refused(name, f"{name} is declared twice")
+    return variables
 
 
-def _initial(name: StToken, type_: str, sign: str, value: StToken) -> str:
-    if LITERALS[value.kind] != type_ or (sign and type_ == "BOOL"):
-        raise refused(value, f"{name.text} : {type_} cannot begin as {sign}{value.text}")
-    return sign + c_literal(value, spare=int(sign == "-"))
+def _section(tree: Any) -> Iterator[tuple[Token, StVariable]]:
+    kind, *rest = tree.children
+    constant = bool(rest) and isinstance(rest[0], Token)
+    section = "VAR CONSTANT" if constant else kind.upper()
+    for declaration in rest[constant:]:
+        name, type_, initial = declaration.children
+        *bounds, scalar = map(str, type_.children)
+        lower, upper = map(int, bounds or (0, -1))
+        if bounds and upper < lower:
+            raise refused(name, f"{name} has no elements")
+        length = upper - lower + 1
+        literals = [] if initial is None else initial.children if initial.data == "listed" else [initial]
+        whole = initial is None or (initial.data == "listed") == bool(bounds)
+        if not whole or len(literals) not in {max(1, length), max(1, length) * constant}:
+            raise refused(name, f"{name} has not as many initial values as it takes")
+        if _WORDS_OF_C.fullmatch(name):
+            raise refused(name, f"{name} is a word of C; name it differently")
+        kind = _AS.get(scalar.upper(), scalar.upper())
+        values = tuple(_initial(name, kind, *literal.children) for literal in literals)
+        yield name, StVariable(section, str(name), kind, length, values, lower)
 
 
-def c_literal(value: StToken, spare: int = 0) -> str:
+def _initial(name: Token, type_: str, sign: Token | None, value: Token) -> str:
+    if _LITERALS[value.type] != type_ or (sign is not None and type_ == "BOOL"):
+        raise refused(value, f"{name} : {type_} cannot begin as {sign or ''}{value}")
+    return (sign or "") + c_literal(value, spare=int(sign == "-"))
+
+
+def c_literal(value: Token, spare: int = 0) -> str:
     """Write a literal in C: without the leading zeros of an integer, by which C counts in eights.
 
     Parameters
     ----------
-    value : StToken
+    value : Token
     spare : int
         What may be added to the greatest DINT.
 
@@ -101,12 +105,13 @@ def c_literal(value: StToken, spare: int = 0) -> str:
     ExportError
         No variable holds it.
     """
-    if value.kind == "TRUTH" or (value.kind == "REAL" and math.isfinite(float(value.text))):
-        return value.text.lower()
-    digits = value.text.lstrip("0") or "0"
-    if value.kind == "INTEGER" and len(digits) <= 10 and int(digits) <= MOST_DINT + spare:
-        return digits
-    raise refused(value, f"no {LITERALS[value.kind]} is as great as {value.text}")
+    if value.type == "TRUTH":
+        return value.lower()
+    if value.type == "REAL" and math.isfinite(float(value)):
+        return value.lower()
+    if value.type == "INTEGER" and int(value) <= MOST_DINT + spare:
+        return str(int(value))
+    raise refused(value, f"no {_LITERALS[value.type]} is as great as {value}")
 
 
 def c_constants(variables: Iterable[StVariable], body: list[str]) -> list[str]:
