@@ -12,7 +12,7 @@ from generator.planned_machines import BAY
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.followed import ON_AVERAGE, Followed, Zone
+from gen_profile.proof.followed import WAY, Followed, Zone
 from gen_profile.proof.habits import GENTLE, ROUGH
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import LATER, WORDS, faults, measured
@@ -159,8 +159,14 @@ def idle(error=0.0):
 def test_a_block_that_obeys_has_no_fault():
     assert kinds(obedient()) == set()
     met = {one.what: one.needed for one in measured(obedient(), REACTIONS)}
-    assert met[LATER[POSITION]] == pytest.approx((7.2 - 1.1 * 5.0 - 2.0 - 0.1) / 2.0 - ON_AVERAGE[POSITION])
-    assert met[LATER[STOP]] == pytest.approx((2.2 - 1.6 - 0.1) / 2.0 - ON_AVERAGE[STOP])
+    assert met[LATER[POSITION]] == pytest.approx((7.2 - 1.1 * 5.0 - 2.0 - 0.1) / 2.0)
+    assert met[LATER[VELOCITY]] == pytest.approx((2.2 - 1.6 - 0.1) / 2.0)
+    assert met[LATER[STOP]] == pytest.approx((2.2 - 1.6 - 0.1) / 2.0)
+    assert LATER[WAY] not in met
+    again = with_orders(REST, attrs.evolve(MOVE, end=250), attrs.evolve(MOVE, begin=250), STICKS, STOPS)
+    met = {one.what: one.needed for one in measured(again, REACTIONS)}
+    limits = 1.1 * (5.0 - 0.25 * 1.3**2) + (1.0 + 0.65) / 0.5 + 0.1
+    assert met[LATER[WAY]] == pytest.approx((8.2 - 2.5 - limits) / 2.0)
 
 
 REST, MOVE, STICKS, STOPS = obedient().orders

@@ -29,11 +29,13 @@ FAULTS = (
     "dead",
     "late",
     "drop-outs",
+    "away",
 )
-NOTICED = ("silent", "no number", "out of range")  # others are noticed where they do harm
+NOTICED = ("silent", "away", "no number", "out of range")  # others are noticed where they do harm
 SHOW_NOTHING = ("frozen",)  # from the first value on, and nothing is promised then
 SHORTEST = 0.5  # s, of a gust
 LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
+AWAY = 2.0  # of the same time, for which one is silent that comes back
 NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
 JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
 FAR_OUT = 1e3  # of the same
@@ -213,6 +215,8 @@ class SensedHistory:
         match self.fault if place == self.failing else "":
             case "silent":
                 valid[first:] = 0.0
+            case "away":
+                valid[first : first + round(AWAY * sensor.drop_out / cycle)] = 0.0
             case "no number":
                 added[first:] = np.nan
             case "out of range":
@@ -282,6 +286,8 @@ def sensor_faults(
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
             yield from _faults_of_a_faulty_one(spec, one, run, (at if noticed.any() else None, sway), cycle)
+            if fault == "away" and noticed[-1]:
+                yield f"a sensor that is back is not used again, from {one.fails:.2f} s"
         elif noticed.any():
             yield (
                 f"a sound sensor is taken for a faulty one ({axis.of('nSensorFault')} "
