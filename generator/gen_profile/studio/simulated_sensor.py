@@ -7,6 +7,7 @@ import numpy as np
 
 from gen_profile.evaluation.simulation import equations_of
 from gen_profile.motion.profile import Array
+from gen_profile.planner.machine import sensed_directions, shown_by_sensors
 from gen_profile.spec.model import Spec
 
 NOISIER, FARTHER, LATER, GREATER = 10.0, 4.0, 3.0, 2.0  # than stated, at most; a scale
@@ -27,7 +28,8 @@ class SimulatedSensor:
     def __init__(self, spec: Spec, cycle: float) -> None:
         sensor = spec.planner.sensor
         assert sensor is not None
-        self._sensor, self._plant, self._cycle = sensor, spec.machine(), cycle
+        self._spec, self._plant, self._cycle = spec, spec.machine(), cycle
+        self._in_order = np.argsort(list(sensed_directions(spec)))  # of the block's axes
         offset, delay = sensor.offset or sensor.noise, sensor.delay
         self._ranges = {
             "noise": (0.0, NOISIER * sensor.noise),
@@ -38,7 +40,7 @@ class SimulatedSensor:
         self._set = {"noise": sensor.noise, "offset": 0.0, "age": sum(delay) / 2.0, "scale": 1.0}
         self._heard = True  # whether there is news of it
         self._kept = round(self._ranges["age"][1] / cycle) + 1
-        self._true = np.zeros((0, len(sensor.names)))
+        self._true = np.zeros((0, len(self._in_order)))
         self._random = np.random.default_rng(0)
 
     @property
@@ -86,12 +88,6 @@ class SimulatedSensor:
         axes : (cycles, axes) array
         parameters : (1, parameters) array
         """
-        names = [coordinate.name for coordinate in self._plant.unactuated]
-        if self._sensor.quantity == "sway":
-            loads = equations_of(self._plant)[1](states[0], axes, parameters)[:, : len(self._plant.loads), 0]
-            seen = loads[:, [list(self._plant.loads).index(load) for load in self._sensor.names]]
-        else:
-            seen = states[int(self._sensor.quantity == "rate")][
-                :, [names.index(of) for of in self._sensor.names]
-            ]
+        sway = equations_of(self._plant)[1](states[0], axes, parameters)[:, : len(self._plant.loads), 0]
+        seen = shown_by_sensors(self._spec, states[0], states[1], sway)[:, self._in_order]
         self._true = np.concatenate([self._true, seen])[-self._kept :]

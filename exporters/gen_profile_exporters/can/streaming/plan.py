@@ -88,6 +88,9 @@ class SetpointSource(Protocol):
     def step(self, cycle: int) -> Step | None:
         """Give the setpoints of a cycle, or None where the motion is over; the numbers never fall."""
 
+    def take(self, message: can.Message) -> None:
+        """Take in what any node sends meanwhile."""
+
     def end(self) -> bool:
         """End the motion early without sway, if that is possible."""
 
@@ -145,6 +148,9 @@ class StreamPlan:
     def step(self, cycle: int) -> Step | None:
         """Give the setpoints of a cycle, or None behind the last."""
         return self._step(cycle) if cycle < len(self.cycles) else None
+
+    def take(self, message: can.Message) -> None:
+        """Know everything beforehand."""
 
     def end(self) -> bool:
         """End nowhere but at its own end."""
