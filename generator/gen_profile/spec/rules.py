@@ -127,7 +127,7 @@ def _can_sensor(frames: CanSensorSpec, sensor: SensorSpec | None) -> Iterator[Fa
     if sensor is None:
         yield "can.sensor", "only with planner.sensor; state that, or remove it"
     elif len(frames.byte) != len(sensor.names):
-        template = "must have {count} numbers, one for each of planner.sensor.of"
+        template = "must have {count} numbers, one for each sensor"
         yield "can.sensor.byte", Phrase(template, count=len(sensor.names)), "planner.sensor.of"
     if max(frames.byte, default=0) + SENSOR_BYTES[frames.type] > FRAME_BYTES:
         template = "{type} would end beyond the {most} bytes of a frame"
