@@ -205,6 +205,7 @@ FAULTS = {
     "taken over": disabled(steps=np.full((1, CYCLES), 0.1)),
     QUICK_STOP: with_orders(REST, attrs.evolve(MOVE, end=500), order(500, CYCLES, QUICK_STOP)),
     "jump": with_orders(REST, attrs.evolve(MOVE, end=500), order(500, CYCLES, QUICK_STOP), moved=0.001),
+    "no way": with_zone(),
     "disabled": with_output("bEnabled", 300, 0.0),
     "distance": with_output("fDistanceToGo", 300, 1.0),
     "time": with_output("fTimeToGo", slice(720, 820), 3.0),
