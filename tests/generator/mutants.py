@@ -333,7 +333,7 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
     "wide": parse_spec(
         GANTRY,
         [
-            *(CYCLE, "planner.operations=6000", "planner.zones=true"),
+            *(CYCLE, "planner.operations=6000", "planner.zones=true", "planner.sway_share=0.0"),
             "limits.axis.x={velocity=1.5, acceleration=0.12, jerk=1.0, travel=[0.0, 40.0]}",
             "limits.axis.y={velocity=1.0, acceleration=0.1, jerk=1.0, travel=[0.0, 20.0]}",
         ],

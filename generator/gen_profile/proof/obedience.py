@@ -80,6 +80,7 @@ WORDS = {
     "wrong error": "nErrorId does not tell the error that there is, or one without a cause",
     "disabled": "bEnabled is not what bEnable asks for",
     "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
+    "no way": "a target is kept behind a blocked interval",
     "zone": "nZone is not the number of the blocked interval",
     "taken over": "a setpoint is not where the axis is taken over by {needed:.3g} m",
     QUICK_STOP: "a quick stop ends later than allowed by {over:.3g} s",

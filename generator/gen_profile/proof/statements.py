@@ -52,6 +52,7 @@ UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as gi
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
+TAKEN_UP = 2  # cycles, in which a blocked interval is
 SHOWN = (10, 20, 21, 22, *range(50, 60), *range(60, 67), 70)  # codes of events that other outputs show, too
 COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
 PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
@@ -336,6 +337,14 @@ def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         above = place >= zone.high - EXACT
         leads = np.where(above, zone.high - low[zone.axis, own], high[zone.axis, own] - zone.low)
         yield from greatest("blocked", leads * guided, EXACT, begin)
+    kept = motion.guided & motion.goes & followed.received.holds
+    for zone in followed.zones:
+        own = slice(zone.begin, zone.end if not zone.limit else 0)
+        place, goal = motion.position[zone.axis, own], (motion.position + motion.way)[zone.axis, own]
+        ahead = (place <= zone.low) & (goal > zone.low + EXACT)
+        behind = (place >= zone.high) & (goal < zone.high - EXACT)
+        for begin, end in runs_of(kept[own] & (ahead | behind)):
+            yield Allowance("no way", own.start + begin, end - begin, TAKEN_UP)
     if followed.zones:
         wrong = followed.issued["nErrorId"] == BLOCKED
         for at in np.flatnonzero(np.diff(wrong, prepend=False) & wrong).tolist():
