@@ -158,11 +158,14 @@ def quick(tmp_path_factory):
 
 
 @pytest.fixture
-def _little_work(quick, monkeypatch):
+def _little_work(monkeypatch):
     """Try no harder to prove a forgery than what it was made of takes."""
-    monkeypatch.setattr("gen_profile_recheck.enclosure.MORE", (2,))
     monkeypatch.setattr("gen_profile_recheck.halving.MOST_PARTS", 200)
-    check(*contents(*quick))
+
+
+@pytest.mark.usefixtures("_little_work")
+def test_little_work_proves_what_forgeries_are_made_of(quick):
+    assert check(*contents(*quick)).startswith("Proved of all machines with J")
 
 
 @pytest.mark.slow
