@@ -16,7 +16,7 @@ from gen_profile_recheck.reading import read_json
 
 SPECS = [
     ("single-pendulum-crane", "export.cycle_time=0.01", "robustness.uncertain={L0=0.02}"),
-    ("slosh-tank", "export.cycle_time=0.02"),
+    ("slosh-tank", "robustness.uncertain={h=0.0005}", "export.cycle_time=0.02"),
 ]
 PLACE, PIECES, STEPS = -1, 4, 4  # of the parameter; how many pieces, and steps from setpoint to setpoint
 
