@@ -20,17 +20,23 @@ from typing import Any
 from flint import arb, arb_mat, arb_poly, arb_series, ctx
 
 from gen_profile_recheck.axes import AxisPiece
-from gen_profile_recheck.machines import Machine
+from gen_profile_recheck.jets import along, moved, parts_of
+from gen_profile_recheck.machines import INNER, Machine, carried
 
 Values = list[Any]
 
 
 @dataclass
 class MachineState:
-    """All that equations depend on: state and slope, axes with derivatives, constants, parameters' places."""
+    """All that equations depend on: states, axes with derivatives, constants, parameters' places.
+
+    States are x = (q, w), and y = (q, dq) with its slope in time.
+    """
 
     x: Values
+    y: Values
     slope: Values
+    lifts: Sequence[Values]  # D
     axes: Sequence[Values]  # position, velocity, acceleration
     k: SimpleNamespace
     places: Values
@@ -104,6 +110,16 @@ def node_values(terms: tuple[int, ...], counts: tuple[int, ...]) -> arb_mat:
 
 
 @cache
+def _greatest(counts: tuple[int, ...], variable: int | None, terms: int) -> arb_mat:
+    """Matrix with what products of Chebyshev's polynomials, or terms of their series, are at most."""
+    numbered = enumerate(counts, start=1)
+    return kronecker(
+        in_powers(one, 1, terms).transpose() if number == variable else arb_mat([[1]] * one)
+        for number, one in numbered
+    )
+
+
+@cache
 def interpolation(count: int) -> arb_mat:
     """Matrix from values at nodes to coefficients."""
     return node_values((count,), (count,)).inv().transpose()
@@ -165,28 +181,26 @@ class MotionPiece:
 
     def at_nodes(self, counts: tuple[int, ...], terms: int) -> Iterator[MachineState]:
         """Take series of time at every node of the parameters."""
-        ctx.cap = terms
+        ctx.cap, n = terms + 1, len(self.series) // 2  # a slope takes a term
         at = [in_powers(one.nrows()) * one * node_values(self.box.terms, counts) for one in self.series]
         columns = [one.transpose().tolist() for one in at]
-        axes = self._axes(lambda poly: arb_series(poly.coeffs(), terms))
+        axes = self._axes(lambda poly: arb_series(poly.coeffs(), terms + 1))
         for number, places in enumerate(product(*map(nodes, counts))):
-            x = [arb_series(column[number], terms) for column in columns]
-            slope = [
-                arb_series(arb_poly(column[number]).derivative().coeffs(), terms) / self.half
-                for column in columns
-            ]
-            key = counts, number, terms
-            yield MachineState(x, slope, axes, self.box.constants(places, key), list(places), key)
+            key, x = (counts, number), [arb_series(column[number], terms + 1) for column in columns]
+            k = self.box.constants(places, key)
+            lifts = self.box.machine.input_matrix(x[:n], axes[0], k)
+            y = x[:n] + carried(x[n:], lifts, axes[1])
+            slope = [one.derivative() / self.half for one in y]
+            yield MachineState(x, y, slope, lifts, axes, k, list(places), key)
 
     def around(self, variable: int | None = None, terms: int = 1) -> MachineState:
         """Take all times and parameters: balls, or series of one of them (0 is time) about any place."""
-        ctx.cap = terms
-        weights, places, x, slope = list[arb_mat](), Values(), Values(), Values()
-        for number, count in enumerate(self.box.terms, start=1):
-            own = number == variable
-            weights.append(in_powers(count, 1, terms).transpose() if own else arb_mat([[1]] * count))
-            places.append(arb_series([wide(1), 1], terms) if own else wide(1))
-        times, parameters = self.series[0].nrows(), kronecker(weights)
+        ctx.cap, n = terms, len(self.series) // 2
+        x, slope, times = Values(), Values(), self.series[0].nrows()
+        places: Values = [wide(1) for _ in self.box.terms]
+        if variable:
+            places[variable - 1] = arb_series([wide(1), 1], terms)
+        parameters = _greatest(self.box.terms, variable, terms)
         time = arb_mat([[1] * times, [k * k for k in range(times)]])
         if variable == 0:
             time = in_powers(times, 1, terms + 1)
@@ -207,29 +221,45 @@ class MotionPiece:
             lambda poly: arb_series(poly(whole).coeffs(), terms) if variable == 0 else poly(wide(1))
         )
         key = variable, terms
-        return MachineState(x, slope, axes, self.box.constants(places, key), places, key)
+        a, v, dv = axes
+        timed, k = (
+            [moved(*each, INNER) for each in ((x, slope), (a, v), (v, dv))],
+            self.box.constants(places, key),
+        )
+        speed = self.box.machine.speed(timed[0], timed[1], timed[2], k)
+        y, slope = (
+            x[:n] + [parts_of(one)[0] for one in speed],
+            slope[:n] + [along(one, INNER) for one in speed],
+        )
+        return MachineState(x, y, slope, self.box.machine.input_matrix(x[:n], a, k), axes, k, places, key)
 
     def enclosed(
-        self, function: Callable[[MachineState], Values], terms: int, counts: tuple[int, ...]
+        self, function: Callable[[MachineState], Values], fits: Callable[[list[arb]], bool], most: int = 20
     ) -> list[Expansion]:
-        """Enclose functions of the motions, by terms of time and nodes of parameters."""
-        rows = [[_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(counts, terms)]
-        rests, amplified = [arb(0)] * len(rows[0]), arb(1)
-        for variable, count in [*enumerate(counts, start=1), (0, terms)]:
-            late = [
-                _coefficients(one, count + 1)[count] for one in function(self.around(variable, count + 1))
-            ]
-            factor = amplified * (arb(2) ** (1 - count) if variable else 1)
-            rests = [rest + abs(one) * factor for rest, one in zip(rests, late, strict=True)]
+        """Enclose functions of the motions, with as many terms of each variable as what they miss fits."""
+        counts, rests, amplified = list[int](), [], arb(1)
+        for variable in [*range(1, 1 + len(self.box.terms)), 0]:
+            late = [_coefficients(one, most + 1) for one in function(self.around(variable, most + 1))]
+            for count in range(1, most + 1):
+                factor = amplified * (arb(2) ** (1 - count) if variable else 1)
+                if fits(missed := [abs(one[count]) * factor for one in late]):
+                    break
+            counts.append(count)
+            rests.append(missed)
             amplified *= 1 + 2 / pi * log(count) + 1e-9
-        tables = ([row[output] for row in rows] for output in range(len(rests)))
+        *nodes, terms = counts
+        rows = [
+            [_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(nodes), terms)
+        ]
         return [
-            Expansion(_interpolated(table, terms, counts), (terms, *counts), rest.abs_upper())
-            for table, rest in zip(tables, rests, strict=True)
+            Expansion(
+                _interpolated(list(table), terms, nodes), (terms, *nodes), sum(rest, start=arb(0)).abs_upper()
+            )
+            for table, rest in zip(zip(*rows, strict=True), zip(*rests, strict=True), strict=True)
         ]
 
 
-def _interpolated(table: Values, terms: int, counts: tuple[int, ...]) -> arb_mat:
+def _interpolated(table: Values, terms: int, counts: Sequence[int]) -> arb_mat:
     """Take powers of time at nodes for coefficients, one variable after the other, the last one first."""
     entries = [one for row in table for one in row]
     for matrix in (from_powers(terms), *map(interpolation, reversed(counts))):

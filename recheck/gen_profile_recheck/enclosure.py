@@ -17,11 +17,12 @@ from gen_profile_recheck.boxes import MachineState, MotionPiece, Values, wide
 from gen_profile_recheck.disturbance import Disturbance
 from gen_profile_recheck.halving import keeps
 from gen_profile_recheck.jets import derivatives
+from gen_profile_recheck.machines import carried
 from gen_profile_recheck.reading import NotProvedError, require
-from gen_profile_recheck.scales import ScaleMatrix, multiplied, norm
+from gen_profile_recheck.scales import Matrix, ScaleMatrix, norm
 
-TERMS, FEW_TERMS = 16, 8  # of power series in time: for the defect and sway, and for μ
-FEWER, MORE = 2, 6  # nodes than terms in each parameter, for the defect, and where that is not enough
+MISSED = 2.0**-11  # of a bound, that all that series leave out may be worth
+GROWTH = 2.0**-4  # by whose exponential errors may grow for what series of the growth leave out
 ATTEMPTS, WIDER = 12, 2
 
 
@@ -43,23 +44,15 @@ def prove(
     ------
     NotProvedError
     """
-    try:
-        _prove(pieces, scales, start, claims, FEWER)
-    except NotProvedError:
-        _prove(pieces, scales, start, claims, MORE)
-
-
-def _prove(
-    pieces: Sequence[MotionPiece], scales: Any, start: Sequence[float], claims: Sequence[SwayClaim], more: int
-) -> None:
     error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
+    least, span = min(claim.bound for claim in claims), sum((2 * one.half for one in pieces), start=arb(0))
     for number, piece in enumerate(pieces):
         if 0 < number < len(scales):
             before, scale = scale, ScaleMatrix(piece, scales[number])
             error *= scale.change(before)
-        proof = PieceProof(piece, scale, [claim for claim in claims if number >= claim.first])
+        proof = PieceProof(piece, scale, [claim for claim in claims if number >= claim.first], least, span)
         error += scale.length(proof.beside.leap(_leap(pieces, number, start), at_start=number == 0))
-        error = proof.error_after(error, more)
+        error = proof.error_after(error)
 
 
 def _leap(pieces: Sequence[MotionPiece], number: int, start: Sequence[float]) -> list[arb]:
@@ -76,39 +69,55 @@ def _leap(pieces: Sequence[MotionPiece], number: int, start: Sequence[float]) ->
 
 
 class PieceProof:
-    """The proof for a piece."""
+    """The proof for a piece, where series may miss little of the least bound and over the span of time."""
 
-    def __init__(self, piece: MotionPiece, scale: ScaleMatrix, claims: Sequence[SwayClaim]) -> None:
+    def __init__(
+        self, piece: MotionPiece, scale: ScaleMatrix, claims: Sequence[SwayClaim], least: float, span: arb
+    ) -> None:
         self.piece, self.scale, self.claims, self.beside = piece, scale, claims, Disturbance(piece)
         self.machine, self.n = piece.box.machine, len(piece.series) // 2
+        lever = reduce(arb.max, self._away([arb(0)] * 2 * self.n, arb(1)))
+        self.room, self.least, self.span = least / lever / span, least, span
 
-    def error_after(self, error: arb, more: int) -> arb:
+    def error_after(self, error: arb) -> arb:
         """Bound the error at the end by that at the beginning, and all sways.
 
         Raises
         ------
         NotProvedError
         """
-        fine = tuple(count + more for count in self.piece.box.terms)
-        outputs = self.piece.enclosed(self._defect_and_sways, TERMS, fine)
-        defect = [wide(one.size) for one in outputs[: 2 * self.n]]
+        outputs = self.piece.enclosed(self._defect_and_sways, self._misses_little)
+        defect = self.beside.in_rates([wide(one.size) for one in outputs[: 2 * self.n]], -1)
         lengths = (self.scale.length(self.beside.in_rates(one)) for one in [defect, *self.beside.terms])
         error, greatest, off = self._step(error, sum(lengths, start=arb(0)) * 2 * self.piece.half)
+        away = self._away(off, greatest)
         for claim, sway in zip(self.claims, outputs[2 * self.n :], strict=True):
-            away = self._away(claim.loads, off, greatest)
-            room = claim.bound - norm(away)
-            kept = room > 0 and keeps(sway, (room if len(away) == 1 else room * room).lower())
+            room = claim.bound - norm(away[claim.loads])
+            single = len(away[claim.loads]) == 1
+            kept = room > 0 and keeps(sway, (room if single else room * room).lower())
             require(kept, f"a sway is not bounded by {1e3 * claim.bound:.6g} mm")
         return error
 
     def _defect_and_sways(self, s: MachineState) -> Values:
-        a, v, _ = s.axes
-        entries = [one - two for one, two in zip(s.slope, self.machine.rate(s.x, a, v, s.k), strict=True)]
-        sways = self.machine.sway(s.x[: self.n], a, s.k)
+        q, dq = s.y[: self.n], s.y[self.n :]
+        a, v, dv = s.axes
+        rates = dq + carried(self.machine.drift(q, dq, a, v, s.k), s.lifts, dv)
+        entries = [one - two for one, two in zip(s.slope, rates, strict=True)]
+        sways = self.machine.sway(q, a, s.k)
         for claim in self.claims:
             own = sways[claim.loads]
             entries.append(own[0] if len(own) == 1 else sum(one * one for one in own))
         return entries
+
+    def _misses_little(self, missed: Sequence[arb]) -> bool:
+        """Tell whether what series of the defect and sways miss is little beside bounds."""
+        length = self.scale.length(missed[: 2 * self.n])
+        return length < MISSED * self.room and all(
+            one < MISSED * self.least**2 for one in missed[2 * self.n :]
+        )
+
+    def _grows_little(self, missed: Sequence[arb]) -> bool:
+        return all(one * 2 * self.n * self.span < GROWTH for one in missed)
 
     def _step(self, error: arb, source: arb) -> tuple[arb, arb, list[arb]]:
         """Assume that errors keep below something, and prove it: the last, the greatest, of all entries."""
@@ -132,27 +141,27 @@ class PieceProof:
         n, indices = self.n, range(2 * self.n)
         tube = [one + two for one, two in zip(off, self.beside.in_rates(self.beside.shift), strict=True)]
 
-        def symmetric(s: MachineState) -> Values:
-            a, v, _ = s.axes
-            y = s.x[:n] + self.machine.speed(s.x, a, v, s.k)
-            y = [one + two for one, two in zip(y, tube, strict=True)]
+        def matrix(s: MachineState) -> Matrix:
+            y = [one + two for one, two in zip(s.y, tube, strict=True)]
             lower = derivatives(lambda q, dq: self.machine.bend(q, dq, s.axes, s.k), y[:n], y[n:])
-            to, back = self.scale.at(s)
-            matrix = [[int(i + n == j) for j in indices] for i in range(n)] + lower
-            changed = multiplied(multiplied(to, matrix), back)
+            return [[int(i + n == j) for j in indices] for i in range(n)] + lower
+
+        def symmetric(s: MachineState) -> Values:
+            changed = self.scale.times(matrix(s), s)
             return [(changed[i][j] + changed[j][i]) / arb(2) for i in indices for j in indices if j <= i]
 
-        found = iter(self.piece.enclosed(symmetric, FEW_TERMS, self.piece.box.terms))
+        found = iter(self.piece.enclosed(symmetric, self._grows_little, 12))
         entry = {(i, j): next(found) for i in indices for j in indices if j <= i}
         sides = ([entry[max(i, j), min(i, j)].size for j in indices if j != i] for i in indices)
-        return reduce(arb.max, (sum(row, start=entry[i, i].upper) for i, row in enumerate(sides)))
+        greatest = reduce(arb.max, (sum(row, start=entry[i, i].upper) for i, row in enumerate(sides)))
+        return greatest + self.scale.gap * self.scale.size(matrix(self.beside.state))
 
-    def _away(self, loads: slice, off: Sequence[arb], error: arb) -> list[arb]:
-        """Bound by how much sways differ from those of the approximate motion."""
+    def _away(self, off: Sequence[arb], error: arb) -> list[arb]:
+        """Bound by how much sways of all loads differ from those of the approximate motion."""
         beside, k, q = self.beside, self.beside.state.k, self.beside.near(off)[: self.n]
-        gains = derivatives(lambda q, a: self.machine.sway(q, a, k)[loads], q, beside.axes[0])
+        gains = derivatives(lambda q, a: self.machine.sway(q, a, k), q, beside.axes[0])
         known = [*beside.shift[: self.n], *(wide(axis.gap.most) for axis in self.piece.axes)]
-        changed = multiplied([row[: self.n] for row in gains], self.scale.inverse[: self.n])
+        changed = self.scale.per_length([row[: self.n] for row in gains])
         still = ([abs(arb(one)) * abs(two) for one, two in zip(row, known, strict=True)] for row in gains)
         return [
             (norm([arb(one) for one in row]) * error + sum(sizes, start=arb(0))).abs_upper()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
 from flint import arb, arb_mat, arb_poly
@@ -39,12 +40,16 @@ def _steepest(one: Expansion) -> int:
 def _half(one: Expansion, axis: int, side: int) -> Expansion:
     if axis == 0:
         return Expansion(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
-    matrix = kronecker(
-        _halving(count, side if number == axis else 0) for number, count in enumerate(one.counts[1:], start=1)
-    )
-    return Expansion(one.coefficients * matrix.transpose(), one.counts, one.rest)
+    return Expansion(one.coefficients * _halving_one(one.counts[1:], axis, side), one.counts, one.rest)
 
 
+@cache
+def _halving_one(counts: tuple[int, ...], axis: int, side: int) -> arb_mat:
+    sides = (side if number == axis else 0 for number in range(1, 1 + len(counts)))
+    return kronecker(map(_halving, counts, sides)).transpose()
+
+
+@cache
 def _halving(count: int, side: int) -> arb_mat:
     """Matrix from Chebyshev coefficients on −1 … 1 to those on a half of it, or with 0 on all of it."""
     inner, columns = arb_poly([arb(side) / 2, arb(1) / (2 if side else 1)]), []

@@ -28,7 +28,7 @@ class Jet:
     def __add__(self, other: Scalar) -> Jet:
         """Add."""
         parts = dict(self.parts)
-        for key, value in _parts(other).items():
+        for key, value in parts_of(other).items():
             parts[key] = parts[key] + value if key in parts else value
         return Jet(parts)
 
@@ -68,7 +68,8 @@ class Jet:
     __rmul__ = __mul__
 
 
-def _parts(x: Scalar) -> dict[int, Scalar]:
+def parts_of(x: Scalar) -> dict[int, Scalar]:
+    """List the parts of a jet, or of another number its only one."""
     return x.parts if isinstance(x, Jet) else {0: x}
 
 
@@ -97,8 +98,9 @@ def inverse(x: Scalar) -> Scalar:
 def sine_cosine(x: Scalar) -> tuple[Scalar, Scalar]:
     """Give sine and cosine, by their series of Taylor."""
     if not isinstance(x, Jet):
-        return x.sin(), x.cos()
-    sine, cosine = x.parts[0].sin(), x.parts[0].cos()
+        sine, cosine = x.sin_cos()
+        return sine, cosine
+    sine, cosine = x.parts[0].sin_cos()
     found, factor = (Jet({0: sine}), Jet({0: cosine})), arb(1)
     slopes = cycle([(cosine, -sine), (-sine, -cosine), (-cosine, sine), (sine, cosine)])
     for order, (power, pair) in enumerate(zip(_powers(x), slopes, strict=False), start=1):
@@ -112,14 +114,14 @@ def moved(values: Sequence[Scalar], directions: Sequence[Scalar], unit: int) -> 
     return [
         one
         if isinstance(way, int) and way == 0
-        else Jet({**_parts(one), **{key | unit: value for key, value in _parts(way).items()}})
+        else Jet({**parts_of(one), **{key | unit: value for key, value in parts_of(way).items()}})
         for one, way in zip(values, directions, strict=True)
     ]
 
 
 def along(x: Scalar, unit: int) -> Scalar:
     """Take what a unit multiplies."""
-    parts = {key ^ unit: value for key, value in _parts(x).items() if key & unit}
+    parts = {key ^ unit: value for key, value in parts_of(x).items() if key & unit}
     return 0 if not parts else parts[0] if parts.keys() == {0} else Jet(parts)
 
 

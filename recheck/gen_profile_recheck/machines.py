@@ -42,21 +42,19 @@ class Machine:
     def speed(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give dq of x = (q, w), where w = dq − D v does not leap when v does."""
         q, w = x[: len(x) // 2], x[len(x) // 2 :]
-        return [one + _product(row, v) for one, row in zip(w, self.input_matrix(q, a, k), strict=True)]
+        return carried(w, self.input_matrix(q, a, k), v)
 
     def rate(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give ẋ."""
         q, dq = x[: len(x) // 2], self.speed(x, a, v, k)
-        carried = self.input_matrix(moved(q, dq, INNER), moved(a, v, INNER), k)
-        drift = self.drift(q, dq, a, v, k)
-        changes = [[along(one, INNER) for one in row] for row in carried]
-        return dq + [one - _product(row, v) for one, row in zip(drift, changes, strict=True)]
+        later = self.input_matrix(moved(q, dq, INNER), moved(a, v, INNER), k)
+        changes = [[along(one, INNER) for one in row] for row in later]
+        return dq + carried(self.drift(q, dq, a, v, k), changes, [-one for one in v])
 
     def bend(self, q: Values, dq: Values, axes: Sequence[Values], k: SimpleNamespace) -> list[Scalar]:
         """Give q̈, of axes with position, velocity and acceleration."""
         a, v, dv = axes
-        rows = zip(self.drift(q, dq, a, v, k), self.input_matrix(q, a, k), strict=True)
-        return [one + _product(row, dv) for one, row in rows]
+        return carried(self.drift(q, dq, a, v, k), self.input_matrix(q, a, k), dv)
 
     def in_rates(self, q: Values, change: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give the change of (q, dq) for one of x, and with −v the other way round."""
@@ -64,6 +62,11 @@ class Machine:
         rows = self.input_matrix(moved(q, change[:n], OUTER), a, k)
         carried = (along(_product(row, v), OUTER) for row in rows)
         return [*change[:n], *(one + other for one, other in zip(change[n:], carried, strict=True))]
+
+
+def carried(values: Values, matrix: Sequence[Values], v: Values) -> list[Scalar]:
+    """Add a matrix times a vector to values."""
+    return [one + _product(row, v) for one, row in zip(values, matrix, strict=True)]
 
 
 def _product(row: Values, v: Values) -> Scalar:

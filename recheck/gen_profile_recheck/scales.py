@@ -1,4 +1,4 @@
-"""S, by which errors are measured: a polynomial of the parameters, and its inverse."""
+"""S, by which errors are measured: a polynomial of the parameters, and nearly its inverse."""
 
 from __future__ import annotations
 
@@ -10,69 +10,102 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from gen_profile_recheck.boxes import MachineState, MotionPiece, Values, chebyshev_value, first, wide
+from gen_profile_recheck.boxes import (
+    MachineState,
+    MotionPiece,
+    Values,
+    chebyshev_value,
+    interpolation,
+    kronecker,
+    nodes,
+    wide,
+)
+from gen_profile_recheck.reading import require
 
-NODES = 7  # of each parameter for the inverse of S
+NODES = 5  # of each parameter for K
+MISSED = 2.0**-20  # of 1, that series of S K may leave out
 Matrix = Sequence[Sequence[Any]]
 
 
+class PolynomialMatrix:
+    """A matrix of polynomials of the parameters, with so many terms in each; `most` encloses its entries."""
+
+    def __init__(self, entries: Any, counts: Sequence[int]) -> None:
+        self.entries, self.degrees = entries, list(product(*map(range, counts)))
+        self.known = dict[Any, Matrix]()
+        self.most = [[wide(sum(map(abs, map(arb, one)), start=arb(0))) for one in row] for row in entries]
+
+    def at(self, places: Sequence[Any], key: Any) -> Matrix:
+        """Evaluate at places of the parameters; entries that are nothing are 0."""
+        if key not in self.known:
+            basis = [prod(map(chebyshev_value, each, places), start=arb(1)) for each in self.degrees]
+            pairs = ([zip(basis, entry, strict=True) for entry in row] for row in self.entries)
+            self.known[key] = [
+                [sum((x * arb(y) for x, y in one if y), start=0) for one in row] for row in pairs
+            ]
+        return self.known[key]
+
+
 class ScaleMatrix:
-    """S, enclosures of the entries of its inverse, and bounds of that one's rows."""
+    """S, and a polynomial K of the parameters with nearly S K = 1, by which no inverse is needed.
+
+    S⁻¹ = K (S K)⁻¹, and so |M S⁻¹| ≤ |M K| / (1 − gap) for any M, where |S K − 1| ≤ `gap`. `rows` bounds the
+    rows of S⁻¹.
+    """
 
     def __init__(self, piece: MotionPiece, entries: Sequence[Sequence[Sequence[float]]]) -> None:
-        self.piece, self.entries, self.known = piece, entries, dict[Any, Any]()
-        self.counts = tuple(1 if len(entries[0][0]) == 1 else min(3, terms) for terms in piece.box.terms)
-        self.most = [[sum(map(abs, map(arb, entry)), start=arb(0)) for entry in row] for row in entries]
-        self.inverse = self._enclosed(lambda s: self.at(s)[1])
-        self.rows = [norm(row) for row in self.inverse]
+        n, single = len(entries), len(entries[0][0]) == 1
+        few = [1 if single else min(3, terms) for terms in piece.box.terms]
+        counts = [1 if count == 1 else NODES for count in few]
+        self.piece, self.scale = piece, PolynomialMatrix(entries, few)
+        middles = (self.scale.at(each, n) for n, each in enumerate(product(*map(nodes, counts))))
+        values = arb_mat([arb_mat(one).inv().entries() for one in middles])
+        columns = [
+            [one.mid() for one in row]
+            for row in (kronecker(map(interpolation, counts)) * values).transpose().tolist()
+        ]
+        self.nearly = PolynomialMatrix([columns[row : row + n] for row in range(0, n * n, n)], counts)
+        unit = [[int(i == j) for j in range(n)] for i in range(n)]
+        self.gap = self._norm(lambda s: self.times(unit, s), unit)
+        require(self.gap < 1, "a matrix of scales that is nearly singular")
+        self.rows = [norm(row) for row in self.per_length(unit)]
 
-    def _enclosed(self, matrix: Callable[[MachineState], Matrix]) -> Matrix:
-        counts, n = tuple(1 if count == 1 else NODES for count in self.counts), len(self.most)
-        flat = self.piece.enclosed(lambda s: [one for row in matrix(s) for one in row], 1, counts)
-        return [[wide(one.size) for one in flat[row : row + n]] for row in range(0, n * n, n)]
+    def _norm(self, matrix: Callable[[MachineState], Matrix], away: Matrix) -> arb:
+        """Bound by how much a function of the parameters is away from a matrix."""
+        n, flat = len(away), [one for row in away for one in row]
+        found = self.piece.enclosed(
+            lambda s: [
+                one - two for one, two in zip((x for row in matrix(s) for x in row), flat, strict=True)
+            ],
+            lambda missed: all(one < MISSED for one in missed),
+        )
+        return _norm([[one.size for one in found[row : row + n]] for row in range(0, n * n, n)])
 
-    def at(self, s: MachineState) -> tuple[Matrix, Matrix]:
-        """Give S and its inverse; entries that are nothing are 0."""
-        if s.key not in self.known:
-            degrees = product(*map(range, self.counts))
-            basis = [prod(map(chebyshev_value, each, s.places), start=arb(1)) for each in degrees]
-
-            def value(entry: Sequence[float]) -> Any:
-                return sum((one * arb(two) for one, two in zip(basis, entry, strict=True) if two), start=0)
-
-            matrix = [[value(entry) for entry in row] for row in self.entries]
-            self.known[s.key] = matrix, inverted(matrix)
-        found: tuple[Matrix, Matrix] = self.known[s.key]
-        return found
+    def times(self, matrix: Matrix, s: MachineState, before: ScaleMatrix | None = None) -> Matrix:
+        """Give S times a matrix times K, which may be another one's."""
+        nearly = (before or self).nearly.at(s.places, s.key)
+        return multiplied(multiplied(self.scale.at(s.places, s.key), matrix), nearly)
 
     def change(self, before: ScaleMatrix) -> arb:
         """Bound the norm of this S times the inverse of another."""
-        return _norm(self._enclosed(lambda s: multiplied(self.at(s)[0], before.at(s)[1])))
+        unit = [[int(i == j) for j in range(len(self.rows))] for i in range(len(self.rows))]
+        nothing = [[0] * len(row) for row in unit]
+        return self._norm(lambda s: self.times(unit, s, before), nothing) / (1 - before.gap)
 
-    def length(self, vector: Values) -> arb:
+    def length(self, vector: Sequence[arb]) -> arb:
         """Bound the length of S times a vector of balls."""
         return norm(
-            [sum((a * wide(b) for a, b in zip(row, vector, strict=True)), start=arb(0)) for row in self.most]
+            [sum((a * b for a, b in zip(row, vector, strict=True)), start=arb(0)) for row in self.scale.most]
         )
+
+    def per_length(self, matrix: Matrix) -> Matrix:
+        """Give the rows of a matrix of balls times S⁻¹: each bounds what a unit of length changes."""
+        columns = multiplied(matrix, self.nearly.most[: len(matrix[0])])
+        return [[one / (1 - self.gap) for one in row] for row in columns]
 
     def size(self, matrix: Matrix) -> arb:
         """Bound the norm of S times a matrix of balls times the inverse of S."""
-        return _norm(multiplied(multiplied(self.most, matrix), self.inverse))
-
-
-def inverted(matrix: Matrix) -> Matrix:
-    """Invert a matrix: nearly by that of its middle, and what it is times that one by elimination."""
-    middle = arb_mat([[first(one).mid() for one in row] for row in matrix]).inv().tolist()
-    nearly = [[0 if one.is_zero() else one.mid() for one in row] for row in middle]
-    unit = [[int(i == j) for j in range(len(matrix))] for i in range(len(matrix))]
-    rows = [[*one, *other] for one, other in zip(multiplied(matrix, nearly), unit, strict=True)]
-    for column, row in enumerate(rows):
-        row[:] = [0 if _nothing(one) else one / row[column] for one in row]
-        for other in rows:
-            if other is not row and not _nothing(factor := other[column]):
-                pairs = zip(other, row, strict=True)
-                other[:] = [one if _nothing(two) else one - factor * two for one, two in pairs]
-    return multiplied(nearly, [row[len(rows) :] for row in rows])
+        return _norm(multiplied(self.scale.most, self.per_length(matrix)))
 
 
 def multiplied(a: Matrix, b: Matrix) -> list[Values]:
@@ -88,7 +121,7 @@ def multiplied(a: Matrix, b: Matrix) -> list[Values]:
 
 def norm(values: Sequence[Any]) -> arb:
     """Bound a vector's length."""
-    return sum((one.abs_upper() ** 2 for one in values), start=arb(0)).sqrt().abs_upper()
+    return sum((arb(one).abs_upper() ** 2 for one in values), start=arb(0)).sqrt().abs_upper()
 
 
 def _norm(matrix: Matrix) -> arb:

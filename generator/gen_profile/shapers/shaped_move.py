@@ -65,11 +65,12 @@ class ShapedMove:
         return Profile(knots=knots, coefficients=coefficients, target=last, method=self.name)
 
     def too_short(self, duration: float, least: float) -> InfeasibleProblem:
-        """Say that a duration in s leaves no time to move in, and what the least is."""
+        """Say that a duration in s leaves too little time to move in, and what the least is."""
         least = float(rounded_up(least, digits=4))
         template = (
             "move.duration: the {name} shaper's delay is {delay:.4g} s for this machine, so "
-            "{duration:g} s leaves no time to move; state at least {least:g} s, or choose another method."
+            "{duration:g} s leaves too little time to move. No less than {least:g} s can do, and the check "
+            "may ask for more; or choose another method."
         )
         return InfeasibleProblem(
             Phrase(template, name=self.name, delay=self.shaper.delay, duration=duration, least=least),
