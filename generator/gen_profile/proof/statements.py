@@ -110,7 +110,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if not len(moving) or followed.sensed("bDamping")[order.begin : order.end].any():
             continue
         rests = order.begin + int(moving[-1]) + 1
-        if rests >= order.end or not _is_end(motion, order, rests):
+        if rests + 1 >= order.end or not _is_end(motion, order, rests):  # another may begin in that cycle
             continue
         takes = followed.reaction + TAKES_OVER * followed.period
         planned = order.begin + followed.after(takes)  # before, it tells of the former motion
