@@ -40,7 +40,7 @@ BARELY = 5e-7  # share of the greatest velocity, within which one certainly is r
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
 TAKES_OVER = 0.1  # periods beyond the stated reaction, at which a plan that was found then takes over (0.04)
-USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
+USED_UP = 0.66  # of the allowed sway: plans are refused from 0.68 on, as an epoch ends (left.st)
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
@@ -111,7 +111,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if not len(moving) or followed.sensed("bDamping")[order.begin : order.end].any():
             continue
         rests = order.begin + int(moving[-1]) + 1
-        if rests >= order.end or not _is_end(motion, order, rests):
+        if rests + 1 >= order.end or not _is_end(motion, order, rests):  # another may begin in that cycle
             continue
         takes = followed.reaction + TAKES_OVER * followed.period
         planned = order.begin + followed.after(takes)  # before, it tells of the former motion
