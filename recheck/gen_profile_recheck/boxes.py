@@ -4,7 +4,7 @@ A function of time and of parameters, each on [−1, 1], is expanded as a power 
 nodes of the parameters, in balls. What N terms miss is at most the coefficient N of its series about any time
 (Taylor). What N nodes of a parameter miss is at most 2¹⁻ᴺ times that of its series about any place, times
 1 + 2/π ln N for each parameter before it (Rivlin). Series about any place at once need only that no
-derivative of T_k is greater on [−1, 1] than at 1.
+derivative of T_k is greater on [−1, 1] than at 1. One such series tells how many terms or nodes it takes.
 """
 
 from __future__ import annotations
