@@ -69,7 +69,7 @@ class SuggestionOptions:
 
     search: Search = COARSE
     first: float = 1.03
-    most: float = 4.2
+    most: float = 8.0
     most_later: float = 64.0
     farther: float = 1.7
     farther_later: float = 16.0
