@@ -4,7 +4,7 @@ A function of time and of parameters, each on [−1, 1], is expanded as a power 
 nodes of the parameters, in balls. What N terms miss is at most the coefficient N of its series about any time
 (Taylor). What N nodes of a parameter miss is at most 2¹⁻ᴺ times that of its series about any place, times
 1 + 2/π ln N for each parameter before it (Rivlin). Series about any place at once need only that no
-derivative of T_k is greater on [−1, 1] than at 1.
+derivative of T_k is greater on [−1, 1] than at 1. One such series tells how many terms or nodes it takes.
 """
 
 from __future__ import annotations
@@ -112,11 +112,10 @@ def node_values(terms: tuple[int, ...], counts: tuple[int, ...]) -> arb_mat:
 @cache
 def _greatest(counts: tuple[int, ...], variable: int | None, terms: int) -> arb_mat:
     """Matrix with what products of Chebyshev's polynomials, or terms of their series, are at most."""
-    numbered = enumerate(counts, start=1)
-    return kronecker(
-        in_powers(one, 1, terms).transpose() if number == variable else arb_mat([[1]] * one)
-        for number, one in numbered
-    )
+    greatest = [arb_mat([[1]] * count) for count in counts]
+    if variable:
+        greatest[variable - 1] = in_powers(counts[variable - 1], 1, terms).transpose()
+    return kronecker(greatest)
 
 
 @cache
@@ -220,18 +219,13 @@ class MotionPiece:
         axes = self._axes(
             lambda poly: arb_series(poly(whole).coeffs(), terms) if variable == 0 else poly(wide(1))
         )
-        key = variable, terms
         a, v, dv = axes
-        timed, k = (
-            [moved(*each, INNER) for each in ((x, slope), (a, v), (v, dv))],
-            self.box.constants(places, key),
-        )
-        speed = self.box.machine.speed(timed[0], timed[1], timed[2], k)
-        y, slope = (
-            x[:n] + [parts_of(one)[0] for one in speed],
-            slope[:n] + [along(one, INNER) for one in speed],
-        )
-        return MachineState(x, y, slope, self.box.machine.input_matrix(x[:n], a, k), axes, k, places, key)
+        k = self.box.constants(places, key := (variable, terms))
+        lifts = self.box.machine.input_matrix(x[:n], a, k)
+        speed = self.box.machine.speed(moved(x, slope, INNER), moved(a, v, INNER), moved(v, dv, INNER), k)
+        y = x[:n] + [parts_of(one)[0] for one in speed]
+        slope = slope[:n] + [along(one, INNER) for one in speed]
+        return MachineState(x, y, slope, lifts, axes, k, places, key)
 
     def enclosed(
         self, function: Callable[[MachineState], Values], fits: Callable[[list[arb]], bool], most: int = 20
@@ -247,16 +241,11 @@ class MotionPiece:
             counts.append(count)
             rests.append(missed)
             amplified *= 1 + 2 / pi * log(count) + 1e-9
-        *nodes, terms = counts
-        rows = [
-            [_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(nodes), terms)
-        ]
-        return [
-            Expansion(
-                _interpolated(list(table), terms, nodes), (terms, *nodes), sum(rest, start=arb(0)).abs_upper()
-            )
-            for table, rest in zip(zip(*rows, strict=True), zip(*rests, strict=True), strict=True)
-        ]
+        *own, terms = counts
+        rows = [[_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(own), terms)]
+        tables = (_interpolated(list(one), terms, own) for one in zip(*rows, strict=True))
+        sums = (sum(one, start=arb(0)).abs_upper() for one in zip(*rests, strict=True))
+        return [Expansion(one, (terms, *own), rest) for one, rest in zip(tables, sums, strict=True)]
 
 
 def _interpolated(table: Values, terms: int, counts: Sequence[int]) -> arb_mat:

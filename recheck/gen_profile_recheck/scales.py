@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import reduce
-from itertools import product
+from itertools import chain, product
 from math import prod
 from typing import Any
 
@@ -65,18 +65,16 @@ class ScaleMatrix:
             for row in (kronecker(map(interpolation, counts)) * values).transpose().tolist()
         ]
         self.nearly = PolynomialMatrix([columns[row : row + n] for row in range(0, n * n, n)], counts)
-        unit = [[int(i == j) for j in range(n)] for i in range(n)]
-        self.gap = self._norm(lambda s: self.times(unit, s), unit)
+        self.unit = [[int(i == j) for j in range(n)] for i in range(n)]
+        self.gap = self._norm(lambda s: self.times(self.unit, s), 1)
         require(self.gap < 1, "a matrix of scales that is nearly singular")
-        self.rows = [norm(row) for row in self.per_length(unit)]
+        self.rows = [norm(row) for row in self.per_length(self.unit)]
 
-    def _norm(self, matrix: Callable[[MachineState], Matrix], away: Matrix) -> arb:
-        """Bound by how much a function of the parameters is away from a matrix."""
-        n, flat = len(away), [one for row in away for one in row]
+    def _norm(self, matrix: Callable[[MachineState], Matrix], less: int) -> arb:
+        """Bound the norm of a function of the parameters, less so many times the unit."""
+        n, away = len(self.unit), [less * one for row in self.unit for one in row]
         found = self.piece.enclosed(
-            lambda s: [
-                one - two for one, two in zip((x for row in matrix(s) for x in row), flat, strict=True)
-            ],
+            lambda s: [one - two for one, two in zip(chain(*matrix(s)), away, strict=True)],
             lambda missed: all(one < MISSED for one in missed),
         )
         return _norm([[one.size for one in found[row : row + n]] for row in range(0, n * n, n)])
@@ -88,9 +86,7 @@ class ScaleMatrix:
 
     def change(self, before: ScaleMatrix) -> arb:
         """Bound the norm of this S times the inverse of another."""
-        unit = [[int(i == j) for j in range(len(self.rows))] for i in range(len(self.rows))]
-        nothing = [[0] * len(row) for row in unit]
-        return self._norm(lambda s: self.times(unit, s, before), nothing) / (1 - before.gap)
+        return self._norm(lambda s: self.times(self.unit, s, before), 0) / (1 - before.gap)
 
     def length(self, vector: Sequence[arb]) -> arb:
         """Bound the length of S times a vector of balls."""

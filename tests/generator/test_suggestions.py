@@ -377,3 +377,14 @@ def test_a_motion_whose_loads_cannot_be_followed_is_none(monkeypatch):
     )
     solution = direct.solve(problem_of(preset_spec("paper", ["limits.sway=0.02"])))
     assert solution.optimum is None
+
+
+def test_a_cost_that_is_too_steep_is_lowered_by_a_value_that_works():
+    (change,) = refused("paper", "cost.sway_scale=5000")
+    assert change == ["cost.sway_weight=0.0"]
+    assert works("paper", "cost.sway_scale=5000", *change)
+
+
+def test_a_move_in_far_too_little_time_is_told_how_long_it_takes():
+    change = refused("mass-spring-chain", "solver.method=direct", "limits.sway=0.3", "move.duration=0.375")
+    assert any(one.startswith("move.duration=") for (one, *_) in change)

@@ -69,7 +69,7 @@ class SuggestionOptions:
 
     search: Search = COARSE
     first: float = 1.03
-    most: float = 4.2
+    most: float = 8.0
     most_later: float = 64.0
     farther: float = 1.7
     farther_later: float = 16.0
@@ -103,8 +103,11 @@ def solve(spec: Spec) -> Solution:
 def explained(spec: Spec, solution: Solution) -> Solution:
     """Find out what would help where a solve failed, unless the indirect method knows."""
     known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.advice != LONGER
-    if solution.optimum is not None or known:
+    if solution.optimum is not None:
         return solution
+    if known:
+        gentler = _gentler(spec, solution) if solution.status is Status.DIVERGED else None
+        return attrs.evolve(solution, suggestions=(gentler,) if gentler else ())
     remedies = remedy(spec, solution.problem.sway_spread)
     advice = remedies.advice or ("" if remedies.suggestions else IN_VAIN)
     return attrs.evolve(solution, advice=advice, suggestions=remedies.suggestions)
@@ -325,6 +328,18 @@ def _less_robust(spec: Spec, options: SuggestionOptions) -> Suggestion | None:
     weakest = {"robustness.method": "none", **({"robustness.order": 1} if changes else {})}
     tries = (_tried(spec, change, options) for change in (*changes, weakest))
     return next((one for one in tries if one and one.passes), None)
+
+
+def _gentler(spec: Spec, solution: Solution) -> Suggestion | None:
+    """Ask for a cost of the sway that is less steep, by no more than it takes to pass the check."""
+    weights = [float(f"{solution.problem.sway_weight / part:.2g}") for part in (2.0, 4.0, 16.0)]
+    found = None
+    with suppress(OutOfWork):
+        for weight in (*weights, 0.0):
+            found = _in_time(partial(_tried, spec, {"cost.sway_weight": weight}), USUAL.fraction) or found
+            if found and found.passes:
+                break
+    return found
 
 
 def _tried(spec: Spec, values: Mapping[str, Any], options: SuggestionOptions = USUAL) -> Suggestion | None:
