@@ -11,7 +11,7 @@ and OR are evaluated, as by many controllers: one side is no guard for the other
 """
 
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
@@ -104,6 +104,7 @@ class _Code(NamedTuple):
     work: int = 0
 
 
+@lru_cache(maxsize=16)  # for its proof, its FMU and its program
 def translate(text: str) -> Translation:
     """Translate a function block.
 
