@@ -257,7 +257,7 @@ def test_an_encoder_on_a_can_bus_is_logged(tmp_path, size, more):
         outcome = run_here("log-swing", source, *how, *more)
     assert outcome.code == 0, outcome.err
     log = read_swing(tmp_path / "swing.csv", preset_spec("bay-crane"), columns=("1", "2"))
-    assert log.times[-1] >= 1.2 and len(log.times) > 40
+    assert log.times[-1] >= 1.2 and len(log.times) > 10
     waves = [np.cos(FREQUENCY * log.times), np.sin(FREQUENCY * log.times), np.ones_like(log.times)]
     (cosine, sine, _), *_ = np.linalg.lstsq(np.stack(waves, axis=1), log.values)
     assert np.hypot(cosine, sine) == pytest.approx(0.2, rel=0.01)
