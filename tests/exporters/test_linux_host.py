@@ -41,7 +41,7 @@ def host(block, tmp_path_factory):
     folder = tmp_path_factory.mktemp("host")
     for file in block_files(block, SPEC, ["c", "linux"]):
         (folder / file.filename).write_bytes(file.content)
-    strict = ["-std=c11", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
+    strict = ["-std=c11", "-Og", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     command = [program("cc", "gcc"), *strict, "-o", "host_3", "host 3_linux.c", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     return folder
