@@ -327,10 +327,10 @@ def _fenced(followed: Followed, motion: IssuedMotion) -> Flags:
 def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge that no axis goes into a blocked interval, nor says that a stop may lead there."""
     low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    for zone, begin in _in_force(followed, motion, TO_STOP):
+    for zone, stopped in _in_force(followed, motion, TO_STOP):
         before = max(zone.begin - 1, 0)
-        if high[zone.axis, before] <= zone.low or low[zone.axis, before] >= zone.high:
-            begin = zone.begin  # no stop leads there
+        led = low[zone.axis, before] < zone.high and high[zone.axis, before] > zone.low
+        begin = stopped if led else zone.begin
         own = slice(begin, zone.end)
         place, guided = motion.position[zone.axis, own], motion.guided[own]
         within = np.minimum(place - zone.low, zone.high - place)
