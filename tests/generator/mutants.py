@@ -40,7 +40,7 @@ from gen_profile.planner import design, execution
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
-from gen_profile.proof.numbering import Numbering
+from gen_profile.proof.numbering import DRAWS, Numbering
 from gen_profile.proof.verdict import JudgedHistory, kind_of, late_on_average, lateness
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
@@ -151,7 +151,8 @@ class Machine:
     constants: block.PlannerConstants
     text: str
     histories: Histories
-    drawn: list[History]
+    drawn: Sequence[History]
+    groups: Sequence[str]
     shown: list[JudgedHistory]
 
 
@@ -167,11 +168,12 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
     finally:
         design.block_text = text_of
     histories = Histories.of(spec)
-    numbering = Numbering.of(histories, count + count // 3, seed=5)
-    drawn = [numbering.history(number) for number in range(len(numbering.drawn))]
+    numbering = Numbering.of(histories, count, seed=5)  # nothing is known to climb from
+    numbering = attrs.evolve(numbering, parents=((),) * len(numbering.rounds))
+    drawn = [(numbering.group(number), numbering.history(number)) for number in range(count)]
     random.Random(name).shuffle(drawn)
-    drawn = drawn[:count]
-    judgements = [one for _, one in judged(spec, text, histories, drawn)]
+    groups, drawn = zip(*drawn, strict=True)
+    judgements = [one for _, one in judged(spec, text, histories, drawn, groups)]
     return Machine(
         name=name,
         spec=spec,
@@ -179,12 +181,13 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
         text=text,
         histories=histories,
         drawn=drawn,
+        groups=groups,
         shown=judgements,
     )
 
 
 def judged(
-    spec: Spec, text: str, histories: Histories, drawn: list[History]
+    spec: Spec, text: str, histories: Histories, drawn: Sequence[History], groups: Sequence[str] = ()
 ) -> Iterator[tuple[int, JudgedHistory]]:
     """Judge history by history."""
     with ClosedLoop(spec, text, histories) as loop:
@@ -192,7 +195,11 @@ def judged(
             part = drawn[first : first + AT_ONCE]
             with loop.runs(part) as runs:
                 for number, (history, run) in enumerate(zip(part, runs, strict=True), start=first):
-                    known = {"cycle": loop.cycle, "number": number, "group": "draws"}
+                    known = {
+                        "cycle": loop.cycle,
+                        "number": number,
+                        "group": groups[number] if groups else DRAWS,
+                    }
                     yield number, judge_run(spec, run, history, **known)
 
 
@@ -284,7 +291,7 @@ def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str, str]:
             continue
         text, found_all = mutated(one, mutant), list[JudgedHistory]()
         try:
-            for number, found in judged(one.spec, text, one.histories, one.drawn):
+            for number, found in judged(one.spec, text, one.histories, one.drawn, one.groups):
                 sound = one.shown[number]
                 found_all.append(found)
                 if new := kinds_of(one.spec, found) - kinds_of(one.spec, sound):

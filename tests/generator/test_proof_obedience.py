@@ -238,7 +238,8 @@ def test_a_block_that_is_disabled_and_taken_over_has_no_fault():
     assert kinds(disabled()) == set()
 
 
-def test_slow_intervals_are_kept():
+def test_intervals_are_kept():
+    assert kind_of(WORDS["blocked"]) in kinds(with_zone(begin=300))  # to which no stop led
     assert kind_of(WORDS["fast"]) in kinds(with_zone(limit=0.5))
     assert kinds(with_zone(limit=1.0)) == set()
     assert kinds(with_zone(limit=0.5, low=5.5, high=5.6, begin=800, end=2000)) == set()

@@ -327,7 +327,10 @@ def _fenced(followed: Followed, motion: IssuedMotion) -> Flags:
 def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge that no axis goes into a blocked interval, nor says that a stop may lead there."""
     low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    for zone, begin in _in_force(followed, motion, TO_STOP):
+    for zone, stopped in _in_force(followed, motion, TO_STOP):
+        before = max(zone.begin - 1, 0)
+        led = low[zone.axis, before] < zone.high and high[zone.axis, before] > zone.low
+        begin = stopped if led else zone.begin
         own = slice(begin, zone.end)
         place, guided = motion.position[zone.axis, own], motion.guided[own]
         within = np.minimum(place - zone.low, zone.high - place)
@@ -401,7 +404,8 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
     unknown += [*followed.rest_reports, *np.flatnonzero(followed.retold)[:1].tolist()]
     until = min(unknown, default=followed.cycles)
-    ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
+    rests = [(begin, min(end, until)) for begin, end in runs_of(motion.stands) if 0 < begin < until]
+    ends = [begin for begin, _ in rests]
     if followed.modes is None or not ends:
         return
     as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
@@ -420,7 +424,7 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield Allowance("sway left", ends[worst], float(above[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        below = at_most - stated[ends]
+        below = at_most - [stated[begin:end].min() for begin, end in rests]  # as nothing decays
         worst = int(np.argmax(below))
         yield Allowance("understated", ends[worst], float(below[worst]), EXACT)
 
