@@ -221,6 +221,12 @@ def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
 
 
+def test_a_motion_may_begin_in_the_cycle_in_which_one_ends():
+    followed = with_orders(REST, attrs.evolve(MOVE, end=821), attrs.evolve(MOVE, begin=821), STICKS, STOPS)
+    followed.issued["fTimeToGo"][820] = 9.0
+    assert kinds(followed) == set()
+
+
 def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginning():
     assert kinds(attrs.evolve(FAULTS["swings"], retold=np.ones(CYCLES, dtype=bool))) == set()
     last = attrs.evolve(obedient(), last_modes=MODES, last_known=50, sway_limit=0.05)
