@@ -11,7 +11,7 @@ and OR are evaluated, as by many controllers: one side is no guard for the other
 """
 
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
@@ -104,6 +104,7 @@ class _Code(NamedTuple):
     work: int = 0
 
 
+@lru_cache(maxsize=16)  # for its proof, its FMU and its program
 def translate(text: str) -> Translation:
     """Translate a function block.
 
@@ -197,8 +198,9 @@ def _require_writable(tree: Any, variables: Mapping[str, StVariable]) -> None:
 
 def _written(tree: Any) -> Iterator[Token]:
     """Find the names of variables that statements write."""
-    yield from (assignment.children[0].children[0] for assignment in tree.find_data("assignment"))
-    yield from (loop.children[0] for loop in tree.find_data("count"))
+    for statement in tree.find_pred(lambda one: one.data in ("assignment", "count")):
+        target = statement.children[0]
+        yield target if isinstance(target, Token) else target.children[0]
 
 
 class _Translator(Transformer[Token, object]):
@@ -207,7 +209,7 @@ class _Translator(Transformer[Token, object]):
     def __init__(
         self, name: str, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool
     ) -> None:
-        super().__init__()
+        super().__init__(visit_tokens=False)
         self._name, self._variables, self._checked = name, variables, checked
         self._owners = {"VAR CONSTANT": "", **owners}
         self._templates = _PLAIN | _CHECKED if checked else _PLAIN

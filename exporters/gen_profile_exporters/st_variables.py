@@ -56,7 +56,7 @@ def declared(tree: Any) -> dict[str, StVariable]:
         A name is declared twice or means something in C, or initial values are not of its type.
     """
     variables: dict[str, StVariable] = {}
-    for section in tree.find_data("section"):
+    for section in tree.children[1:-1]:
         for name, variable in _section(section):
             if variables.setdefault(name.lower(), variable) is not variable:
                 raise refused(name, f"{name} is declared twice")
@@ -69,8 +69,8 @@ def _section(tree: Any) -> Iterator[tuple[Token, StVariable]]:
     section = "VAR CONSTANT" if constant else kind.upper()
     for declaration in rest[constant:]:
         name, type_, initial = declaration.children
-        *bounds, scalar = map(str, type_.children)
-        lower, upper = map(int, bounds or (0, -1))
+        *bounds, scalar = type_.children
+        lower, upper = (int(c_literal(bound)) for bound in bounds) if bounds else (0, -1)
         if bounds and upper < lower:
             raise refused(name, f"{name} has no elements")
         length = upper - lower + 1
@@ -109,8 +109,9 @@ def c_literal(value: Token, spare: int = 0) -> str:
         return value.lower()
     if value.type == "REAL" and math.isfinite(float(value)):
         return value.lower()
-    if value.type == "INTEGER" and int(value) <= MOST_DINT + spare:
-        return str(int(value))
+    digits = value.lstrip("0") or "0"
+    if value.type == "INTEGER" and len(digits) <= 10 and int(digits) <= MOST_DINT + spare:
+        return digits
     raise refused(value, f"no {_LITERALS[value.type]} is as great as {value}")
 
 

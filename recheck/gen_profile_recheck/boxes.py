@@ -236,10 +236,10 @@ class MotionPiece:
             late = [_coefficients(one, most + 1) for one in function(self.around(variable, most + 1))]
             for count in range(1, most + 1):
                 factor = amplified * (arb(2) ** (1 - count) if variable else 1)
-                if fits(gaps := [abs(one[count]) * factor for one in late]):
+                if fits(residual := [abs(one[count]) * factor for one in late]):
                     break
             counts.append(count)
-            rests.append(gaps)
+            rests.append(residual)
             amplified *= 1 + 2 / pi * log(count) + 1e-9
         *own, terms = counts
         rows = [[_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(own), terms)]

@@ -109,13 +109,15 @@ class PieceProof:
             entries.append(own[0] if len(own) == 1 else sum(one * one for one in own))
         return entries
 
-    def _misses_little(self, gaps: Sequence[arb]) -> bool:
+    def _misses_little(self, residual: Sequence[arb]) -> bool:
         """Tell whether what series of the defect and sways miss is little beside bounds."""
-        length = self.scale.length(gaps[: 2 * self.n])
-        return length < MISSED * self.room and all(one < MISSED * self.least**2 for one in gaps[2 * self.n :])
+        length = self.scale.length(residual[: 2 * self.n])
+        return length < MISSED * self.room and all(
+            one < MISSED * self.least**2 for one in residual[2 * self.n :]
+        )
 
-    def _grows_little(self, gaps: Sequence[arb]) -> bool:
-        return all(one * 2 * self.n * self.span < GROWTH for one in gaps)
+    def _grows_little(self, residual: Sequence[arb]) -> bool:
+        return all(one * 2 * self.n * self.span < GROWTH for one in residual)
 
     def _step(self, error: arb, source: arb) -> tuple[arb, arb, list[arb]]:
         """Assume that errors keep below something, and prove it: the last, the greatest, of all entries."""

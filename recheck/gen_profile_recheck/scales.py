@@ -75,7 +75,7 @@ class ScaleMatrix:
         n, away = len(self.unit), [less * one for row in self.unit for one in row]
         found = self.piece.enclosed(
             lambda s: [one - two for one, two in zip(chain(*matrix(s)), away, strict=True)],
-            lambda gaps: all(one < MISSED for one in gaps),
+            lambda residual: all(one < MISSED for one in residual),
         )
         return _norm([[one.size for one in found[row : row + n]] for row in range(0, n * n, n)])
 

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 from command_line import PROGRAM, run_here
-from end_to_end.test_deploy import free_port, in_thread
+from end_to_end.simulated_controllers import free_port, in_thread
 
 from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
 from gen_profile.deployment.table import read_table

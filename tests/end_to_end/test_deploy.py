@@ -1,11 +1,10 @@
 """Deployment by OPC UA, as a user does it, to simulated controllers and to servers that are odd."""
 
-import asyncio
 import base64
 import hashlib
 import json
 import re
-import socket
+import signal
 import threading
 import time
 from contextlib import ExitStack, closing, contextmanager
@@ -17,6 +16,7 @@ from command_line import run_here
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from end_to_end.simulated_controllers import BARE, free_port, in_thread
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
 from gen_profile.deployment.deploy import deploy
@@ -27,8 +27,6 @@ from gen_profile.deployment.table import read_table
 from gen_profile.deployment.watching.judge import Judge
 from gen_profile.errors import DeploymentError
 
-SETTINGS = ("export.plc_tables=variables", "export.plc_layout=samples", "export.cycle_time=0.02")
-BARE = ("--preset", "paper", *(word for one in SETTINGS for word in ("--set", one)), "--no-check")
 FORMS = ("--export", "plc", "--export", "twincat")
 
 
@@ -42,33 +40,6 @@ def files(tmp_path_factory):
     for name in ("plc", "me"):
         own_certificate(folder / f"{name}.pem")
     return folder
-
-
-def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
-
-
-@contextmanager
-def in_thread(main):
-    """Run a coroutine that calls its argument once it is ready, until it is asked to end."""
-    ready, loops = threading.Event(), []
-
-    async def running():
-        end = asyncio.Event()
-        loops.append((asyncio.get_running_loop(), end))
-        await main(lambda *_: ready.set(), end)
-
-    thread = threading.Thread(target=asyncio.run, args=(running(),))
-    thread.start()
-    try:
-        assert ready.wait(600)
-        yield
-    finally:
-        loop, end = loops[0]
-        loop.call_soon_threadsafe(end.set)
-        thread.join()
 
 
 @contextmanager
@@ -173,11 +144,11 @@ def fresh(files):
 def test_what_stands_is_watched(files, fresh, tmp_path):
     old, log = files / "old" / "paper.st", tmp_path / "log.csv"
     where = ("--to", fresh, "--security", "none")
-    done = run_here("deploy", old, *where, "--watch", "--for", "0.5", "--log", log, "--json")
+    done = run_here("deploy", old, *where, "--watch", "--for", "1", "--log", log, "--json")
     assert done.code == 0, done.err
     document = done.document
     assert (document["action"], document["fault"], document["moving"]) == ("watched", None, 0)
-    assert 2 < document["states"] <= document["cycles"] + 1 < 60
+    assert 1 < document["states"] <= document["cycles"] + 1
     head, first, *_ = log.read_text("utf-8").splitlines()
     assert head.startswith("time_s,call,phase,error,off_nominal,place_cycles,rate,cart_position_m,")
     assert re.fullmatch(r"0\.\d{3},\d+,idle,0,0,0\.0,0\.0,0\.0,0\.0,0\.0,began 20\S+\+00:00", first)
@@ -204,7 +175,9 @@ def once_watched(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_path, once_watched):
+def test_a_motion_is_watched_and_another_deployment_ends_it(
+    files, fresh, tmp_path, once_watched, monkeypatch
+):
     old, new, log = files / "old" / "paper.st", read_table(files / "new" / "paper.st"), tmp_path / "log.csv"
     where, own = ("--to", fresh, "--security", "none"), OpcUaAccess(url=fresh, security="none")
 
@@ -214,8 +187,17 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
             node = runner.run(client.nodes.objects.get_child(["2:FB_paper", "2:bExecute"]))
             runner.run(node.write_value(value))
 
-    with once_watched(execute, True):
-        done = run_here("deploy", old, *where, "--watch", "--for", "5", "--log", log)
+    take = Judge.take
+
+    def interrupted_on_arrival(judge, *arguments):
+        said = take(judge, *arguments)
+        if judge.seen.completed:
+            signal.raise_signal(signal.SIGINT)
+        return said
+
+    with once_watched(execute, True), monkeypatch.context() as patched:
+        patched.setattr(Judge, "take", interrupted_on_arrival)
+        done = run_here("deploy", old, *where, "--watch", "--log", log)
     assert done.code == 0 and "a motion's setpoints, all the table's bit for bit" in done.out, done.err
     assert "motions begun: 1, arrived: 1." in done.out and "motion 1 begins" in done.err
     rows = [line.split(",") for line in log.read_text("utf-8").splitlines()]
@@ -229,7 +211,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(files, fresh, tmp_pa
             deploy(new, Mailbox(link))
 
     with once_watched(rival):
-        found = run_here("deploy", old, *where, "--watch", "--for", "20", "--json")
+        found = run_here("deploy", old, *where, "--watch", "--json")
     assert found.code == 4 and "has gone over to its other buffer" in found.document["fault"]
     assert f"Error: {found.document['fault']}" in found.err
 

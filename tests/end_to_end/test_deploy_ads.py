@@ -8,8 +8,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from command_line import run_here
-from end_to_end.simulated_controllers import serving
-from end_to_end.test_deploy import BARE, free_port
+from end_to_end.simulated_controllers import BARE, free_port, serving
 
 from gen_profile.deployment.ads import AdsAccess, AdsLink
 from gen_profile.deployment.ads_sim import SimulatedAdsController
@@ -58,7 +57,7 @@ def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
         controller.block.set("bExecute", np.ones(1))
     watched = run_here("deploy", old, *where, "--watch", "--for", "1.5", "--json")
     assert watched.code == 0, watched.err
-    assert watched.document["moving"] == watched.document["exact"] > 10
+    assert watched.document["moving"] == watched.document["exact"] > 1
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ from fmu.kinds import PLANNED, planner_text
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
 from gen_profile.cli import planner
 from gen_profile.planner.commands import play
+from gen_profile.planner.design import planner_block
+from gen_profile.spec.reading import evolve_spec, preset_spec
 from gen_profile.streaming import stream as workflow
 
 KNOWING = "time_s,command,value,L1\n0,stop,,0.42\n0.1,velocity,0.3,\n2,stop,,\n"  # as --live-parameter does
@@ -18,23 +20,40 @@ SCRIPT = ("--planner", "paper.st", "--commands", "commands.csv")
 COMMANDS = "time_s,command,value\n0.1,velocity,0.3\n2,stop,\n"
 
 
-def deployed(folder, check, text=None):
+SENSOR = {"cob_id": 0x1A0, "type": "int16", "byte": [2], "counts": 5000.0, "reverse": True}
+MEASURED = preset_spec(
+    "bay-crane",
+    [
+        *(
+            "export.cycle_time=0.02",
+            "can.sync_period=0.02",
+            "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}",
+        ),
+        'planner.sensor={quantity="angle", of="theta1", noise=0.002, delay=[0.0, 0.1]}',
+        "planner.disturbance={swing={payload=0.5}, settle=15.0}",
+        "move={start=10.0, target=18.0, duration=14.0}",
+    ],
+)
+SWINGING = "time_s,command,value\n0.1,velocity,0.5\n4,quick-stop,\n26,stop,\n"
+
+
+def deployed(folder, check, text=None, *, spec=PLANNED, commands=COMMANDS):
     """A block and its manifest, which says what came of the proof."""
-    content = planner_text().encode("ascii")
+    content = (planner_text() if spec is PLANNED else planner_block(spec).text).encode("ascii")
     (folder / "paper.st").write_bytes(content if text is None else text.encode("ascii"))
     known = Artefact(format="planner", path="paper.st", sha256=sha256(content), bytes=len(content))
-    spec = PLANNED.to_dict() | {"can": {"sync_period": PLANNED.export.cycle_time, "timeout": 0.5}}
+    can = spec.to_dict()["can"] | {"sync_period": spec.export.cycle_time, "timeout": 0.5}
     manifest = Manifest(
         name="paper",
-        spec=spec,
-        spec_sha256=PLANNED.sha256(),
+        spec=spec.to_dict() | {"can": can},
+        spec_sha256=spec.sha256(),
         profile_sha256="",
         versions={},
         artefacts=(known,),
         check=check,
     )
     (folder / FILENAME).write_bytes(manifest.to_json())
-    (folder / "commands.csv").write_text(COMMANDS)
+    (folder / "commands.csv").write_text(commands)
     return ("--planner", folder / "paper.st", "--commands", folder / "commands.csv")
 
 
@@ -56,6 +75,16 @@ def test_a_script_drives_simulated_drives(tmp_path, monkeypatch):
     assert len(rows) == document["cycles_sent"] == len(due)
     for now, before in zip(rows[1:], due, strict=False):  # a drive is where it was led to by the cycle before
         assert float(now["cart_planned_m"]) == pytest.approx(float(before["position_m"]), abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_sensor_on_the_bus_lets_the_block_damp_what_a_quick_stop_left(tmp_path, monkeypatch):
+    monkeypatch.setattr(workflow, "SharedClock", HastyClock)
+    spec = evolve_spec(MEASURED, can={"sensor": SENSOR})
+    options = deployed(tmp_path, {"passed": True}, spec=spec, commands=SWINGING)
+    outcome = run_here("stream", *options, "--simulate-drive", "--json")
+    assert outcome.code == 0, outcome.err
+    assert outcome.document["drive"]["sway_residual_peak_m"] < 0.05  # without, 0.3 m
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import PROGRAM
-from end_to_end.simulated_controllers import serving
+from end_to_end.simulated_controllers import free_port, serving
 from end_to_end.studios import studio
-from end_to_end.test_deploy import free_port
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
 from simulated_blocks import exported, poked

@@ -14,7 +14,7 @@ from end_to_end.studios import closed, conversation, status, studio
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
 
-from gen_profile.studio.entrance import GO_ON, PATIENCE
+from gen_profile.studio.entrance import GO_ON
 from gen_profile.studio.state import StudioState
 
 BROWSER = """#!/bin/sh
@@ -144,7 +144,6 @@ def half_sent(address):
 
 def until_closed(connection):
     """Wait until the other end closes a connection."""
-    connection.settimeout(3.0 * PATIENCE)
     while connection.recv(65_536):
         pass
 

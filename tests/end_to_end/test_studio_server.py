@@ -152,7 +152,7 @@ def test_nothing_of_a_file_is_touched_before_the_user_agrees(tmp_path):
     spying = (sys.executable, SPY, touched, machine.parent)
     with studio(program=spying) as running:
         logged = {"use": "", "columns": None, "after": 0.0, "at": [], "free": []}
-        driven = {"drive": 1, "command": "", "values": [], "live": {}}
+        driven = {"drive": 1, "command": "", "values": [], "live": {}, "sensor": {}, "wind": []}
         for content in (own, foreign):
             state = showing(content)["state"]
             asking = [

@@ -171,6 +171,12 @@ def test_what_c_cannot_take_is_refused(declaration, words):
         translate(f"FUNCTION_BLOCK x {declaration} END_FUNCTION_BLOCK")
 
 
+def test_a_number_of_any_length_is_refused_and_leading_zeros_count_for_nothing():
+    with pytest.raises(ExportError, match="no DINT is as great as 9999"):
+        translate(text_of(f"k := {'9' * 5000};"))
+    assert translate(text_of(f"k := {'0' * 5000}7;")) == translate(text_of("k := 7;"))
+
+
 def test_nesting_without_end_is_refused_in_a_sentence():
     with pytest.raises(ExportError, match="nested too deeply"):
         translate(text_of(f"y := {'(' * 3000}x{')' * 3000};"))

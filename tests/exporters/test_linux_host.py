@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 from asyncua import Client, ua
+from end_to_end.simulated_controllers import free_port
 from system_parts import program
 from test_planner_forms import BAY
 
@@ -20,7 +21,6 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files
 from gen_profile.spec.reading import parse_spec
 
-PORT = 48407
 CYCLES = 10_000
 SPEC = parse_spec(BAY.replace("bay 3", "host 3").replace("0.004", "0.001"))
 COMMANDS = (  # cycle, inputs from there on
@@ -41,7 +41,7 @@ def host(block, tmp_path_factory):
     folder = tmp_path_factory.mktemp("host")
     for file in block_files(block, SPEC, ["c", "linux"]):
         (folder / file.filename).write_bytes(file.content)
-    strict = ["-std=c11", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
+    strict = ["-std=c11", "-Og", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     command = [program("cc", "gcc"), *strict, "-o", "host_3", "host 3_linux.c", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     return folder
@@ -66,7 +66,7 @@ def until(look):
         time.sleep(0.01)
 
 
-async def commanded(process):
+async def commanded(process, url):
     """Command by the numbers of the rows, from the first one that is read, and end the host by a signal.
 
     Returns
@@ -75,7 +75,7 @@ async def commanded(process):
         `first` is the number of the first row, before any command.
     """
     first, rows, commands = -1, [], [*COMMANDS]
-    async with Client(f"opc.tcp://127.0.0.1:{PORT}") as client:
+    async with Client(url) as client:
         space = await client.get_namespace_index("urn:host_3")
         block = await client.nodes.objects.get_child(f"{space}:host_3")
         names = await (await block.get_child(f"{space}:Names")).read_value()
@@ -97,10 +97,12 @@ async def commanded(process):
 
 @pytest.mark.slow
 def test_every_setpoint_read_from_outside_is_the_block_s_own(block, host):
-    server_script = [sys.executable, host / "host 3_opcua.py", "--port", str(PORT)]
+    port = free_port()
+    url = f"opc.tcp://127.0.0.1:{port}"
+    server_script = [sys.executable, host / "host 3_opcua.py", "--port", str(port)]
     with running(host / "host_3", "0") as process, running(*server_script) as server:
-        assert server.stdout.readline() == f"host_3 at opc.tcp://127.0.0.1:{PORT}\n", server.stderr.read()
-        names, first, rows = asyncio.run(commanded(process))
+        assert server.stdout.readline() == f"host_3 at {url}\n", server.stderr.read()
+        names, first, rows = asyncio.run(commanded(process, url))
         said = process.communicate()[0]
         assert server.communicate()[1] == "host_3 has ended.\n"
     assert len(rows) >= CYCLES

@@ -237,9 +237,7 @@ def test_short_slots_leave_no_cycle_more_work():
     assert parts[-1]["fVelocity_x"][2200] < -0.1
 
 
-def test_an_axis_that_has_left_much_moves_on_beside_another():
-    """x stood for 92 s while y crept: its share of what may be left was used up, that of y was not."""
-    spec = parse_spec("""
+LEAVES_MUCH = """
 plant = { type = "gantry-crane", m = 2000.0, L = 5.0 }
 move = { distance = [12.0, 4.0], duration = 16.0 }
 robustness = { uncertain = { L = 0.05 } }
@@ -248,9 +246,15 @@ export = { cycle_time = 0.004 }
 limits.axis.x = { velocity = 1.2, acceleration = 0.4, jerk = 2.0, travel = [0.0, 40.0] }
 limits.axis.y = { velocity = 1.0, acceleration = 0.4, jerk = 2.0, travel = [0.0, 20.0] }
 planner = { live = { L = [3.0, 9.0] } }
-""")
+"""
+
+
+def test_an_axis_that_has_left_much_moves_on_beside_another():
+    """x stood for 92 s while y crept: its share of what may be left was used up, that of y was not."""
     places = {"fActPosition_x": 21.31370246703929, "fActPosition_y": 9.300723183119427}
-    block = CountedBlock(compile_counting(planner_block(spec).text), fL=7.012614402715599, **places)
+    block = CountedBlock(
+        compile_counting(planner_block(parse_spec(LEAVES_MUCH)).text), fL=7.012614402715599, **places
+    )
     block.hold(500, bEnable=1.0)
 
     def go(x, y, seconds, override=1.0, limits=(0.0, 0.0)):
@@ -276,4 +280,33 @@ planner = { live = { L = [3.0, 9.0] } }
     go(1.607, 0.0, 40.6, 0.7434)
     out = go(40.0, 4.677, 45.0)
     assert out["fSwayLeft"][0] > 0.028
+    assert out["bDone"][-1] and out["bPromise"].all()
+
+
+def test_a_far_target_is_approached_where_pulses_are_refused():
+    """A refused pulse began a search for a plan, which a far target has not, without pulses: 5 s later."""
+    places = {"fActPosition_x": 20.527381009898555, "fActPosition_y": -0.6}
+    text = planner_block(parse_spec(LEAVES_MUCH)).text
+    block = CountedBlock(compile_counting(text), fL=7.237206773782146, **places)
+
+    def stick(x, y, seconds, **inputs):
+        speeds = {"fVelocityCommand_x": x, "fVelocityCommand_y": y}
+        block.hold(round(seconds / 0.004), bExecute=0.0, bVelocity=1.0, **speeds, **inputs)
+
+    block.hold(69, bEnable=1.0)
+    stick(-1.0757211394296429, 0.6290580749480357, 4.354)
+    stick(-1.0757211394296429, float("nan"), 0.175)
+    stick(-1.0757211394296429, 0.6290580749480357, 0.404)
+    stick(0.0, 0.0, 0.987)
+    stick(-1.0757211394296429, 0.6290580749480357, 6.07)
+    block.hold(340, bVelocity=0.0, bExecute=1.0, fTarget_x=13.912835609271173, fTarget_y=9.930992746004346)
+    block.hold(110, rOverride=0.0)
+    stick(-1.1867769724950896, 0.7216046025025749, 1.326)
+    stick(0.0, 0.0, 0.44)
+    stick(0.0, 0.0, 11.307, rOverride=1.0)
+    stick(-1.0644461934011693, 1.0, 0.425)
+    stick(0.94, 1.0, 45.92, fVelocityLimit_x=0.99268, fVelocityLimit_y=0.82724)
+    quick = {"fVelocityLimit_x": 0.0, "fVelocityLimit_y": 0.0}
+    out = block.hold(11_500, bVelocity=0.0, bExecute=1.0, fTarget_x=0.0, fTarget_y=2.0, **quick)
+    assert out["fSwayLeft"][0] > 0.03
     assert out["bDone"][-1] and out["bPromise"].all()

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from exporters.driven_block import G
-from scipy.signal import czt
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
@@ -75,6 +74,8 @@ def worst(velocity, rope, load, decay=0.0, watched=False):
 
     `watched`: on the machines alone that the block watches, and as given.
     """
+    from scipy.signal import czt  # noqa: PLC0415  (half a second in each process that collects these tests)
+
     low, high = (modes(rope * (1.0 + error), load)[0] for error in (ERROR, -ERROR))
     if watched:
         low, high = (modes(rope, load)[0] + 0.5 * sign * (high - low) for sign in (-1.0, 1.0))

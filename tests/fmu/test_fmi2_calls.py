@@ -365,17 +365,23 @@ def functions_of_the_standard():
     return set(re.findall(r"FMI2_Export \w+TYPE\s+(fmi2\w+);", header))
 
 
-def test_only_fmi_functions_are_exported(fmu):
+def exported_and_needed(library):
+    """Names that a library of this computer exports, and libraries that it needs."""
     assert sys.platform == "linux", "This test reads ELF files."
-    (library,) = (fmu.folder / "binaries").glob("*/*.so")
     with library.open("rb") as file:
         elf = ELFFile(file)
         symbols = list(elf.get_section_by_name(".dynsym").iter_symbols())
         needed = {tag.needed for tag in elf.get_section_by_name(".dynamic").iter_tags("DT_NEEDED")}
-    defined = {
+    exported = {
         symbol.name
         for symbol in symbols
         if symbol["st_shndx"] != "SHN_UNDEF" and symbol["st_info"]["bind"] != "STB_LOCAL"
     }
-    assert defined == functions_of_the_standard()
+    return exported, needed
+
+
+def test_only_fmi_functions_are_exported(fmu):
+    (library,) = (fmu.folder / "binaries").glob("*/*.so")
+    exported, needed = exported_and_needed(library)
+    assert exported == functions_of_the_standard()
     assert needed <= {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2"}

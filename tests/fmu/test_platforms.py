@@ -5,11 +5,11 @@ import os
 import shutil
 import subprocess
 import zipfile
+from importlib import import_module
 from pathlib import Path
 
 import attrs
 import fmpy
-import lief
 import numpy as np
 import pytest
 from fmu.drivers import Instance
@@ -33,6 +33,12 @@ WINE = "/usr/lib/wine/wine64"
 WINE_LIBRARIES = "/usr/lib/x86_64-linux-gnu/wine/x86_64-windows"
 
 
+@pytest.fixture
+def lief():
+    """Load it for who uses it: it takes each process that collects these tests half a second."""
+    return import_module("lief")
+
+
 def binaries(version, *names):
     """Files below binaries/ of an FMU for some platforms."""
     with zipfile.ZipFile(io.BytesIO(build_fmu(SYSTEM, version, names))) as archive:
@@ -47,7 +53,7 @@ def exported_by(binary):
     return {symbol.name.removeprefix("_") for symbol in binary.exported_symbols}
 
 
-def test_linux_on_arm():
+def test_linux_on_arm(lief):
     found = binaries(Version.FMI3, "linux-arm64")
     assert list(found) == ["aarch64-linux/paper_system.so"]
     elf = lief.ELF.parse(list(*found.values()))
@@ -61,7 +67,7 @@ def test_linux_on_arm():
     assert all(name == "GLIBC_2.17" for name in versions)
 
 
-def test_macos_for_both_processors():
+def test_macos_for_both_processors(lief):
     names = ("macos-x86_64", "macos-arm64")
     assert set(binaries(Version.FMI3, *names)) == {
         "x86_64-darwin/paper_system.dylib",
@@ -84,7 +90,7 @@ def test_macos_for_both_processors():
         }
 
 
-def test_one_processor_of_macos_needs_no_universal_binary():
+def test_one_processor_of_macos_needs_no_universal_binary(lief):
     (found,) = binaries(Version.FMI2, "macos-arm64").values()
     universal = lief.MachO.parse(list(found))
     assert universal.size == 1
@@ -99,7 +105,7 @@ def bare_windows(folder):
     return folder
 
 
-def test_windows_runs_under_wine(cache, tmp_path):
+def test_windows_runs_under_wine(lief, cache, tmp_path):
     """The same values to 12 digits as this computer's binary computes."""
     wine = program(WINE, "wine64")
     (library,) = binaries(Version.FMI2, "windows-x86_64").values()

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from asyncua import Server, ua
 from command_line import PROGRAM, run_here
-from end_to_end.test_deploy import free_port, in_thread
+from end_to_end.simulated_controllers import free_port, in_thread
 
 from gen_profile.identification.identify import read_swing
 from gen_profile.spec.reading import preset_spec
@@ -60,6 +60,16 @@ class Phyphox:
                 "buffer": [float(f"{one:.7e}") for one in values],
             }
         return {"buffer": kept, "status": {"session": self.session, "measuring": self.measuring}}
+
+
+class Lossy(Phyphox):
+    """Lost for two requests, once the first readings were taken."""
+
+    def answer(self, path, query):
+        answer = super().answer(path, query)
+        if sum("|" in asked for asked in self.asked) == 1:
+            self.fails = 2
+        return answer
 
 
 class OtherServer(Phyphox):
@@ -119,12 +129,9 @@ def test_a_phone_is_logged_about_the_axis_it_swings_about(tmp_path, measuring):
 
 
 def test_a_network_that_is_lost_for_a_moment_loses_nothing(tmp_path):
-    app = Phyphox(measuring=True)
+    app = Lossy(measuring=True)
     with served(app) as url:
-        timer = threading.Timer(0.2, lambda: setattr(app, "fails", 2))
-        timer.start()
         outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "12")
-        timer.join()
     assert outcome.code == 0 and app.fails == 0, outcome.err
     times = np.loadtxt(tmp_path / "swing.csv", delimiter=",", skiprows=1)[:, 0]
     np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-6)
@@ -163,11 +170,10 @@ def test_ctrl_c_ends_a_log_and_keeps_it(tmp_path):
         program = subprocess.Popen(
             [PROGRAM, "log-swing", url], cwd=tmp_path, stderr=subprocess.PIPE, text=True
         )
-        while "|" not in app.asked[-1:].__repr__():
+        while sum("|" in asked for asked in app.asked) < 3:  # the readings of two requests are taken in
             time.sleep(0.05)
-        time.sleep(0.5)
         program.send_signal(signal.SIGINT)
-        _, err = program.communicate(timeout=60)
+        _, err = program.communicate()
     assert program.returncode == 0, err
     assert len((tmp_path / "swing.csv").read_text().splitlines()) > 16
 
@@ -204,7 +210,7 @@ def test_a_node_of_a_controller_is_logged(tmp_path):
             assert refused.code == 6 and sentence in refused.err
     assert outcome.code == 0, outcome.err
     log = read_swing(tmp_path / "swing.csv", preset_spec("bay-crane"), columns=("1", "2"))
-    assert log.times[-1] >= 2.0 and len(log.times) > 40
+    assert log.times[-1] >= 2.0 and len(log.times) > 10
     apart = [np.std(log.values - rate(log.times + late)) for late in np.linspace(0.0, 4.0, 200)]
     assert min(apart) < 0.01
 
@@ -251,7 +257,7 @@ def test_an_encoder_on_a_can_bus_is_logged(tmp_path, size, more):
         outcome = run_here("log-swing", source, *how, *more)
     assert outcome.code == 0, outcome.err
     log = read_swing(tmp_path / "swing.csv", preset_spec("bay-crane"), columns=("1", "2"))
-    assert log.times[-1] >= 1.2 and len(log.times) > 40
+    assert log.times[-1] >= 1.2 and len(log.times) > 10
     waves = [np.cos(FREQUENCY * log.times), np.sin(FREQUENCY * log.times), np.ones_like(log.times)]
     (cosine, sine, _), *_ = np.linalg.lstsq(np.stack(waves, axis=1), log.values)
     assert np.hypot(cosine, sine) == pytest.approx(0.2, rel=0.01)

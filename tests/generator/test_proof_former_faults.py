@@ -9,6 +9,7 @@ from gen_profile.proof.numbering import Numbering
 
 FORMER = {  # machine: how many are drawn, seed, number
     "zones": [
+        (300, 34, 9),  # error 8, as an axis came out of a blocked interval and went on
         (400, 1, 51),  # a stick followed 9 s too late: the first pulse after its plan was lost
         (400, 5, 58),  # a stick that exceeded a slow interval by 0.115 m/s
         (400, 12, 233),  # a pulse beyond the ends that were stated meanwhile, by 0.5 mm
@@ -36,6 +37,10 @@ FORMER = {  # machine: how many are drawn, seed, number
         (300, 5, 192),  # at a fifth of full speed, as calming broke the pulses' rise off
         (150, 1, 43),  # a plan by the rope of 60 s ago, as a stick had held the axis at its end
         (150, 1, 93),  # a stop 6 s late: plans to a stick's velocity left no time to learn of the rope
+        (200, 1, 80),  # a target 0.5 s late, as nothing made up for slots that calmed
+        (200, 2, 81),  # a stick 0.6 s late, as a pulse was cut before the axis stood
+        (225, 3, 9),  # a stop 4.8 s late, as its stated ends left too little room for calming
+        (100, 4, 57),  # 2.7 s late, as what half of a long plan leaves was calmed
     ],
 }
 

@@ -2,9 +2,15 @@
 
 from types import SimpleNamespace
 
+import attrs
 import numpy as np
+import pytest
+from generator.test_proof_obedience import MOVE, REACTIONS, REST, STICKS, STOPS, obedient, with_orders
 
+from gen_profile.proof.followed import WAY
 from gen_profile.proof.numbering import DRAWS, SEARCH
+from gen_profile.proof.obedience import LATER, measured
+from gen_profile.proof.orders import POSITION, STOP, VELOCITY
 from gen_profile.proof.verdict import Proof, late_on_average
 
 ONE_LOAD = {"payload": 0.05}
@@ -34,7 +40,21 @@ def test_what_comes_late_on_average_is_a_fault():
         one = SimpleNamespace(group=group, later={"stop": mean + np.array([-0.3, 0.3])})
         return [*late_on_average([one] * (count // 2))]
 
-    assert late(DRAWS, 40, 0.2) == ["Stops end later than allowed on average, by 0.11 slow periods or more."]
-    assert not late(DRAWS, 40, 0.05)  # which may be chance
-    assert not late(DRAWS, 10, 0.9)
-    assert not late(SEARCH, 40, 0.9)
+    assert late(DRAWS, 40, 1.2) == ["Stops end later than allowed on average, by 0.11 slow periods or more."]
+    assert not late(DRAWS, 40, 1.05)  # which may be chance
+    assert not late(DRAWS, 10, 1.9)
+    assert not late(SEARCH, 40, 1.9)
+
+
+def test_how_late_commands_are_carried_out_is_counted_from_what_limits_take():
+    def late(followed):
+        return {one.what: one.needed for one in measured(followed, REACTIONS)}
+
+    met = late(obedient())
+    assert met[LATER[POSITION]] == pytest.approx((7.2 - 1.1 * 5.0 - 2.0 - 0.1) / 2.0)
+    assert met[LATER[VELOCITY]] == pytest.approx((2.2 - 1.6 - 0.1) / 2.0)
+    assert met[LATER[STOP]] == pytest.approx((2.2 - 1.6 - 0.1) / 2.0)
+    assert LATER[WAY] not in met
+    again = with_orders(REST, attrs.evolve(MOVE, end=250), attrs.evolve(MOVE, begin=250), STICKS, STOPS)
+    limits = 1.1 * (5.0 - 0.25 * 1.3**2) + (1.0 + 0.65) / 0.5 + 0.1
+    assert late(again)[LATER[WAY]] == pytest.approx((8.2 - 2.5 - limits) / 2.0)

@@ -203,7 +203,7 @@ def test_a_very_stiff_mode_costs_no_time():
 
 @pytest.mark.parametrize("duration", [0.5, 2.42, 2.4229])
 def test_a_move_shorter_than_the_delay_names_the_shortest_one(duration):
-    cure = r"move\.duration: the zvd shaper's delay is 2\.423 s .* state at least 2\.423 s"
+    cure = r"move\.duration: the zvd shaper's delay is 2\.423 s .* No less than 2\.423 s can do"
     with pytest.raises(InfeasibleProblem, match=cure):
         papers("zvd", duration)
     assert papers("zvd", 2.423).duration == 2.423

@@ -21,9 +21,34 @@ LIMITS = {
 EDITS = {**LIMITS, "export.cycle_time": 0.01, "planner.live.L1": [0.4, 0.5], "check.residual_sway": 0.02}
 
 
+SENSED = {
+    "limits.travel": [-10.0, 30.0],
+    "planner.live.m2": [500.0, 2000.0],
+    "planner.sensor.quantity": "angle",
+    "planner.sensor.of": "theta1",
+    "planner.sensor.noise": 0.002,
+    "planner.sensor.delay": [0.05, 0.15],
+    "planner.disturbance.swing.payload": 0.3,
+    "planner.disturbance.gust.acceleration": 0.1,
+    "planner.disturbance.gust.longest": 5.0,
+    "planner.disturbance.settle": 15.0,
+}
+
+
 def asked(preset="paper", edits=EDITS, **how):
     question = Question(start=preset_start(preset), state=StudioState(preset=preset, edits=edits))
-    return DriveQuestion(**{"question": question, "drive": 1, "command": "", "values": (), "live": {}, **how})
+    return DriveQuestion(
+        **{
+            "question": question,
+            "drive": 1,
+            "command": "",
+            "values": (),
+            "live": {},
+            "sensor": {},
+            "wind": (),
+            **how,
+        }
+    )
 
 
 def moments(count, **how):
@@ -122,3 +147,33 @@ def test_the_target_is_where_the_load_hangs_in_the_picture_that_is_pointed_at(pr
     beyond = going.moment(asked(command="point", values=(view, 1e3, 1e3)))["target"]
     assert beyond == pytest.approx(np.full(len(there), {"paper": 1.0}.get(preset, 20.0)))
     assert going.moment(asked(command="stop"))["target"] is None
+
+
+def test_a_load_that_swings_is_damped_while_the_sensor_is_heard():
+    def swung(drive, **how):
+        parts = moments(200, preset="bay-crane", edits=SENSED, drive=drive, **how)
+        return parts, [max(map(abs, part["animation"]["actors"][0]["sway_mm"])) for part in parts]
+
+    parts, sway = swung(11)
+    assert len(parts[0]["animation"]["actors"]) == 1  # only one load can be measured
+    assert sway[0] == pytest.approx(300.0, rel=0.05) and max(sway[-30:]) < 50.0
+    assert parts[-1]["promise"] and parts[-1]["sensor"]["used"] and parts[-1]["sensor"]["fault"] == 0
+    assert any(part["sensor"]["damping"] for part in parts)
+    parts, sway = swung(12, sensor={"lost": 1.0})
+    assert max(sway[-60:]) == pytest.approx(300.0, rel=0.05) and not parts[-1]["sensor"]["used"]
+    parts, _ = swung(13, sensor={"scale": -1.0, "age": 0.0})
+    assert any(part["sensor"]["fault"] for part in parts)
+
+
+def test_wind_holds_a_load_where_it_balances_its_weight():
+    """Both ropes in one line; a load that hangs before its axis sways by less than nothing."""
+    going = Drive(asked("bay-crane", SENSED).question.spec())
+    leaning = np.array([[-np.arctan(0.1 / 9.81), 0.0]])
+    going._state = np.stack([leaning, 0.0 * leaning])
+    for _ in range(20):
+        part = going.moment(asked(wind=(0.1,), sensor={"lost": 1.0}))
+    assert going._state[0] == pytest.approx(leaning, abs=1e-5)
+    sway = 1e3 * (6.0 + 1.5) * np.sin(leaning[0, 0])
+    assert part["animation"]["actors"][0]["sway_mm"][-1] == pytest.approx(sway, abs=0.1)
+    (refused,) = drive(asked("bay-crane", SENSED, drive=11, wind=(0.1, 0.1)))
+    assert "Wind takes 1 values, one for each axis." in refused["faults"][0]["sentence"]

@@ -136,11 +136,11 @@ def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
     Raises
     ------
     ExportError
-        There are too few node ids, or two PDOs have the same COB-ID.
+        There are too few node ids, or two PDOs, or one and a sensor's, have the same COB-ID.
     """
-    plan = layout(target.can)
+    plan, sensor = layout(target.can), target.can.sensor
     used = sorted({*plan.received, *plan.transmitted})
-    identifiers, taken = [], dict[int, str]()
+    identifiers, taken = [], {} if sensor is None else {sensor.cob_id: "can.sensor.cob_id"}
     for axis, node in zip(target.axes, nodes(target), strict=True):
         stated = target.can.cob_ids.get(axis.name, CobIdsSpec())
         if plan.shared and stated.command:

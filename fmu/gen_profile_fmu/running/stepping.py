@@ -22,10 +22,14 @@ class Instant:
         Of the axes, in m (or rad).
     sway : (outputs,) array
         Of the loads, in m.
+    q_u, dq_u : (n_u,) array
+        Coordinates that swing, and their rates.
     """
 
     position: Array
     sway: Array
+    q_u: Array
+    dq_u: Array
 
 
 class SteppedPlant(PlantCosimulation):
@@ -82,4 +86,4 @@ class SteppedPlant(PlantCosimulation):
         )
         observed = self._observe(step)
         self._time = end
-        return Instant(position=observed["position"][-1], sway=observed["sway"][-1])
+        return Instant(**{name: observed[name][-1] for name in ("position", "sway", "q_u", "dq_u")})

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.problem.sampling import latin_hypercube
 from gen_profile.spec.model import Spec
 
 TIMING = "timing"
@@ -152,8 +153,5 @@ def _draws(spec: Spec) -> list[Scenario]:
 
 
 def _latin_hypercube(spec: Spec, dimensions: int) -> Array:
-    from scipy.stats import qmc  # noqa: PLC0415  (a quarter of what the main job takes to start)
-
-    generator = np.random.default_rng(spec.check.seed)
-    drawn: Array = qmc.LatinHypercube(dimensions, seed=generator).random(spec.check.samples)
+    drawn: Array = latin_hypercube(spec.check.samples, dimensions, np.random.default_rng(spec.check.seed))
     return drawn

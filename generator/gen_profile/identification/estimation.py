@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
@@ -129,7 +129,7 @@ def _estimate(
 ) -> Estimate:
     """Tell the ranges that hold all parameters at once, and what they follow from."""
     fit, unknowns = around.fit, around.unknowns
-    factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
+    factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     progress("finding the ranges")
     half_ranges = around.half_ranges(factor)
 

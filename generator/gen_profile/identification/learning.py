@@ -15,7 +15,7 @@ from typing import Any
 
 import attrs
 import numpy as np
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError
 from gen_profile.evaluation.residual_sway import observation_time
@@ -64,6 +64,8 @@ class Machines:
     def drawn(self, count: int) -> list[dict[str, float]]:
         """Draw so many evenly, the middle one first (I. M. Sobol, 1967)."""
         ends = np.array(list(self.ranges.values()))
+        from scipy.stats import qmc  # noqa: PLC0415  (half of what the command line takes to start)
+
         shares = qmc.Sobol(len(ends), scramble=False).random(count)
         shares[0] = 0.5
         rows = ends[:, 0] + shares * (ends[:, 1] - ends[:, 0])
@@ -130,7 +132,7 @@ def narrowed_by_log(
             "to: look at its unit, and at what it is of (signal)."
         )
     sigma = noise if lines is None else np.array([lines.widened(float(noise[0]), len(model.log.times))])
-    factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
+    factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     half = uncertainty(fit, unknowns, sigma).half_ranges(factor)
     ends = np.stack([unknowns[: len(half)] - half, unknowns[: len(half)] + half], axis=1) * fit.scale[:, None]
     evidence = {

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.signal import lombscargle
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.fit import Fit
@@ -90,6 +89,8 @@ class Misfit:
 
 def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
     """Take the periodogram of residuals up to some harmonics of the fastest natural frequency in rad/s."""
+    from scipy.signal import lombscargle  # noqa: PLC0415  (half of what a command that draws takes to start)
+
     apart = 2.0 * np.pi / float(times[-1] - times[0])
     highest = min(max(HARMONICS * fastest, FEWEST * apart), np.pi / float(np.median(np.diff(times))))
     count = min(max(int(highest / apart), 1), MOST_LINES)

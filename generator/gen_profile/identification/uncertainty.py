@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit
@@ -231,6 +231,6 @@ def _require_possible(fit: Fit, unknowns: Array, residuals: Array) -> None:
 
 def _birge_ratio(residuals: Array, freedom: int) -> float:
     square = float(residuals @ residuals)
-    if freedom < 1 or chi2.sf(square, freedom) > CHANCE:
+    if freedom < 1 or chdtrc(freedom, square) > CHANCE:
         return 1.0
     return float(np.sqrt(square / freedom))

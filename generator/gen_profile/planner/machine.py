@@ -178,6 +178,31 @@ class SensedDirection:
     end_load: int
 
 
+def shown_by_sensors(spec: Spec, q_u: Array, dq_u: Array, sway: Array) -> Array:
+    """Give what the sensors of ``planner.sensor.of`` show, one after the other.
+
+    Parameters
+    ----------
+    spec : Spec
+    q_u, dq_u : (..., n_u) array
+    sway : (..., loads) array
+        m.
+
+    Returns
+    -------
+    (..., sensors) array
+    """
+    plant, sensor = spec.machine(), spec.planner.sensor
+    assert sensor is not None
+    coordinates = [coordinate.name for coordinate in plant.unactuated]
+    values, known = {
+        "angle": (q_u, coordinates),
+        "rate": (dq_u, coordinates),
+        "sway": (sway, list(plant.loads)),
+    }[sensor.quantity]
+    return values[..., [known.index(name) for name in sensor.names]]
+
+
 def sensed_directions(spec: Spec) -> dict[int, SensedDirection]:
     """Find what sensors measure along which axes, by the axes' numbers.
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import eigenvalues_at
 from gen_profile.problem.problem import Problem
+from gen_profile.problem.sampling import halton
 from gen_profile.problem.symbolic import Array
 
 Phases = Callable[[Array], Array]  # of every mode in rad at the end of the motion, (places, modes)
@@ -159,13 +160,10 @@ def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:
     if ranges == 1:
         return Start(places=lines[0], steps=steps)
     corners = list(product((0.0, 1.0), repeat=ranges)) if ranges <= CORNERS else []
-    from scipy.stats import qmc  # noqa: PLC0415  (a quarter of what the main job takes to start)
-
-    sequence = qmc.Halton(ranges, scramble=False)
-    coarse = sequence.random(min(FEWEST_SPREAD * ranges, most))
+    coarse = halton(min(FEWEST_SPREAD * ranges, most), ranges)
     span = np.ptp(phase_of(np.concatenate([coarse, *lines])), axis=0)
     count = int(min(np.prod(1.0 + span), most))
-    spread = [coarse, sequence.random(max(count - len(coarse), 0)), *_on_faces(coarse)]
+    spread = [coarse, halton(max(count - len(coarse), 0), ranges, begin=len(coarse)), *_on_faces(coarse)]
     return Start(places=np.concatenate([np.array(corners).reshape(-1, ranges), *lines, *spread]), steps=steps)
 
 

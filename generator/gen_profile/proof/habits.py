@@ -347,8 +347,7 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
     begin, before = around.period * (0.2 + _fraction(how, 3)), 0.1 * around.period
     places = (nan, -FAR, FAR, -1.01 * limit, 1.01 * limit, 0.99 * limit)
     away = {f"fActPosition{suffix}": places[int(6.0 * how) % 6]}
-    most = {f"fFollowingLimit{suffix}": limit}
-    within = around.period * (1.0 + _fraction(how, 5))
+    most, within = {f"fFollowingLimit{suffix}": limit}, around.period * (1.0 + _fraction(how, 5))
     return Manner(
         commands=(first, _stopped(first, begin + within)),
         changes=(
@@ -391,10 +390,14 @@ def _contradicted(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
-    """Block an interval for some time, or make it slow, wherever the axis is."""
+    """Block an interval for some time, or make it slow, wherever the axis is, or where it is to go."""
     later, lasts = around.part(how, 3), around.period * (2.0 + 6.0 * _fraction(how, 4))
-    k = int(how * len(around.suffixes)) % len(around.suffixes)
-    zone = around.zone(k, _fraction(how, 5), _fraction(how, 6), ZONES - 1, slow=_fraction(how, 7) < 0.5)
+    aims = command.command == "position" and how > 0.5
+    k = int((32.0 if aims else 1.0) * how) % len(around.suffixes)
+    (low, high), place = around.targets[k], _fraction(how, 5)
+    if aims:
+        place = max(0.0, (command.values[k] - low) / (high - low) - 0.1 * _fraction(how, 8))
+    zone = around.zone(k, place, _fraction(how, 6), ZONES - 1, slow=_fraction(how, 7) < 0.5)
     reset = _change(command, later + lasts + 2.0 * around.cycle, 0.0, {"bReset": 1.0})
     again = _followed(command, later + lasts + 0.5 * around.period)
     return Manner(commands=(command, again), changes=(_change(command, later, lasts, zone), reset))
@@ -410,8 +413,8 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
             taken |= {f"fActPosition{suffix}": speed * around.cycle, f"fActVelocity{suffix}": speed}
     goes = how > 0.3  # still, as it is taken over
     if how > 0.8 and not around.hoists:  # nowhere, and so not taken over yet
-        name = "fActPosition" if how < 0.9 else "fActVelocity"
-        taken = {f"{name}{around.suffixes[int(100.0 * how) % len(around.suffixes)]}": nan}
+        name, k = "fActPosition" if how < 0.9 else "fActVelocity", int(100.0 * how) % len(around.suffixes)
+        taken = {f"{name}{around.suffixes[k]}": nan} if how < 0.95 else {"fCycleTime": 0.5 * around.cycle}
     changes = (
         _change(command, later, lasts + 4.0 * around.cycle * (not goes), {"bEnable": 0.0}),
         _change(command, later, lasts + 1.5 * around.cycle * goes, taken),

@@ -12,7 +12,6 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
-from scipy.stats import qmc
 
 from gen_profile.evaluation import phrases
 from gen_profile.motion.profile import Array
@@ -23,6 +22,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
+from gen_profile.problem.sampling import latin_hypercube
 from gen_profile.proof.habits import BRAKING, HELD, ROUGH, Change, Manner, Surroundings, habit, rhythm
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
@@ -272,7 +272,7 @@ class Histories:
         (count, choices) array
         """
         random = np.random.default_rng(seed)
-        drawn: Array = qmc.LatinHypercube(self.choices, seed=random).random(count)
+        drawn: Array = latin_hypercube(count, self.choices, random)
         corners = self.corners(count)
         every = 2 ** min(self._ends, 62)
         numbers = np.arange(every) if every == corners else random.integers(every, size=corners)

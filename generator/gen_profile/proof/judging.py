@@ -31,7 +31,7 @@ class WatchedRun:
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
     later : mapping of str to sequence of float
-        Slow periods, by which commands of a kind are carried out later than allowed on average.
+        Slow periods more than limits take, in which commands of a kind are carried out.
     """
 
     run: BlockRun

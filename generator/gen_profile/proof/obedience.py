@@ -14,10 +14,13 @@ from gen_profile.proof.followed import (
     FROM_REST,
     IN_VELOCITY,
     ON_AVERAGE,
+    ON_WAY,
     RUN_OUT,
     TO_SLOW,
+    TO_STICK,
     TO_STOP,
     TO_TURN,
+    WAY,
     Allowance,
     Followed,
     IssuedMotion,
@@ -77,6 +80,7 @@ WORDS = {
     "wrong error": "nErrorId does not tell the error that there is, or one without a cause",
     "disabled": "bEnabled is not what bEnable asks for",
     "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
+    "no way": "a target is kept behind a blocked interval",
     "zone": "nZone is not the number of the blocked interval",
     "taken over": "a setpoint is not where the axis is taken over by {needed:.3g} m",
     QUICK_STOP: "a quick stop ends later than allowed by {over:.3g} s",
@@ -182,12 +186,13 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
 
 
 def _lateness(followed: Followed, order: TimedOrder, late: float, before: Array) -> Iterator[Allowance]:
-    """Measure by how many periods a target from rest is reached, or a stop ends, later than on average."""
-    if order.kind == STOP and before.any() and not followed.reserve:
-        yield Allowance(LATER[STOP], order.begin, late / followed.period + TO_STOP - ON_AVERAGE[STOP], inf)
-    if order.kind == POSITION and not before.any() and not followed.reserve:
-        late = (late + followed.reaction) / followed.period + FROM_REST - ON_AVERAGE[POSITION]
-        yield Allowance(LATER[POSITION], order.begin, late, inf)
+    """Measure by how many periods more than its limits take a command is carried out."""
+    kind = WAY if order.kind == POSITION and before.any() else order.kind
+    if followed.reserve or (kind == STOP and not before.any()):
+        return
+    late += followed.reaction * (kind == POSITION)
+    allowed = {POSITION: FROM_REST, WAY: ON_WAY, VELOCITY: TO_STICK, STOP: TO_STOP}[kind]
+    yield Allowance(LATER[kind], order.begin, late / followed.period + allowed, inf)
 
 
 def _left(

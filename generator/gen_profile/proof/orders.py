@@ -386,8 +386,10 @@ class _Reader:
     def _leads_into(self, facts: Facts, axis: int, cycle: int, fence: Interval) -> bool:
         """Whether the goal of an axis lies within or behind an interval, or a stop would lead there."""
         (low, high), place = fence, facts.position[axis, cycle]
-        if facts.low[axis, cycle] < high - ROUNDING and facts.high[axis, cycle] > low + ROUNDING:
+        lowest, highest = facts.low[axis, cycle], facts.high[axis, cycle]
+        if lowest < high - ROUNDING and highest > low + ROUNDING:
             return True
-        goal = self._goal[axis] if self._kind == POSITION else place
-        ahead, behind = goal > low and place <= low + ROUNDING, goal < high and place >= high - ROUNDING
+        goal = self._goal[axis] if self._kind == POSITION else place  # from within it may be on its way out
+        ahead = goal > low and min(place, highest) <= low + ROUNDING
+        behind = goal < high and max(place, lowest) >= high - ROUNDING
         return bool(ahead or behind)

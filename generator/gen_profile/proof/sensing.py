@@ -5,7 +5,6 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
@@ -30,11 +29,13 @@ FAULTS = (
     "dead",
     "late",
     "drop-outs",
+    "away",
 )
-NOTICED = ("silent", "no number", "out of range")  # others are noticed where they do harm
+NOTICED = ("silent", "away", "no number", "out of range")  # others are noticed where they do harm
 SHOW_NOTHING = ("frozen",)  # from the first value on, and nothing is promised then
 SHORTEST = 0.5  # s, of a gust
 LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
+AWAY = 2.0  # of the same time, for which one is silent that comes back
 NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
 JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
 FAR_OUT = 1e3  # of the same
@@ -143,7 +144,7 @@ class SensedHistory:
                     )
         shares_and_phases = zip([swing, *more[0]], [phase, *more[1]], strict=True)
         return cls(
-            starts=_starts(
+            starts=stated_swing(
                 spec, [(max(0.0, _stretched(a)), 2.0 * np.pi * b) for a, b in shares_and_phases], *machine
             ),
             gusts=tuple(gusts),
@@ -214,6 +215,8 @@ class SensedHistory:
         match self.fault if place == self.failing else "":
             case "silent":
                 valid[first:] = 0.0
+            case "away":
+                valid[first : first + round(AWAY * sensor.drop_out / cycle)] = 0.0
             case "no number":
                 added[first:] = np.nan
             case "out of range":
@@ -283,6 +286,8 @@ def sensor_faults(
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
             yield from _faults_of_a_faulty_one(spec, one, run, (at if noticed.any() else None, sway), cycle)
+            if fault == "away" and noticed[-1]:
+                yield f"a sensor that is back is not used again, from {one.fails:.2f} s"
         elif noticed.any():
             yield (
                 f"a sound sensor is taken for a faulty one ({axis.of('nSensorFault')} "
@@ -324,6 +329,8 @@ def _misstated(
             yield f"{uncertainty} is too small by {apart[at]:.3g} m, at {at * cycle:.2f} s"
     if fault not in SHOWS or disturbance.gust is None:
         return
+    from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
+
     cycles = np.arange(len(used))
     used[[min(round(time / cycle), len(used) - 1) for time in resets]] = False  # it forgets
     first = one.fails if fault else 0.0
@@ -363,13 +370,16 @@ def _coming_and_going(lost: float, cycles: int, random: np.random.Generator) -> 
     return np.concatenate(pieces)[:cycles]
 
 
-def _starts(
+def stated_swing(
     spec: Spec,
     swings: Sequence[tuple[float, float]],
     parameters: Mapping[str, float],
     places: Sequence[float],
 ) -> dict[str, float]:
-    """Let the slowest mode swing along each axis with a sensor by a share of what is stated, at a phase."""
+    """Let the slowest mode swing along each axis with a sensor by a share of what is stated, at a phase.
+
+    Coordinates that swing by name, and their rates as ``NAME.rate``.
+    """
     plant, (_, disturbance) = spec.machine(), _stated(spec)
     at, found = linearize(plant, parameters, places), np.zeros((2, len(plant.unactuated)))
     for axis, (share, phase) in zip(sensed_directions(spec), swings, strict=True):

@@ -40,7 +40,7 @@ BARELY = 5e-7  # share of the greatest velocity, within which one certainly is r
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
 TAKES_OVER = 0.1  # periods beyond the stated reaction, at which a plan that was found then takes over (0.04)
-USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
+USED_UP = 0.66  # of the allowed sway: plans are refused from 0.68 on, as an epoch ends (left.st)
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
@@ -52,6 +52,7 @@ UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as gi
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
+TAKEN_UP = 2  # cycles, in which a blocked interval is
 SHOWN = (10, 20, 21, 22, *range(50, 60), *range(60, 67), 70)  # codes of events that other outputs show, too
 COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
 PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
@@ -110,7 +111,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if not len(moving) or followed.sensed("bDamping")[order.begin : order.end].any():
             continue
         rests = order.begin + int(moving[-1]) + 1
-        if rests >= order.end or not _is_end(motion, order, rests):
+        if rests + 1 >= order.end or not _is_end(motion, order, rests):  # another may begin in that cycle
             continue
         takes = followed.reaction + TAKES_OVER * followed.period
         planned = order.begin + followed.after(takes)  # before, it tells of the former motion
@@ -326,7 +327,10 @@ def _fenced(followed: Followed, motion: IssuedMotion) -> Flags:
 def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge that no axis goes into a blocked interval, nor says that a stop may lead there."""
     low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    for zone, begin in _in_force(followed, motion, TO_STOP):
+    for zone, stopped in _in_force(followed, motion, TO_STOP):
+        before = max(zone.begin - 1, 0)
+        led = low[zone.axis, before] < zone.high and high[zone.axis, before] > zone.low
+        begin = stopped if led else zone.begin
         own = slice(begin, zone.end)
         place, guided = motion.position[zone.axis, own], motion.guided[own]
         within = np.minimum(place - zone.low, zone.high - place)
@@ -336,6 +340,14 @@ def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         above = place >= zone.high - EXACT
         leads = np.where(above, zone.high - low[zone.axis, own], high[zone.axis, own] - zone.low)
         yield from greatest("blocked", leads * guided, EXACT, begin)
+    kept = motion.guided & motion.goes & followed.received.holds
+    for zone in followed.zones:
+        own = slice(zone.begin, zone.end if not zone.limit else 0)
+        place, goal = motion.position[zone.axis, own], (motion.position + motion.way)[zone.axis, own]
+        ahead = (place <= zone.low) & (goal > zone.low + EXACT)
+        behind = (place >= zone.high) & (goal < zone.high - EXACT)
+        for begin, end in runs_of(kept[own] & (ahead | behind)):
+            yield Allowance("no way", own.start + begin, end - begin, TAKEN_UP)
     if followed.zones:
         wrong = followed.issued["nErrorId"] == BLOCKED
         for at in np.flatnonzero(np.diff(wrong, prepend=False) & wrong).tolist():
@@ -392,7 +404,8 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
     unknown += [*followed.rest_reports, *np.flatnonzero(followed.retold)[:1].tolist()]
     until = min(unknown, default=followed.cycles)
-    ends = [begin for begin, _ in runs_of(motion.stands) if 0 < begin < until]
+    rests = [(begin, min(end, until)) for begin, end in runs_of(motion.stands) if 0 < begin < until]
+    ends = [begin for begin, _ in rests]
     if followed.modes is None or not ends:
         return
     as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
@@ -411,7 +424,7 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield Allowance("sway left", ends[worst], float(above[worst]), 0.0)
         promised = followed.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
-        below = at_most - stated[ends]
+        below = at_most - [stated[begin:end].min() for begin, end in rests]  # as nothing decays
         worst = int(np.argmax(below))
         yield Allowance("understated", ends[worst], float(below[worst]), EXACT)
 

@@ -7,9 +7,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.proof.followed import ON_AVERAGE, WAY
 from gen_profile.proof.histories import History
 from gen_profile.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
 from gen_profile.proof.obedience import LATE, WORDS
+from gen_profile.proof.orders import POSITION, STOP, VELOCITY
 from gen_profile.summary import Summarised
 from gen_profile.verification.verdict import Examination
 
@@ -24,6 +26,12 @@ QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 FEWEST, SURE = 20, 2.0  # commands of a kind; and standard deviations of their mean
 LISTED = 10  # of the worst histories
+NAMED = {
+    POSITION: "Targets from rest are reached",
+    WAY: "Targets on the way are reached",
+    VELOCITY: "A stick's velocities are reached",
+    STOP: "Stops end",
+}
 TAKEN_BACK = "the block takes its promise back"
 
 
@@ -52,7 +60,7 @@ class JudgedHistory:
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
     later : mapping of str to sequence of float
-        Slow periods, by which commands of a kind are carried out later than allowed on average.
+        Slow periods more than limits take, in which commands of a kind are carried out.
     """
 
     number: int
@@ -231,13 +239,20 @@ class Proof(Summarised, Examination):
         }
 
 
-def late_on_average(judged: Sequence[JudgedHistory]) -> Iterator[str]:
-    """Say which commands of what is drawn are carried out later on average than allowed, beyond doubt."""
+def lateness(judged: Sequence[JudgedHistory]) -> dict[str, list[float]]:
+    """Collect by how many slow periods later than their limits allow commands are carried out, by kind."""
     drawn = [one.later for one in judged if one.group in (CORNERS, DRAWS)]
-    for kind, words in (("position", "Targets from rest are reached"), ("stop", "Stops end")):
-        late = [value for later in drawn for value in later.get(kind, ())]
-        if len(late) >= FEWEST and (least := np.mean(late) - SURE * np.std(late) / len(late) ** 0.5) > 0.0:
-            yield f"{words} later than allowed on average, by {least:.2g} slow periods or more."
+    return {kind: [value for later in drawn for value in later.get(kind, ())] for kind in ON_AVERAGE}
+
+
+def late_on_average(judged: Sequence[JudgedHistory]) -> Iterator[str]:
+    """Say which of these are carried out later on average than allowed, beyond doubt."""
+    for kind, late in lateness(judged).items():
+        if len(late) < FEWEST:
+            continue
+        least = np.mean(late) - ON_AVERAGE[kind] - SURE * np.std(late) / len(late) ** 0.5
+        if least > 0.0:
+            yield f"{NAMED[kind]} later than allowed on average, by {least:.2g} slow periods or more."
 
 
 def kind_of(fault: str) -> str:

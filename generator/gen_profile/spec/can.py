@@ -81,6 +81,34 @@ class FixedPdosSpec(Checked, table="can.fixed_pdos"):
         return any((*self.received, *self.sent))
 
 
+SENSOR_BYTES = {"int16": 2, "int32": 4, "float32": 4}
+
+
+@attrs.frozen(kw_only=True)
+class CanSensorSpec(Checked, table="can.sensor"):
+    """Frames of a node that tells what ``planner.sensor`` shows, for a planner block that is streamed.
+
+    Attributes
+    ----------
+    cob_id : int
+        Of its frames.
+    type : str
+        ``"int16"``, ``"int32"`` or ``"float32"``, little endian.
+    byte : tuple of int
+        At which byte of a frame the value of each sensor begins.
+    counts : float
+        What it counts for each rad (or m, rad/s, m/s).
+    reverse : bool
+        Whether it counts the other way.
+    """
+
+    cob_id: PdoCobId
+    type: Literal["int16", "int32", "float32"] = "int16"
+    byte: tuple[Annotated[int, Bounds(least=0, most=6)], ...] = (0,)
+    counts: Positive
+    reverse: bool = False
+
+
 @attrs.frozen(kw_only=True)
 class CanSpec(Checked, table="can"):
     """The drives on the CAN bus, and how they are to be fed, watched and stopped.
@@ -129,6 +157,8 @@ class CanSpec(Checked, table="can"):
         Serial number 1018h:04 that the drive of an axis must have.
     homed : (int, int, int) or None
         Index, subindex and bits of the drive's object that are set once it knows where its axis is.
+    sensor : CanSensorSpec or None
+        From which node a streamed planner block learns what its sensors show.
     """
 
     node: NodeId = 1
@@ -153,3 +183,4 @@ class CanSpec(Checked, table="can"):
     product: Unsigned32 | None = None
     serial: Annotated[Mapping[AxisName, Unsigned32], example("cart = 0x12345678")] = NONE
     homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
+    sensor: CanSensorSpec | None = None

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.plants.virtual_work import end_load_is_a_body
+from gen_profile.spec.can import SENSOR_BYTES, CanSensorSpec
 from gen_profile.spec.model import RobustnessSpec, Spec
+from gen_profile.spec.planner import SensorSpec
 from gen_profile.spec.structure import place
 from gen_profile.suggestion import suggestion
 from gen_profile.units import RATES, UNITS
@@ -14,6 +16,7 @@ from gen_profile.units import RATES, UNITS
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
 SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
 SMALL_SWING = 1e-3  # m (or rad), to compare forces with
+FRAME_BYTES = 8  # of CAN
 MOST_CORNERS = 10  # parameters whose ranges have 2¹⁰ corners
 
 Fault = tuple[str, ...]  # a place, what is wrong there, and other places that may be the cause
@@ -110,11 +113,25 @@ def _can(spec: Spec) -> Iterator[Fault]:
     if can.mode == "csv" and can.following_error is None:
         problem = 'required with mode = "csv": how far the axis may be off the motion, in m'
         yield "can.following_error", problem
+    if can.sensor is not None:
+        yield from _can_sensor(can.sensor, spec.planner.sensor)
     taken: dict[int, str] = {}
     for axis, node in can.nodes.items():
         if taken.setdefault(node, axis) != axis:
             problem = Phrase("{node} is the node of the axis {taken} already", node=node, taken=taken[node])
             yield place("can.nodes", axis), problem
+
+
+def _can_sensor(frames: CanSensorSpec, sensor: SensorSpec | None) -> Iterator[Fault]:
+    """Hold the frames of sensors to the sensors of the planner."""
+    if sensor is None:
+        yield "can.sensor", "only with planner.sensor; state that, or remove it"
+    elif len(frames.byte) != len(sensor.names):
+        template = "must have {count} numbers, one for each sensor"
+        yield "can.sensor.byte", Phrase(template, count=len(sensor.names)), "planner.sensor.of"
+    if max(frames.byte, default=0) + SENSOR_BYTES[frames.type] > FRAME_BYTES:
+        template = "{type} would end beyond the {most} bytes of a frame"
+        yield "can.sensor.byte", Phrase(template, type=frames.type, most=FRAME_BYTES)
 
 
 def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:

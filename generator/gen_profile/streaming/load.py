@@ -9,10 +9,12 @@ from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import length, peak
+from gen_profile.planner.machine import shown_by_sensors
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import max_step
-from gen_profile_fmu.running.stepping import SteppedPlant
+from gen_profile_exporters.can.sensor_frame import frame_of
+from gen_profile_fmu.running.stepping import Instant, SteppedPlant
 
 
 class CraneLoad:
@@ -40,6 +42,8 @@ class CraneLoad:
         self._settle, self._watch = STANDSTILL * tau, observation_time(spec)
         self._end_load = spec.machine().end_load
         self._position: Sequence[float] = spec.move.start
+        self._spec = spec
+        self._now: Instant | None = None
         self._fmu = SteppedPlant(
             spec.machine(),
             spec.move.start,
@@ -57,8 +61,16 @@ class CraneLoad:
 
     def advance(self, position: Sequence[float], duration: float) -> Sequence[float]:
         """Lead every axis evenly to a position in m (or rad), and return where the axes then are."""
-        self._position = position
-        return [float(at) for at in self._fmu.advance(position, duration).position]
+        self._position, self._now = position, self._fmu.advance(position, duration)
+        return [float(at) for at in self._now.position]
+
+    def sensor_frames(self) -> Sequence[tuple[int, bytes]]:
+        """Give COB-IDs and data of what sensors of the load send now, if the spec states some on the bus."""
+        frames, now = self._spec.can.sensor, self._now
+        if frames is None or now is None:
+            return ()
+        values = shown_by_sensors(self._spec, now.q_u, now.dq_u, now.sway)
+        return (frame_of(values.tolist(), frames),)
 
     def residual_sway(self) -> float:
         """Hold the axes, and return the greatest sway of the end load in m from their standstill on."""

@@ -1,10 +1,12 @@
 """Setpoints that a written planner block issues while they are streamed, called cycle by cycle."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol
 
 import attrs
+import can
 import numpy as np
 
 from gen_profile.errors import GenProfileError, SpecError, StreamAborted
@@ -12,8 +14,8 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.planner.commands import STILL, Command, inputs_of, start_cycles_of
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.interface import ISSUED, LOST, live_inputs
-from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.interface import ISSUED, LOST, SENSOR, BlockAxis, live_inputs
+from gen_profile.planner.machine import planned_axes, sensed_directions
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
 from gen_profile.streaming.status import StatusLine
@@ -30,6 +32,7 @@ from gen_profile_exporters.can.scaling import (
     setpoints,
     travel_counts,
 )
+from gen_profile_exporters.can.sensor_frame import values_in
 from gen_profile_exporters.can.streaming.plan import Step, cycle_of
 from gen_profile_exporters.exporter import Target, target_of
 from gen_profile_exporters.setpoints import INT32, TOO_FAR, require_within
@@ -138,6 +141,8 @@ class PlannedMotion:
         self._block, self._axes, self._operator = block, block.axes, operator
         self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live)
         self._calls = _calls(spec, self._values["fCycleTime"])
+        self._sensor, self._heard = spec.can.sensor, -math.inf  # which of the block's cycles had news of it
+        self._shown, self._fresh = _sensor_inputs(spec, block.axes, self._values["fCycleTime"])
         self._status = StatusLine(self._axes, self._values["fCycleTime"]) if watched else None
         self._still_enough = round(STILL / spec.can.sync_period)
         self._frames = frames.setpoint_frames(self.target)
@@ -213,6 +218,12 @@ class PlannedMotion:
                 raise StreamAborted(str(error)) from error
         return self._step
 
+    def take(self, message: can.Message) -> None:
+        """Take what the load's sensors show; frames of others are none of ours."""
+        if self._sensor is not None and (values := values_in(message, self._sensor)) is not None:
+            self._heard = self._called
+            self._values |= dict(zip(self._shown, values, strict=True))
+
     def end(self) -> bool:
         """Stop without sway, whatever the operator wants."""
         self._values |= inputs_of(Command(time=0.0, command="stop"), self._axes)
@@ -245,6 +256,8 @@ class PlannedMotion:
         self._called += 1
         due = [] if self._ends else [*self._waiting, *self._operator.due(self._called)]
         self._values["bReset"], self._waiting = float(bool(due)), []
+        heard = float(self._called - self._heard <= self._fresh)
+        self._values |= {name.replace(*SENSOR[:2]): heard for name in self._shown}
         for command in due:
             self._still = 0
             if command.command == "position" and self._values["bExecute"]:
@@ -301,6 +314,19 @@ class PlannedMotion:
         return self._status.words(
             self._called, dict(zip(self._outputs, self._rows[-1], strict=True)), commanded
         )
+
+
+def _sensor_inputs(spec: Spec, axes: Sequence[BlockAxis], cycle: float) -> tuple[list[str], int]:
+    """Name the inputs that sensors are shown to, and in how many cycles a value may be shown again.
+
+    It may become as much older as is stated of what is not known of its age.
+    """
+    sensor = spec.planner.sensor
+    if sensor is None or spec.can.sensor is None:
+        return [], 0
+    planned = list(planned_axes(spec))
+    shown = [axes[planned.index(number)].of(SENSOR[0]) for number in sensed_directions(spec)]
+    return shown, round((sensor.delay[1] - sensor.delay[0]) / cycle)
 
 
 def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> Demand:

@@ -307,7 +307,8 @@ def drive_bank(
         for axis, node, at in axes
     ]
     channels = frames.channels(target) if target.can.channels else ()
-    return DriveBank(bus, clock or SystemClock(), drives, scales, load, channels=channels)
+    others = load.sensor_frames
+    return DriveBank(bus, clock or SystemClock(), drives, scales, load, channels=channels, others=others)
 
 
 def _of_identity(make: DriveVariant, can: CanSpec, axis: str) -> DriveVariant:

@@ -18,14 +18,16 @@ from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.evaluation.phrases import machine, place_unit
 from gen_profile.evaluation.simulation import equations_of, swing_from
 from gen_profile.motion.profile import Array
-from gen_profile.planner.machine import planned_axes
-from gen_profile.planner.planner import Planner, SetpointHistory
+from gen_profile.planner.machine import planned_axes, sensed_directions
+from gen_profile.planner.planner import Planner
 from gen_profile.plants.drawing import Drawing
 from gen_profile.plants.looks import body_size, drawings, pose_of
-from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.dynamics import parameter_column, parameter_rows
+from gen_profile.proof.sensing import stated_swing
 from gen_profile.report.animation import Actor, Animation
 from gen_profile.spec.model import Spec
 from gen_profile.studio.orders import DriveQuestion
+from gen_profile.studio.simulated_sensor import SimulatedSensor
 from gen_profile.studio.views import fault
 
 MOMENT = 0.1  # s
@@ -88,54 +90,124 @@ class Drive:
         self._live = self._planner.live
         n_u = len(self._plant.unactuated)
         self._state = np.zeros((2, len(self._followers), n_u))  # coordinates and rates of every machine
-        self._axes = self._at(np.array([start]), np.zeros((2, 1, len(start))))[0]
+        self._axes = self._at(np.array([start]))[0]
         self._target: Array | None = None  # of the planned axes
+        cycle = self._planner.cycle_time
+        self._sensor: SimulatedSensor | None = None
+        if spec.planner.sensor is not None:
+            self._sensor = SimulatedSensor(spec, cycle)
+            self._state[:, 0] = self._swinging()
+            self._sensor.follow(self._state, self._axes[:1], self._rows()[:1])
         self._bounds = self._room()
 
     def moment(self, asked: DriveQuestion) -> Part:
         """Follow a hand for a moment, and tell what is then to be seen."""
-        issued = self._planner.hold(MOMENT, **self._orders(asked))
-        self._tell_live(asked.live)
-        position, velocity, acceleration = (
-            np.reshape(values, (-1, len(self._columns)))
-            for values in (issued.position, issued.velocity, issued.acceleration)
+        started = self._axes[None], self._state[:, None]
+        outputs, axes, states = self._go_on(asked)
+        position, velocity, low, high = (
+            self._of(outputs, name) for name in ("fPosition", "fVelocity", "fStopLow", "fStopHigh")
         )
-        ends = [self._stated(issued, name) for name in ("fStopLow", "fStopHigh")]
-        axes = self._at(position, np.stack([velocity, acceleration]))
-        states = self._swing(axes)
         shown = np.linspace(0, len(axes), FRAMES + 1).round().astype(int)
-        frames = self._animation(np.stack([self._axes, *axes])[shown, 0], states[0, shown])
-        self._axes, self._state = axes[-1], states[:, -1]
+        places, swung = np.concatenate([started[0], axes]), np.concatenate([started[1], states], axis=1)
+        frames = self._animation(places[shown, 0], swung[0, shown])
         return {
             "part": "driven",
             "animation": frames.to_json(self._bounds),
             "seconds": MOMENT,
-            "axes": self._facts(position[-1], velocity[-1], [end[-1] for end in ends]),
+            "axes": self._facts(position[-1], velocity[-1], [low[-1], high[-1]]),
             "live": [self._ranges(name, value) for name, value in self._live.items()],
             "target": None if self._target is None else self._target.tolist(),
             "marks": [] if self._target is None else self._marks(self._target).tolist(),
-            "stops": [self._marks(end[-1]).tolist() for end in ends],
+            "stops": [self._marks(end[-1]).tolist() for end in (low, high)],
             "trace": {
                 "times": (self._planner.cycle_time * shown[1:]).tolist(),
                 "position": position[shown[1:] - 1].T.tolist(),
                 "velocity": velocity[shown[1:] - 1].T.tolist(),
-                "low": ends[0][shown[1:] - 1].T.tolist(),
-                "high": ends[1][shown[1:] - 1].T.tolist(),
+                "low": low[shown[1:] - 1].T.tolist(),
+                "high": high[shown[1:] - 1].T.tolist(),
+                "estimated": self._estimated(outputs)[shown[1:] - 1].tolist() if self._sensor else [],
             },
-            "busy": bool(issued.busy[-1]),
-            "promise": bool(issued.promise[-1]),
-            "error": int(issued.error_id[-1]),
+            "busy": bool(outputs["bBusy"][-1]),
+            "promise": bool(outputs["bPromise"][-1]),
+            "error": int(outputs["nErrorId"][-1]),
+            "sensor": self._sensed(outputs),
         }
 
-    def _stated(self, issued: SetpointHistory, output: str) -> Array:
-        """Give an output of every planned axis, shape (cycles, axes)."""
-        names = [name for name in issued.outputs if name == output or name.startswith(f"{output}_")]
-        return np.stack([issued.outputs[name] for name in names], axis=1)
+    def _go_on(self, asked: DriveQuestion) -> tuple[Mapping[str, Array], Array, Array]:
+        """Let block and machines go on for a moment, no farther at once than it is known what sensors show.
+
+        Returns
+        -------
+        outputs : mapping of str to (cycles,) array
+            Of the block.
+        axes : (cycles, 3, axes) array
+        states : (2, cycles, machines, n_u) array
+        """
+        orders, cycle = self._orders(asked), self._planner.cycle_time
+        left, found = round(MOMENT / cycle), list[tuple[Mapping[str, Array], Array, Array]]()
+        if self._sensor is not None:
+            self._sensor.set(asked.sensor)
+        while left:
+            cycles = left
+            if self._sensor is not None:
+                cycles = min(left, self._sensor.known_cycles)
+                orders["sensor"] = self._sensor.shows(cycles)
+            outputs = self._planner.hold(cycles * cycle, **orders).outputs
+            self._tell_live(asked.live)
+            axes = self._at(
+                *(self._of(outputs, name) for name in ("fPosition", "fVelocity", "fAcceleration"))
+            )
+            states = self._swing(axes, asked.wind)[:, 1:]
+            self._axes, self._state = axes[-1], states[:, -1]
+            if self._sensor is not None:
+                self._sensor.follow(states[:, :, 0], axes[:, 0], self._rows()[:1])
+            found.append((outputs, axes, states))
+            orders, left = {}, left - cycles
+        parts = list(zip(*found, strict=True))
+        together = {name: np.concatenate([part[name] for part in parts[0]]) for name in parts[0][0]}
+        return together, np.concatenate(parts[1]), np.concatenate(parts[2], axis=1)
+
+    def _swinging(self) -> Array:
+        """Let the nominal machine swing by as much as is stated, shape (2, n_u)."""
+        along = len(sensed_directions(self._spec))
+        swing = stated_swing(
+            self._spec, [(along**-0.5, 0.0)] * along, self._parameters()[0], self._places.tolist()
+        )
+        names = [coordinate.name for coordinate in self._plant.unactuated]
+        return np.array([[swing[f"{name}{order}"] for name in names] for order in ("", ".rate")])
+
+    def _sensed(self, outputs: Mapping[str, Array]) -> Part | None:
+        """Tell what becomes of the sensor: its knobs, and what the block makes of it."""
+        if self._sensor is None:
+            return None
+        used, fault = (self._of(outputs, name)[-1] for name in ("bSensorUsed", "nSensorFault"))
+        disturbance = self._spec.planner.disturbance
+        gust = disturbance.gust if disturbance else None
+        return {
+            "knobs": self._sensor.knobs,
+            "wind": gust.acceleration if gust else 0.0,
+            "used": bool(used.all()),
+            "damping": bool(outputs["bDamping"][-1]),
+            "fault": int(fault.max()),
+        }
+
+    def _estimated(self, outputs: Mapping[str, Array]) -> Array:
+        """Give the end load's sway in mm by the block, shape (cycles,); along two axes its size."""
+        along = 1e3 * self._of(outputs, "fSwayEstimated")
+        return along[:, 0] if along.shape[1] == 1 else np.linalg.norm(along, axis=1)
+
+    def _of(self, outputs: Mapping[str, Array], output: str) -> Array:
+        """Give an output of every axis that has it, shape (cycles, axes)."""
+        names = [name for name in outputs if name == output or name.startswith(f"{output}_")]
+        return np.stack([outputs[name] for name in names], axis=1)
 
     def _orders(self, asked: DriveQuestion) -> dict[str, Any]:
         """Write a command as the planner takes it."""
-        if asked.command not in ("", *COMMANDS) or not np.isfinite(asked.values).all():
+        numbers = [*asked.values, *asked.wind, *asked.sensor.values()]
+        if asked.command not in ("", *COMMANDS) or not np.isfinite(numbers).all():
             raise SpecError(f"There is no command {asked.command[:20]!r} with such values.")
+        if asked.wind and len(asked.wind) != len(self._columns):
+            raise SpecError(f"Wind takes {len(self._columns)} values, one for each axis.")
         orders: dict[str, Any] = {"live": asked.live}
         if not asked.command:
             return orders
@@ -193,21 +265,30 @@ class Drive:
             for one in self._followers
         ]
 
-    def _at(self, position: Array, rates: Array) -> Array:
+    def _rows(self) -> Array:
+        """Give the parameters of every machine, shape (machines, parameters)."""
+        return parameter_rows(self._plant, self._parameters())
+
+    def _at(self, *motion: Array) -> Array:
         """Put the planned axes' motion beside those that stand still: shape (cycles, 3, axes)."""
-        axes = np.zeros((len(position), 3, len(self._places)))
+        axes = np.zeros((len(motion[0]), 3, len(self._places)))
         axes[:, 0] = self._places
-        for order, values in enumerate((position, *rates)):
+        for order, values in enumerate(motion):
             axes[:, order, self._columns] = values
         return axes
 
-    def _swing(self, axes: Array) -> Array:
-        """Let all machines follow the axes, shape (2, cycles + 1, machines, n_u)."""
-        rows = np.stack([self._axes, *axes]).reshape(len(axes) + 1, -1)
+    def _swing(self, axes: Array, wind: Sequence[float]) -> Array:
+        """Let all machines follow the axes, shape (2, cycles + 1, machines, n_u).
+
+        Loads that wind pushes in proportion to their masses swing as where the axes accelerate against it.
+        """
+        moved = np.stack([self._axes, *axes])
+        moved[:, 2, self._columns] -= wind or 0.0
+        rows = moved.reshape(len(moved), -1)
         times: Array = self._planner.cycle_time * np.arange(len(rows), dtype=np.float64)
         return swing_from(
             self._plant,
-            np.concatenate([parameter_column(self._plant, values) for values in self._parameters()]),
+            self._rows(),
             motion=lambda nodes: np.stack([np.interp(nodes, times, row) for row in rows.T], axis=1),
             start=self._state,
             times=times,
@@ -288,7 +369,7 @@ def _load(drawing: Drawing) -> int:
 
 
 def _followers(spec: Spec) -> Sequence[Follower]:
-    """Choose the machines: nominal, and both ends of every range beside."""
+    """Choose the machines: nominal, and both ends of every range beside; a sensor measures but the first."""
     ranges, nominal = spec.checked_ranges(), spec.plant.parameters
     ends = {
         name: (low / nominal[name], high / nominal[name])
@@ -296,7 +377,7 @@ def _followers(spec: Spec) -> Sequence[Follower]:
         if nominal[name] != 0.0 and name not in spec.check.spans
     }
     followers = [Follower(name="nominal", off={})]
-    for side in (0, 1) if ends else ():
+    for side in (0, 1) if ends and spec.planner.sensor is None else ():
         off = {name: both[side] for name, both in ends.items()}
         words = ", ".join(f"{name} {100.0 * (factor - 1.0):+.3g} %" for name, factor in off.items())
         followers.append(Follower(name=machine(words), off=off))

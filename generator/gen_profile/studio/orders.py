@@ -94,6 +94,10 @@ class DriveQuestion:
         picture, and a place in it in m.
     live : mapping of str to float
         Live parameters, as they are now.
+    sensor : mapping of str to float
+        What is wrong with a simulated sensor, as `SimulatedSensor.set` takes it.
+    wind : tuple of float
+        m/s² along each axis that is planned, by which it pushes all loads; calm if empty.
     """
 
     question: Question
@@ -101,6 +105,8 @@ class DriveQuestion:
     command: str
     values: tuple[float, ...]
     live: Mapping[str, float]
+    sensor: Mapping[str, float]
+    wind: tuple[float, ...]
 
 
 @attrs.frozen(kw_only=True)

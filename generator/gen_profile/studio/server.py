@@ -329,6 +329,8 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             command=str(said["command"]),
             values=tuple(map(float, said["values"])),
             live={str(name): float(value) for name, value in said["live"].items()},
+            sensor={str(name): float(value) for name, value in said["sensor"].items()},
+            wind=tuple(map(float, said["wind"])),
         )
         self._session.ask("drive", int(said["number"]), asked)
 

@@ -29,9 +29,9 @@ def test_stands_still_while_the_machine_does():
 def test_what_was_done_before_counts_for_nothing():
     clock = SharedClock(longest=5 * MS)
     time.sleep(0.05)
-    before = clock.catch_up()
+    real, before = time.monotonic_ns(), clock.catch_up()
     assert before >= 45 * MS
-    assert clock.catch_up() - before < 45 * MS
+    assert clock.catch_up() - before <= time.monotonic_ns() - real
 
 
 def test_others_work_even_when_an_instant_has_passed():

@@ -57,7 +57,11 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     ExportError
         The text is no such log, was cut off, or is for other nodes than the target's.
     """
-    taken, stamps = read_setpoints(content, target)
+    return played(*read_setpoints(content, target), target)
+
+
+def played(taken: frames.Integers, stamps: Sequence[Frame], target: Target) -> SampledProfile:
+    """Tell where setpoints of all cycles lead the axes, by the stamps of their SYNCs."""
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
     if target.can.mode == "csv":
         return _led_by_velocity(taken[:, :, 0], _cycle_time(stamps), target)

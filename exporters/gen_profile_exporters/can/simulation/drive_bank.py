@@ -55,6 +55,8 @@ class DriveBank:
     load : Load
     channels : sequence of str
         Of each drive, where they are on several buses; each answers the SYNC of its own.
+    others : callable
+        COB-IDs and data of what other nodes send after each SYNC.
     """
 
     def __init__(
@@ -66,11 +68,12 @@ class DriveBank:
         load: Load,
         *,
         channels: Sequence[str] = (),
+        others: Callable[[], Sequence[tuple[int, bytes]]] = tuple,
     ) -> None:
         self.drives = tuple(drives)
         self._bus, self._clock, self.load = bus, clock, load
         self._counts_per_si = tuple(counts_per_si)
-        self._network = _Network(bus, clock)
+        self._network, self._others = _Network(bus, clock), others
         self._synced = clock.now()
         self._channels = tuple(channels)
         self._waiting = set(self._channels)  # for SYNC in this cycle
@@ -151,6 +154,7 @@ class DriveBank:
     def _set_out(self) -> None:
         self._waiting = set(self._channels)
         self._advance()
+        self._tell(self._others())
 
     def _tell(self, pdos: Sequence[tuple[int, bytes]]) -> None:
         for cob_id, data in pdos:

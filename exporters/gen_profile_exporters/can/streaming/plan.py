@@ -12,7 +12,7 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.can import frames, pdos
-from gen_profile_exporters.can.export.exporter import read_setpoints, replay
+from gen_profile_exporters.can.export.exporter import played, read_setpoints
 from gen_profile_exporters.can.frames import Integers, SetpointFrame, message
 from gen_profile_exporters.can.scaling import Demand, Setpoints, demand_of
 from gen_profile_exporters.exporter import Target
@@ -88,6 +88,9 @@ class SetpointSource(Protocol):
     def step(self, cycle: int) -> Step | None:
         """Give the setpoints of a cycle, or None where the motion is over; the numbers never fall."""
 
+    def take(self, message: can.Message) -> None:
+        """Take in what any node sends meanwhile."""
+
     def end(self) -> bool:
         """End the motion early without sway, if that is possible."""
 
@@ -146,6 +149,9 @@ class StreamPlan:
         """Give the setpoints of a cycle, or None behind the last."""
         return self._step(cycle) if cycle < len(self.cycles) else None
 
+    def take(self, message: can.Message) -> None:
+        """Know everything beforehand."""
+
     def end(self) -> bool:
         """End nowhere but at its own end."""
         return False
@@ -171,13 +177,13 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
     ExportError
         It is none, is damaged, or has another period than the target.
     """
-    motion = replay(content, target)
+    taken, stamps = read_setpoints(content, target)
+    motion = played(taken, stamps, target)
     if motion.cycle_time != target.can.sync_period:
         raise ExportError(
             f"can.sync_period: the log's cycle is {motion.cycle_time:g} s and the spec's "
             f"{target.can.sync_period:g} s; export the log again."
         )
-    taken, _ = read_setpoints(content, target)
     setpoints = _setpoints(taken, motion, target)
     return StreamPlan(target=target, motion=setpoints, cycles=cycles_of(setpoints, target))
 

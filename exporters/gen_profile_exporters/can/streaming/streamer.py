@@ -80,6 +80,7 @@ class Streamer:
             ours=frames.commanding_cob_ids(target),
         )
         self._link.subscribe(self._watch.take)
+        self._link.subscribe(source.take)
         self._following = Following(self._watch.axes, target, windows(source.demand, target))
         self._recorder = Recorder(book or Book.blank(source.most, len(target.axes)))
         self._found = Restoration()

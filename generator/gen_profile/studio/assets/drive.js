@@ -7,7 +7,7 @@ const driving = (() => {
   const $ = (id) => document.getElementById(id);
   let page = null; // what the page lends: words, its state, its socket
   let drive = 0, number = 0;
-  let running = false, pointing = false, order = null, sent = null, live = {};
+  let running = false, pointing = false, order = null, sent = null, live = {}, sensor = {}, wind = [];
   let helm = null; // the controls, once it is known what there is to control
   let actors = null, playing = null, next = null, told = null;
   let history = null; // of the last minute: times, and what every curve was at them
@@ -19,6 +19,8 @@ const driving = (() => {
     running = true;
     order = { command: "", values: [] };
     live = {};
+    sensor = {};
+    wind = [];
     history = null;
     $("undriven").textContent = page.phrase("drive.preparing");
     $("undriven").className = "";
@@ -40,7 +42,7 @@ const driving = (() => {
 
   function ask() {
     sent = order;
-    page.say({ say: "drive", number: ++number, state: page.state(), drive, ...order, live });
+    page.say({ say: "drive", number: ++number, state: page.state(), drive, ...order, live, sensor, wind });
   }
 
   function command(name, values = []) {
@@ -99,7 +101,8 @@ const driving = (() => {
   function remember(part) {
     const { axes, animation, trace } = part;
     const rows = axes.flatMap((_, axis) => [trace.position[axis], trace.low[axis], trace.high[axis], trace.position[axis].map(() => part.target?.[axis] ?? null), trace.velocity[axis]]);
-    const all = [...rows, ...animation.actors.map((actor) => actor.sway_mm.slice(-trace.times.length))];
+    const sways = animation.actors.map((actor) => actor.sway_mm.slice(-trace.times.length));
+    const all = [...rows, ...sways, ...(part.sensor ? [trace.estimated] : [])];
     history ??= { times: [], rows: all.map(() => []), now: 0, rested: 0 };
     if (part.busy || !part.promise) history.rested = history.now + part.seconds; // until then the load may swing
     history.times.push(...trace.times.map((time) => history.now + time));
@@ -110,7 +113,7 @@ const driving = (() => {
     if (!still) drawMinute(part);
   }
 
-  function drawMinute({ axes, animation }) {
+  function drawMinute({ axes, animation, sensor }) {
     const of = 5, end = Math.max(history.now, FIRST); // rows of an axis; end of the time that is shown
     const curve = (name, colour, y, more = {}) => ({ name, colour, dash: "solid", width: 1.6, y, ...more });
     const faint = { width: 0.8, colour: "ghost" };
@@ -133,6 +136,7 @@ const driving = (() => {
       ];
     });
     const sways = animation.actors.map((actor, index) => curve(actor.name, actor.colour, history.rows[of * axes.length + index]));
+    if (sensor) sways.push(curve("drive.estimated", "#d55e00", history.rows.at(-1), { dash: "dash" }));
     const kept = history.rested < history.now ? [animation.limit_mm, -animation.limit_mm] : [];
     const limits = kept.map((value) => ({ value, between: [history.rested, end] }));
     panels.push(panel(page.phrase("drive.sway"), "mm", sways, { levels: limits }));
@@ -153,6 +157,7 @@ const driving = (() => {
         [`${name}${page.phrase("drive.stops")}`, `${bare(axis, axis.stop_low)} … ${place(axis, axis.stop_high)}`],
       ];
     });
+    if (part.sensor) lines.push([page.phrase("drive.sensor"), sensorWords(part.sensor)]);
     $("driven").replaceChildren(...lines.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
     const kept = part.promise ? "promise" : "open";
     if ($("promise").dataset.kept !== kept) { // a screen reader gets changes only
@@ -173,6 +178,11 @@ const driving = (() => {
       if (!pointing) command("target", part.target);
     }
     buttons();
+  }
+
+  function sensorWords({ fault, used, damping }) {
+    if (fault) return page.filled("drive.sensor.fault", { fault });
+    return page.phrase(damping ? "drive.sensor.damping" : used ? "drive.sensor.used" : "drive.sensor.unused");
   }
 
   function buttons() {
@@ -204,19 +214,31 @@ const driving = (() => {
     const targets = part.axes.map((axis) => slider(named("move.target", axis), { least: axis.travel[0], most: axis.travel[1], value: axis.position }, (value) => place(axis, value), aim));
     function steer() { command("velocity", sticks.map(({ range }) => Number(range.value))); }
     function aim() { command("target", targets.map(({ range }) => Number(range.value))); }
-    for (const stick of sticks) {
-      stick.range.addEventListener("pointerup", () => { // a stick that is let go springs back
-        stick.range.value = "0";
-        stick.put();
-        steer();
-      });
+    const gust = part.sensor?.wind ?? 0;
+    const winds = (gust ? part.axes : []).map((axis) => slider(named("drive.wind", axis), { least: -gust, most: gust, value: 0 }, (value) => `${numbers.local(value.toFixed(2))} m/s²`, blow));
+    function blow() { wind = winds.map(({ range }) => Number(range.value)); }
+    for (const [levers, act] of [[sticks, steer], [winds, blow]]) {
+      for (const { range, put } of levers) {
+        range.addEventListener("pointerup", () => { // what is let go springs back
+          range.value = "0";
+          put();
+          act();
+        });
+      }
     }
+    const errors = (part.sensor?.knobs ?? []).map((knob) => slider(page.phrase(`drive.sensor.${knob.name}`), knob, (now) => numbers.local(now.toPrecision(2)), () => {
+      for (const [index, { name }] of part.sensor.knobs.entries()) sensor[name] = Number(errors[index].range.value);
+    }));
     const ropes = part.live.map(({ name, value, least, most, unit }) => slider(name, { least, most, value }, (now) => `${numbers.local(now.toFixed(2))} ${unit}`, () => {
       live = Object.fromEntries(ropes.map(({ range }, index) => [part.live[index].name, Number(range.value)]));
     }));
     const views = [...document.querySelectorAll("#drive .stage svg")].map((svg, place) => pictured(svg, part.animation.views, place % part.animation.views.length));
     helm = { sticks, targets, views, live: ropes.map(({ range }) => range) };
-    $("helm").replaceChildren(...[...sticks, ...targets, ...ropes].map(({ host }) => host));
+    const silent = element("input", { type: "checkbox" });
+    silent.checked = Boolean(sensor.lost);
+    silent.addEventListener("change", () => { sensor.lost = Number(silent.checked); });
+    const silence = element("label", { class: "lever" }, element("span", {}, silent, ` ${page.phrase("drive.sensor.lost")}`));
+    $("helm").replaceChildren(...[...sticks, ...targets, ...ropes, ...winds, ...errors].map(({ host }) => host), ...(part.sensor ? [silence] : []));
   }
 
   /** Let the target be dragged in a picture, and mark where the load will hang. */
