@@ -83,7 +83,7 @@ def test_less_sensitive_motions_take_little_longer(distance):
 @pytest.fixture(scope="module")
 def refusing():
     """A block whose allowed sway gives no room to any way back after 44 m, and its patience."""
-    allowed = ["check.residual_sway=0.004", "check.uncertain={L1=0.1}", "limits.travel=[0.0, 90.0]"]
+    allowed = ["check.residual_sway=0.0035", "check.uncertain={L1=0.1}", "limits.travel=[0.0, 90.0]"]
     text = planner_block(parse_spec(BAY, allowed)).text
     block = CountedBlock(compile_counting(text), fL1=6.8, fm2=1000.0, fActPosition=1.0)
     block.hold(500)
