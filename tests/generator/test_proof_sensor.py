@@ -148,7 +148,10 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     assert not faults(sound, fSensorScale=1.5, fAcceleration=0.1 * swings)  # too little to tell
     assert not faults(sound, range(1, 20, 5), fSensorScale=1.5, fAcceleration=swings)  # forgotten by resets
     assert not faults(dead, fSensorScale=0.3, fAcceleration=swings)
-    assert "fSensorScale is wrong by 1" in faults(dead, fAcceleration=swings)[0]
+    assert "fSensorScale is wrong by 0.998" in faults(dead, fAcceleration=swings)[0]
+    stronger = np.where(np.arange(5000) * CYCLE < dead.fails, 30.0, 1.0) * swings  # which is still remembered
+    assert not faults(dead, fSensorScale=0.6, fAcceleration=stronger)
+    assert faults(dead, fSensorScale=0.6, fAcceleration=swings)
     assert not faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.06)
     (off,) = faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.04)
     assert off.startswith("fSwayUncertainty is too small by 0.16 m")

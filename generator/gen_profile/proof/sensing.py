@@ -336,13 +336,16 @@ def _misstated(
     first = one.fails if fault else 0.0
     rate, since = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
     swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
-    own = lfilter(swings.ravel(), fades, issued[axis.of("fAcceleration")] * (cycles * cycle > first))
+    since_first = (cycles * cycle > first)[:, None]
+    moved = issued[axis.of("fAcceleration")][:, None] * np.hstack([since_first, np.ones_like(since_first)])
     share = cycle / period
-    strength = rate**2 * np.sqrt(lfilter([share], [1.0, share - 1.0], own**2)) / disturbance.gust.acceleration
+    own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
+    strength = rate**2 * np.sqrt(own[:, 0]) / disturbance.gust.acceleration
     strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
     at = int(np.argmax(strength))
     scale = axis.of("fSensorScale")
-    wrong = abs(issued[scale][at] - SHOWS[fault])
+    remembered = max(0.0, 1.0 - own[at, 0] / max(own[at, 1], 1e-300))  # of what it showed before it failed
+    wrong = abs(issued[scale][at] - SHOWS[fault] - remembered * (1.0 - SHOWS[fault]))
     if strength[at] > STRONG and wrong > KNOWN_TO:
         yield f"{scale} is wrong by {wrong:.3g}, at {at * cycle:.2f} s"
 
