@@ -96,6 +96,11 @@ def test_a_moment_tells_what_curves_of_the_last_minute_show():
     assert low[0] == pytest.approx(axis["stop_low"]) and high[0] == pytest.approx(axis["stop_high"])
 
 
+def test_a_moment_lasts_a_whole_number_of_cycles():
+    (part,) = moments(1, preset="bay-crane", edits={"export.cycle_time": 0.03}, drive=9)
+    assert part["seconds"] == part["trace"]["times"][-1] == pytest.approx(0.09)
+
+
 def test_machines_swing_by_the_equations():
     """After a quick stop they swing freely, as others integrate them."""
     going = Drive(asked().question.spec())

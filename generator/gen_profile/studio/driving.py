@@ -113,7 +113,7 @@ class Drive:
         return {
             "part": "driven",
             "animation": frames.to_json(self._bounds),
-            "seconds": MOMENT,
+            "seconds": self._planner.cycle_time * len(axes),
             "axes": self._facts(position[-1], velocity[-1], [low[-1], high[-1]]),
             "live": [self._ranges(name, value) for name, value in self._live.items()],
             "target": None if self._target is None else self._target.tolist(),
@@ -144,7 +144,7 @@ class Drive:
         states : (2, cycles, machines, n_u) array
         """
         orders, cycle = self._orders(asked), self._planner.cycle_time
-        left, found = round(MOMENT / cycle), list[tuple[Mapping[str, Array], Array, Array]]()
+        left, found = max(1, round(MOMENT / cycle)), list[tuple[Mapping[str, Array], Array, Array]]()
         if self._sensor is not None:
             self._sensor.set(asked.sensor)
         while left:
