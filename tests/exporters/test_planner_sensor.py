@@ -149,6 +149,20 @@ def test_a_sensor_that_fails_before_it_showed_anything_withdraws_the_promise(com
     assert not swung.run(0.1, bLoadAtRest=1.0)["nPromise"][-1]  # who knows may say so
 
 
+@pytest.mark.slow
+def test_a_value_that_stays_the_same_may_hide_a_gust():
+    compiled = compile_counting(planner_block(preset_spec("bay-crane", [LIVE, SENSOR, GUSTS])).text)
+    swung, sound = crane(compiled), {"noise": 0.002, "random": np.random.default_rng(4)}
+    assert swung.run(10.0, **sound)["bPromise"][-1]
+    swung.gust = 0.08
+    swung.run(1.2, **sound)
+    swung.gust = 0.0
+    swung.run(0.1, **sound)  # which the sensor has hardly shown yet
+    issued = swung.run(10.0, sensor=lambda *_: 0.0)
+    assert np.abs(issued["sway"][-1000:]).max() > 1.2 * ALLOWED
+    assert issued["nPromise"][-1] == 6.0
+
+
 def test_an_override_of_0_holds_while_the_load_swings(compiled):
     swung = crane(compiled, swing=(0.4, 0.5))
     issued = swung.run(6.0, rOverride=0.0)

@@ -46,9 +46,9 @@ class SensorConstants:
     most, step, gate, frozen, noisy : float
         In its unit: what it may show; change from cycle to cycle; difference from what is expected, and
         the change of that while the value stays the same; mean square change.
-    swing, floor, begin, again, roused, end : float
-        m, of the slowest mode: what is unknown at first and later; where damping begins as the axis arrives,
-        where later at rest, where once it hung still, and where it ends.
+    swing, hides, floor, begin, again, roused, end : float
+        m, of the slowest mode: what is unknown at first, where the value stays the same, and later; where
+        damping begins as the axis arrives, where later at rest, where once it hung still, and where it ends.
     gains : (3,) sequence of float
         Of sway, its rate and position, in pulses of a slot.
     misread : float
@@ -70,6 +70,7 @@ class SensorConstants:
     frozen: float
     noisy: float
     swing: float
+    hides: float
     floor: float
     begin: float
     again: float
@@ -169,6 +170,7 @@ def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
         "cSensorStep": sensor.step,
         "cSensorGate": sensor.gate,
         "cSensorFrozen": sensor.frozen,
+        "cSensorHides": sensor.hides,
         "cSensorNoisy": sensor.noisy,
         "cSensorSmoothing": min(1.0, cycle / NOISE_WATCHED),
         "cSensorScale": sensor.misread,

@@ -147,7 +147,7 @@ def _constants(
         for order in (0, 1)
     )
     slope = own_slope + disturbed * max(float(one.frequencies[0]) for one in sensed)
-    noise = sensor.noise
+    noise, swing = sensor.noise, max(one.swing for one in sensed)
     floor = max(float(_floor(sensor, one)[0]) for one in sensed)
     unit = next((one.unit for one in spec.machine().unactuated if one.name in sensor.names), "m")
     words = {"angle": "{}", "rate": "the rate of {}", "sway": "the sway of the {}"}[sensor.quantity]
@@ -168,7 +168,8 @@ def _constants(
         gate=_gate(sensor, disturbed),
         frozen=STUCK * noise,
         noisy=(NOISES * noise) ** 2 + slope**2 * UPDATE * spec.export.cycle_time,
-        swing=max(one.swing for one in sensed),
+        swing=swing,
+        hides=swing if disturbance.gust else 0.0,
         floor=floor,
         begin=BEGIN * allowed,
         again=AGAIN * allowed,
