@@ -102,6 +102,26 @@ def test_on_the_way_it_is_damped_within_the_limits_and_the_way_takes_little_long
     require_limits(issued)
 
 
+SLOWER = {
+    "stop": ({"bStop": 1.0}, 0.3),  # it stands, and damps
+    "stick": ({"bVelocity": 1.0}, 0.3),
+    "override": ({"rOverride": 0.5}, 0.551),
+    "limit": ({"fVelocityLimit": 0.55}, 0.551),
+}  # and how fast an axis may go 8 s later, in m/s
+
+
+@pytest.mark.parametrize("name", SLOWER)
+def test_while_it_damps_on_the_way_a_stop_and_a_lower_limit_are_obeyed(compiled, name):
+    swung = crane(compiled, swing=(0.5, 0.8))
+    swung.run(0.1)
+    swung.run(8.0, fTarget=1.0, bExecute=1.0)
+    assert swung.rows["bDamping"][-1] and swung.rows["fVelocity"][-1] < -0.7
+    inputs, most = SLOWER[name]
+    issued = swung.run(10.0, **inputs)
+    assert np.abs(issued["fVelocity"][-500:]).max() <= most
+    require_limits(issued)
+
+
 def test_after_a_quick_stop_the_promise_comes_back_by_itself(compiled):
     swung = crane(compiled)
     swung.run(1.0)

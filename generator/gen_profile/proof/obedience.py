@@ -31,7 +31,7 @@ from gen_profile.proof.followed import (
     runs_of,
     slowing,
 )
-from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
+from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
 from gen_profile.proof.statements import (
     blocked,
     events,
@@ -167,7 +167,7 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 there = np.arange(begin, end) >= first
             case "stop":
                 allowed = slowing(followed, before, TO_STOP)
-                there = motion.stands[own] | followed.sensed("bDamping")[own]
+                there = motion.stands[own] | _damped_at_rest(followed, motion)[own]
             case _:
                 continue
         latest = since + followed.after(allowed)
@@ -183,6 +183,14 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield from _lateness(followed, order, lasts - allowed, before)
         if order.kind == POSITION:
             yield from _left(followed, motion, (first, end), allowed)
+
+
+def _damped_at_rest(followed: Followed, motion: IssuedMotion) -> Flags:
+    """Tell when a load is damped since its axes stood."""
+    at_rest = np.zeros(followed.cycles, dtype=bool)
+    for begin, end in runs_of(followed.sensed("bDamping")):
+        at_rest[begin:end] = motion.stands[max(0, begin - 1)]
+    return at_rest
 
 
 def _lateness(followed: Followed, order: TimedOrder, late: float, before: Array) -> Iterator[Allowance]:

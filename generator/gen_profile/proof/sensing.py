@@ -332,7 +332,6 @@ def _misstated(
     from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
 
     cycles = np.arange(len(used))
-    used[[min(round(time / cycle), len(used) - 1) for time in resets]] = False  # it forgets
     first = one.fails if fault else 0.0
     rate, since = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
     swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
@@ -342,6 +341,7 @@ def _misstated(
     own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
     strength = rate**2 * np.sqrt(own[:, 0]) / disturbance.gust.acceleration
     strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
+    strength *= cycles * cycle < min(resets, default=np.inf)  # when it forgets, perhaps on the way
     at = int(np.argmax(strength))
     scale = axis.of("fSensorScale")
     remembered = max(0.0, 1.0 - own[at, 0] / max(own[at, 1], 1e-300))  # of what it showed before it failed
