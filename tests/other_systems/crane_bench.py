@@ -29,7 +29,7 @@ SPEC = (
     "limits={axis={cart={velocity=2.0, acceleration=0.6, jerk=1.2, travel=[-5.0, 25.0]}}}",
     "export.cycle_time=0.01",
     "check.residual_sway=0.0003",
-    'planner.sensor={quantity="angle", of="phi", noise=0.00001, offset=0.02}',
+    'planner.sensor={quantity="angle", of="phi", noise=0.000003, offset=0.02}',
     "planner.disturbance={swing={payload=0.5}, gust={acceleration=0.15, longest=5.0}, settle=20.0}",
 )
 CYCLE = 0.01  # s, of its controllers

@@ -36,7 +36,10 @@ from gen_profile_exporters.planner.sensor_constants import (
     model_rows,
 )
 
-BANDWIDTH = 1.0  # of the observer at most, by the slowest frequency: what ropes and delays are wrong by
+# Bandwidth of the observer at most, by the slowest frequency: where delay and frequency are known, and where
+# not. A quicker one takes an unknown delay and a wrong rope for sway.
+QUICK, USUAL = 2.5, 1.0
+KNOWN = 0.05  # rad, of both together: the greatest uncertainty at which it is quicker
 FAST = 0.1  # how much other modes are expected to be excited, by what the sensor shows of them
 OFFSET_TIME = 0.35  # slow periods, in which an offset is learnt
 NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cycles are shorter
@@ -70,6 +73,8 @@ class SensedModes:
         What an acceleration does to z, what the sensor shows of it, and the end load's sway by it.
     swing : float
         m, stated for z of the slowest mode.
+    bandwidth : float
+        rad/s, of the observer at most.
     """
 
     frequencies: Array
@@ -78,6 +83,7 @@ class SensedModes:
     shown: Array
     end_load: Array
     swing: float
+    bandwidth: float
 
 
 def sensor_constants(
@@ -214,8 +220,10 @@ def _age(sensor: SensorSpec) -> float:
 
 
 def _sensed(spec: Spec, point: Sequence[float], direction: SensedDirection) -> SensedModes:
-    at, disturbance = linearized(spec, point), spec.planner.disturbance
-    assert disturbance is not None
+    at, sensor, disturbance = linearized(spec, point), spec.planner.sensor, spec.planner.disturbance
+    assert sensor is not None and disturbance is not None
+    slowest, errors = float(at.distinct_frequencies[0]), float(frequency_errors(spec)[0])
+    unknown = slowest * 0.5 * (sensor.delay[1] - sensor.delay[0]) + errors
     sways = at.sway_gain @ driven_modes(at, direction.axis)
     push = np.abs(sways[direction.largest, range(sways.shape[1])])
     by_load = dict(zip(spec.machine().loads, np.abs(sways[:, 0] / push[0]).tolist(), strict=True))
@@ -234,6 +242,7 @@ def _sensed(spec: Spec, point: Sequence[float], direction: SensedDirection) -> S
         shown=shown_of_modes(spec, at, direction) / push,
         end_load=sways[direction.end_load] / push,
         swing=min(swings),
+        bandwidth=slowest * min(QUICK, max(USUAL, KNOWN / max(unknown, 1e-9))),
     )
 
 
@@ -254,7 +263,7 @@ def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
         spread[2 * mode + 1] = push * (FAST * like**2 if mode else 1.0)
     measured[0, -1] = 1.0
     shows = abs(one.shown[0]) * slowest**rate
-    noise = max(sensor.noise**2 * NOISE_TIME, push * shows**2 / (BANDWIDTH * slowest) ** 4)
+    noise = max(sensor.noise**2 * NOISE_TIME, push * shows**2 / one.bandwidth**4)
     spread[-1] = noise / (OFFSET_TIME * 2.0 * np.pi / slowest) ** 2
     covariance = solve_continuous_are(state.T, measured.T, np.diag(spread), np.array([[noise]]))
     return state, measured, np.asarray(covariance @ measured.T / noise)[:, 0]
