@@ -272,6 +272,9 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             calms = CALMS * max(limits.margin for limits in followed.limits)
             yield from greatest("ends", leaves, STATED + calms, begin)
         if order.kind == QUICK_STOP:
+            after = begin + np.flatnonzero(motion.stands[begin:])[:1]  # it brakes on when another order comes
+            rest = motion.position[:, [*after, order.end - 1][0]][:, None]
+            highest, lowest = np.maximum(highest, rest), np.minimum(lowest, rest)
             wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own]
             margin = max(limits.margin for limits in followed.limits)
             yield from greatest("loose", wide, margin + EXACT, begin)
