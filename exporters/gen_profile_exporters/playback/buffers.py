@@ -34,7 +34,7 @@ from gen_profile_exporters.block_source import (
     parse_function_block,
 )
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.block import fill
+from gen_profile_exporters.playback.block import fill, layout_of
 from gen_profile_exporters.playback.layouts import LAYOUTS
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
@@ -146,7 +146,7 @@ def _buffered(
     sources: Sequence[BlockSource], target: Target, capacity: int | None, *, library: bool
 ) -> BlockSource:
     constants = {variable.name: variable for variable in sources[0].variables}
-    layout, axes = _layout(constants), len(_split(constants["cStart"]))
+    layout, axes = layout_of(sources[0].declaration()), len(_split(constants["cStart"]))
     cycle = float(constants["cCycleTime"].initial)
     texts = _texts([_motion_texts(source, layout, axes) for source in sources], cycle, library=library)
     if capacity is None:
@@ -291,13 +291,6 @@ def without_refusal(body: str) -> str:
 def is_library(source: BlockSource) -> bool:
     """Tell whether an input selects what a block plays."""
     return any(variable.name == LIBRARY for variable in source.variables)
-
-
-def _layout(variables: dict[str, BlockVariable]) -> str:
-    if "cPower0" in variables:
-        return "segments"
-    array = variables["cPosition"].array
-    return "counts" if array is not None and array[2] == "DINT" else "samples"
 
 
 def _texts(motions: Sequence[list[str]], cycle: float, *, library: bool) -> list[str]:

@@ -17,14 +17,8 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.buffers import (
-    buffered,
-    constant_sources,
-    is_buffered,
-    is_library,
-    refusing,
-    without_refusal,
-)
+from gen_profile_exporters.playback import buffers
+from gen_profile_exporters.playback.buffers import buffered, constant_sources, is_buffered, is_library
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
     block_name,
@@ -35,10 +29,9 @@ from gen_profile_exporters.playback.structured_text import (
 )
 from gen_profile_exporters.playback.table import MOST_SAMPLES
 
-SCALARS = ("cLast", "cRows", "cChecks", "cPlayOn", "cSlope", "cSlopeRate", "cChecksum", "cLastSegment")
-PER_AXIS = ("cRoom", "cInverse", "cStopJerk", "cStart", "cTarget", "cLeastScale", "cMirrors", "cShifts")
-TABLES = ("cPosition", "cVelocity", "cAcceleration", *(f"cPower{power}" for power in range(6)))
-SEGMENTS = "cFirst"
+SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.SCALARS, buffers.PER_AXIS))
+*POWERS, SEGMENTS = (f"c{name}" for name in buffers.COLUMNS["segments"])
+TABLES = (*(f"c{name}" for name in buffers.SAMPLED), *POWERS)
 ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
 
 SELECTION = Path(__file__).with_name("text").joinpath("selection.st").read_text("ascii") + "\n"
@@ -221,12 +214,12 @@ def _selecting(body: str) -> str:
     body = _AXIS.sub(r"\1[nSelected * cAxes + nAxis - 1]", body)
     body = _TABLE.sub(rf"\1[{FIRST_ROW}[nSelected] + \2]", body)
     body = _SEGMENT.sub(rf"{SEGMENTS}[{FIRST_SEGMENT}[nSelected] + \1]", body)
-    return SELECTION + refusing(body)
+    return SELECTION + buffers.refusing(body)
 
 
 def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) -> BlockSource:
     """Undo all that, for one motion."""
-    body = _OFFSET.sub(r"\1[\2]", without_refusal(library.body.removeprefix(SELECTION)))
+    body = _OFFSET.sub(r"\1[\2]", buffers.without_refusal(library.body.removeprefix(SELECTION)))
     body = body.replace("[nSelected * cAxes + nAxis - 1]", "[nAxis]").replace("[nSelected]", "")
     axes = len(arrays["cStart"]) // len(arrays[FIRST_ROW])
     rows, first_row = int(arrays[ROWS][number]), int(arrays[FIRST_ROW][number])
