@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,12 +15,12 @@ from asyncua import Server, ua
 from asyncua.crypto.permission_rules import User, UserRole
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
+from gen_profile.deployment.opcua import POLICIES
 from gen_profile.deployment.simulated_block import LONGEST, LOOPBACK, SimulatedBlock
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 
 NAMESPACE = "urn:gen-profile:plc-sim"
-logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
 
 @attrs.frozen(kw_only=True)
@@ -91,9 +90,8 @@ class SimulatedController:
         await server.load_certificate(own.der)
         await server.load_private_key(own.key, format="pem")
         self.fingerprint = fingerprint(own.der)
-        kinds = ("Aes256Sha256RsaPss", "Basic256Sha256", "Aes128Sha256RsaOaep")
         server.set_security_policy(
-            [getattr(ua.SecurityPolicyType, f"{kind}_SignAndEncrypt") for kind in kinds]
+            [getattr(ua.SecurityPolicyType, f"{policy}_SignAndEncrypt") for policy in POLICIES]
         )
         user = ua.UserNameIdentityToken if self._options.user else ua.AnonymousIdentityToken
         server.set_identity_tokens([user])
@@ -145,9 +143,7 @@ class _Users:
 
 def _shown(name: str, values: np.ndarray[Any, Any]) -> Any:
     """Give a variable of the block the type that its name tells."""
-    type_ = {"b": ua.VariantType.Boolean, "n": ua.VariantType.Int32, "r": ua.VariantType.Double}.get(
-        name[0], ua.VariantType.Double
-    )
-    convert = {ua.VariantType.Boolean: bool, ua.VariantType.Int32: int}.get(type_, float)
+    others = {"b": (ua.VariantType.Boolean, bool), "n": (ua.VariantType.Int32, int)}
+    type_, convert = others.get(name[0], (ua.VariantType.Double, float))
     listed = [convert(value) for value in values.tolist()]
     return ua.Variant(listed if len(listed) > 1 else listed[0], type_)
