@@ -63,27 +63,19 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 def played(taken: frames.Integers, stamps: Sequence[Frame], target: Target) -> SampledProfile:
     """Tell where setpoints of all cycles lead the axes, by the stamps of their SYNCs."""
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
-    if target.can.mode == "csv":
-        return _led_by_velocity(taken[:, :, 0], _cycle_time(stamps), target)
-    velocity = None
+    period, least, velocity = _cycle_time(stamps), 1.0, None
+    if target.can.mode == "csv":  # velocities, which are kept from each SYNC to the next one
+        position = np.array(target.start) + in_si(travelled(taken[:, :, 0], period), counts_per_si)
+        least = period
+    else:
+        position = in_si(taken[:, :, 0].astype(np.float64), counts_per_si)
     if pdos.VELOCITY_OFFSET in pdos.setpoint_fields(target.can):
         velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
     return SampledProfile(
-        cycle_time=_cycle_time(stamps),
-        position=in_si(taken[:, :, 0].astype(np.float64), counts_per_si),
-        velocity=velocity,
-        resolution=in_si(np.ones(len(target.axes)), np.abs(counts_per_si)),
-    )
-
-
-def _led_by_velocity(velocity: frames.Integers, period: float, target: Target) -> SampledProfile:
-    """Tell where velocities lead the axes, which are kept from each SYNC to the next one."""
-    counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
-    distance = in_si(travelled(velocity, period), counts_per_si)
-    return SampledProfile(
         cycle_time=period,
-        position=np.array(target.start) + distance,
-        resolution=in_si(np.full(len(target.axes), period), np.abs(counts_per_si)),
+        position=position,
+        velocity=velocity,
+        resolution=in_si(np.full(len(target.axes), least), np.abs(counts_per_si)),
     )
 
 
