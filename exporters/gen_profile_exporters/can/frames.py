@@ -113,7 +113,10 @@ def nodes(target: Target) -> tuple[int, ...]:
         There are too few.
     """
     if target.can.nodes:
-        return _stated_nodes(target)
+        stated = tuple(target.can.nodes[axis.name] for axis in target.axes)
+        if max(stated) > LAST_NODE:
+            raise ExportError(f"can.nodes: {MASTER} is the master's own; the last node id is {LAST_NODE}.")
+        return stated
     first, axes = target.can.node, len(target.axes)
     if first + axes - 1 > LAST_NODE:
         raise ExportError(
@@ -121,13 +124,6 @@ def nodes(target: Target) -> tuple[int, ...]:
             f"({MASTER} is the master's)."
         )
     return tuple(range(first, first + axes))
-
-
-def _stated_nodes(target: Target) -> tuple[int, ...]:
-    stated = tuple(target.can.nodes[axis.name] for axis in target.axes)
-    if max(stated) > LAST_NODE:
-        raise ExportError(f"can.nodes: {MASTER} is the master's own; the last node id is {LAST_NODE}.")
-    return stated
 
 
 def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
