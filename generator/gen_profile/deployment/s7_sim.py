@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -17,8 +16,6 @@ from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedBlock
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, state_length
-
-logging.getLogger("snap7").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
 
 class SimulatedS7Controller:
