@@ -23,7 +23,6 @@ from gen_profile_exporters.playback.structured_text import (
     axis_lines,
     block_name,
     plain,
-    read_block,
     read_table,
     table_checksum,
 )
@@ -117,7 +116,7 @@ def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, 
         The block is no such library, or was altered.
     """
     singles = constant_sources(library, target) if is_buffered(library) else _singles(library)
-    return tuple(read_block(single.text(), target) for single in singles)
+    return tuple(read_table(single.text(), target).motion() for single in singles)
 
 
 def constant_singles(source: BlockSource) -> list[BlockSource]:

@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
@@ -70,7 +71,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     ExportError
         The text is no such block, was altered or cut off, or is for other axes than the target's.
     """
-    return read_block(content.decode("latin-1"), target)
+    return read_table(content.decode("latin-1"), target).motion()
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
@@ -99,11 +100,6 @@ def block_text(profile: Profile, target: Target) -> str:
     return buffered([parse_function_block(text)], target).text()
 
 
-def read_block(text: str, target: Target) -> SampledProfile:
-    """Work out what a block issues, see `replay`."""
-    return read_table(text, target).motion()
-
-
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
     if TABLE in text and is_buffered(source := parse_function_block(text)):
@@ -126,7 +122,7 @@ def read_table(text: str, target: Target) -> PlaybackTable:
 
 def replays(unwrap: Callable[[bytes, Target], BlockSource]) -> Callable[[bytes, Target], SampledProfile]:
     """Make the `replay` of a format from how it reads its first block; raises as both do."""
-    return lambda content, target: read_block(unwrap(content, target).text(), target)
+    return lambda content, target: read_table(unwrap(content, target).text(), target).motion()
 
 
 def block_name(name: str) -> str:
@@ -190,9 +186,9 @@ def _constants(table: PlaybackTable) -> dict[str, str]:
         "stop_jerk": _per_axis(limits.jerk),
         "start": _per_axis(table.start),
         "target": _per_axis(table.target),
-        "least_scale": _per_axis(np.array([variant.least_scale for variant in table.variants])),
-        "mirrors": _switches([variant.mirror for variant in table.variants]),
-        "shifts": _switches([variant.shift for variant in table.variants]),
+        "least_scale": _per_axis([variant.least_scale for variant in table.variants]),
+        "mirrors": _per_axis([variant.mirror for variant in table.variants]),
+        "shifts": _per_axis([variant.shift for variant in table.variants]),
     }
 
 
@@ -213,7 +209,7 @@ def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
         "axis_lines": "\n".join(axis_lines(table)),
         "units": units[0] if len(set(units)) == 1 else ", ".join(units),
         "sha256": table.motion().payload_hash(),
-        "start_tolerance": _per_axis(np.array([START_TOLERANCE * abs(axis.factor) for axis in table.axes])),
+        "start_tolerance": _per_axis([START_TOLERANCE * abs(axis.factor) for axis in table.axes]),
     }
 
 
@@ -341,13 +337,10 @@ def _verify(tokens: Mapping[str, Token], table: PlaybackTable) -> None:
         )
 
 
-def _per_axis(values: Array) -> str:
-    texts = [literal(value) for value in values.tolist()]
-    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
-
-
-def _switches(values: Sequence[bool]) -> str:
-    texts = [str(value).upper() for value in values]
+def _per_axis(values: ArrayLike) -> str:
+    """Write a number, or TRUE or FALSE, for each axis."""
+    known = np.asarray(values).tolist()
+    texts = [str(value).upper() if isinstance(value, bool) else literal(value) for value in known]
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
