@@ -194,12 +194,6 @@ def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
     )
 
 
-def commanding_cob_ids(target: Target) -> set[int]:
-    """List the COB-IDs that only the controller of these drives may send: commands and setpoints."""
-    sent = layout(target.can).received
-    return {own[pdo] for own in cob_ids(target) for pdo in sent}
-
-
 def period_digits(can: CanSpec) -> tuple[int, int]:
     """SYNC period as object 60C2h tells it to a drive: 1 to 255 times a power of ten of seconds.
 

@@ -13,7 +13,7 @@ import can
 import numpy as np
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames, pdos, startup
+from gen_profile_exporters.can import pdos
 from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
 from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.frames import Integers
@@ -27,10 +27,9 @@ from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.plan import Cycle, SetpointSource, Step, cycles_of, preload
 from gen_profile_exporters.can.streaming.record import Book, Phase, Record
 from gen_profile_exporters.can.streaming.restoration import Restoration
-from gen_profile_exporters.can.streaming.standing import STILL, Standing, trembling
+from gen_profile_exporters.can.streaming.standing import STILL
 from gen_profile_exporters.can.streaming.stopping import quick_stop
-from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch, WatchedAxis
-from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
@@ -76,14 +75,7 @@ class Streamer:
         self._reset_fault = reset_fault
         self._link = Link(bus, clock)
         self._pacer = Pacer(self._link, target)
-        self._watch = Watch(
-            _watched(target),
-            clock,
-            period=self._pacer.period,
-            heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
-            timeout=self._pacer.timeout,
-            ours=frames.commanding_cob_ids(target),
-        )
+        self._watch = Watch(target, clock)
         self._link.subscribe(self._watch.take)
         self._link.subscribe(source.take)
         self._following = Following(self._watch.axes, target, windows(source.demand, target))
@@ -332,18 +324,3 @@ class Streamer:
             aftermath=" ".join(filter(None, [fault, *self._left])),
             launched=self._link.launching is not None,
         )
-
-
-def _watched(target: Target) -> list[WatchedAxis]:
-    """Make an axis to be watched for each of a target's."""
-    transmitted = pdos.layout(target.can).transmitted
-    drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), strict=True)
-    return [
-        WatchedAxis(
-            name=axis.name,
-            node=node,
-            feedback={own[pdo]: fields for pdo, fields in transmitted.items()},
-            standstill=Standing(trembling(axis)),
-        )
-        for axis, node, own in drives
-    ]
