@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
 from typing import Any, Self
 
-import attrs
 import numpy as np
 
 from gen_profile.errors import CosimulationError
@@ -104,12 +103,10 @@ class ManyRuns:
         CosimulationError
             A name is unknown, lengths differ, or the FMU refuses a value or a step.
         """
-        given = _Given.of(times, inputs, parameters)
+        given = _given(times, inputs, parameters)
         plan = _Plan(
-            times=_per_run(given.times),
-            inputs=_per_run(given.inputs),
-            parameters=_per_run(given.parameters),
-            steps=given.times.shape[1] - 1,
+            **{name: _per_run(rows) for name, rows in given.items()},
+            steps=given["times"].shape[1] - 1,
             n_inputs=len(inputs),
             n_parameters=len(parameters),
             n_outputs=len(outputs),
@@ -119,7 +116,8 @@ class ManyRuns:
             n_components=components,
             since=since * (1.0 - 1e-12),
         )
-        return self._run(plan, np.empty((given.runs, len(outputs) + (components > 0))))
+        runs = next((len(rows) for rows in given.values() if len(rows) != 1), 1)
+        return self._run(plan, np.empty((runs, len(outputs) + (components > 0))))
 
     def _run(self, plan: _Plan, rows: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""
@@ -142,29 +140,21 @@ class ManyRuns:
         return int(self._loop(byref(worker.called), byref(plan), first, end, doubles(room), doubles(rows)))
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class _Given:
-    """What runs are given: arrays of one row for all runs, or one row for each of them."""
-
-    times: Array
-    inputs: Array
-    parameters: Array
-    runs: int
-
-    @classmethod
-    def of(cls, times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array | float]) -> Self:
-        """Order and check what a caller gives by name."""
-        points = np.ascontiguousarray(np.atleast_2d(times), dtype=np.float64)
-        columns = {name: np.reshape(values, (-1, 1)) for name, values in parameters.items()}
-        rows = {
-            "times": points,
-            "inputs": _stacked("inputs", inputs, points.shape[1] - 1),
-            "parameters": _stacked("parameters", columns, 1),
-        }
-        counts = {len(array) for array in rows.values()} - {1}
-        if len(counts) > 1:
-            raise CosimulationError(f"Times, inputs and parameters are of {sorted(counts)} runs.")
-        return cls(runs=counts.pop() if counts else 1, **rows)
+def _given(
+    times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array | float]
+) -> dict[str, Array]:
+    """Order and check what a caller gives: arrays of one row for all runs, or one row for each of them."""
+    points = np.ascontiguousarray(np.atleast_2d(times), dtype=np.float64)
+    columns = {name: np.reshape(values, (-1, 1)) for name, values in parameters.items()}
+    rows = {
+        "times": points,
+        "inputs": _stacked("inputs", inputs, points.shape[1] - 1),
+        "parameters": _stacked("parameters", columns, 1),
+    }
+    counts = {len(array) for array in rows.values()} - {1}
+    if len(counts) > 1:
+        raise CosimulationError(f"Times, inputs and parameters are of {sorted(counts)} runs.")
+    return rows
 
 
 def _stacked(what: str, arrays: Mapping[str, Array], length: int) -> Array:
