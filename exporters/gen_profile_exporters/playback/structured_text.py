@@ -257,10 +257,7 @@ def _table(tokens: Mapping[str, Token], layout: str, target: Target) -> Playback
     cycle, last = tokens["cycle_time"], _number(tokens["last"].text, tokens["last"])
     cycles = rows // len(axes) - 1 if first is None else last
     if last != cycles or not 1 <= last <= MOST_CYCLES or (first is not None and not _rise(first, last)):
-        raise ExportError(
-            f"line {tokens['last'].line}: cLast = {last:g} does not belong to the table; "
-            "export the block again."
-        )
+        raise _altered(tokens["last"], f"cLast = {last:g} does not belong to the table")
     columns_by_axis = np.array(columns).reshape(len(names), -1, len(axes))
     return PlaybackTable(
         layout=layout,
@@ -278,19 +275,15 @@ def _table(tokens: Mapping[str, Token], layout: str, target: Target) -> Playback
 def _within(token: Token, last: float) -> int:
     number = _number(token.text, token)
     if not (0.0 <= number <= last and number.is_integer()):
-        raise ExportError(
-            f"line {token.line}: {token.text[:40]} is no cycle of the motion; export the block again."
-        )
+        raise _altered(token, f"{token.text[:40]} is no cycle of the motion")
     return int(number)
 
 
 def _variants(tokens: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[AxisVariants, ...]:
     columns = [_array(tokens[name]) for name in ("least_scale", "mirrors", "shifts")]
     if any(len(column) != len(axes) for column in columns):
-        raise ExportError(
-            f"line {tokens['least_scale'].line}: {len(axes)} axes, but values for another number of them; "
-            "export the block again."
-        )
+        wrong = f"{len(axes)} axes, but values for another number of them"
+        raise _altered(tokens["least_scale"], wrong)
     return tuple(
         AxisVariants(least_scale=float(scale), mirror=bool(mirror), shift=bool(shift))
         for scale, mirror, shift in zip(*columns, strict=True)
@@ -300,9 +293,7 @@ def _variants(tokens: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[A
 def _end(token: Token, axes: Sequence[AxisScale]) -> Array:
     target = _array(token)
     if len(target) != len(axes):
-        raise ExportError(
-            f"line {token.line}: {len(target)} targets for {len(axes)} axes; export the block again."
-        )
+        raise _altered(token, f"{len(target)} targets for {len(axes)} axes")
     return target
 
 
@@ -324,17 +315,12 @@ def _verify(tokens: Mapping[str, Token], table: PlaybackTable) -> None:
     for name, token in tokens.items():
         same = token.text == due.get(name, token.text)  # as it was exported: no number need be read
         if not same and _numbers(token) != _numbers(Token(due[name])):
-            raise ExportError(
-                f"line {token.line}: {token.text[:40]} stands where the table asks for {due[name][:40]}; "
-                "export the block again."
-            )
+            raise _altered(token, f"{token.text[:40]} stands where the table asks for {due[name][:40]}")
     end_error = np.abs(table.arrival() - table.target)
     factor = np.abs([axis.factor for axis in table.axes])
     if (end_error > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
-        raise ExportError(
-            f"line {tokens['target'].line}: cTarget = {tokens['target'].text[:40]} is not where the table "
-            "ends; export the block again."
-        )
+        wrong = f"cTarget = {tokens['target'].text[:40]} is not where the table ends"
+        raise _altered(tokens["target"], wrong)
 
 
 def _per_axis(values: ArrayLike) -> str:
@@ -373,7 +359,10 @@ def _number(text: str, token: Token, below: int = 0) -> float:
     text = _SWITCH.get(text.strip().upper(), text)
     number = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise ExportError(
-            f"line {token.line + below}: {text.strip()[:40]!r} is no finite number; export the block again."
-        )
+        raise _altered(token, f"{text.strip()[:40]!r} is no finite number", below)
     return number
+
+
+def _altered(token: Token, what: str, below: int = 0) -> ExportError:
+    """Say what is wrong with a token, so many lines below where that begins."""
+    return ExportError(f"line {token.line + below}: {what}; export the block again.")
