@@ -108,7 +108,8 @@ def configure(
         if reset_fault:
             _reset_fault(link, node)
         watched = _upload(link, node, *HEARTBEAT_WATCHED, optional=True)
-        _await_own_stop(link, node, watched)
+        if patience := time_of_ours(watched):  # its streamer was killed just now, and it stops by itself
+            _wait_while(link, node, MOVING, patience + STOP_PATIENCE)
         _require_rest(link, node)
         restoration.remember_watch(node.number, watched)
         _download(link, node, *HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
@@ -221,12 +222,6 @@ def _reset_fault(link: Link, node: Node) -> None:
     except (SdoError, struct.error) as error:
         raise _silent(node, error) from error
     _wait_while(link, node, FAULTS, RESET_PATIENCE)
-
-
-def _await_own_stop(link: Link, node: Node, watched: bytes | None) -> None:
-    """Let a drive stop by itself whose streamer was killed just now, and is still waited for."""
-    if patience := time_of_ours(watched):
-        _wait_while(link, node, MOVING, patience + STOP_PATIENCE)
 
 
 def _wait_while(link: Link, node: Node, states: Container[State], patience: int) -> None:
