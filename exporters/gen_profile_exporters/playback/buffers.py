@@ -264,9 +264,8 @@ def constant_sources(source: BlockSource, target: Target) -> list[BlockSource]:
             count = int(float(texts[len(HEAD)]))
             starts = [int(float(text)) for text in texts[len(HEAD) + 1 :][:count]]
         parts = [texts[start:end] for start, end in zip(starts, [*starts[1:], len(texts)], strict=True)]
-        back = [
-            parse_function_block(_constant_text(variables, source, part, layout, target)) for part in parts
-        ]
+        axes = len(target.axes)
+        back = [constant_block(_constant_values(part, layout, axes), source, layout) for part in parts]
         again = _buffered(back, target, len(variables[TABLE].elements) // 2, library=library)
     except (KeyError, ValueError, IndexError, OverflowError, ZeroDivisionError) as error:
         raise ExportError(ALTERED) from error
@@ -275,17 +274,12 @@ def constant_sources(source: BlockSource, target: Target) -> list[BlockSource]:
             "The block does not take its numbers from its buffers as it should, or is for other axes: it was "
             "altered; export it again."
         )
-    return [attrs.evolve(one, header=source.header) for one in back]
+    return back
 
 
 def refusing(body: str) -> str:
     """Refuse to start while `LIBRARY` counts no motion."""
     return body.replace(_LAST_REFUSAL, _LAST_REFUSAL + _REFUSAL)
-
-
-def without_refusal(body: str) -> str:
-    """Undo `refusing`."""
-    return body.replace(_LAST_REFUSAL + _REFUSAL, _LAST_REFUSAL)
 
 
 def is_library(source: BlockSource) -> bool:
@@ -330,12 +324,9 @@ def _as_real(text: str) -> str:
     return text if "." in text else f"{text}.0"
 
 
-def _constant_text(
-    variables: dict[str, BlockVariable], source: BlockSource, texts: list[str], layout: str, target: Target
-) -> str:
-    """Write the block of constants of a motion's values."""
-    axes, columns = len(target.axes), COLUMNS[layout]
-    own = len(SCALARS) + axes * len(PER_AXIS)
+def _constant_values(texts: list[str], layout: str, axes: int) -> dict[str, list[str]]:
+    """Read a motion's numbers, by the names of constants."""
+    columns, own = COLUMNS[layout], len(SCALARS) + axes * len(PER_AXIS)
     rows = (len(texts) - own) // len(columns)
     values = {name: [text.removesuffix(".0")] for name, text in zip(WHOLE, texts, strict=False)}
     values |= dict(zip(SCALARS[len(WHOLE) :], ([text] for text in texts[len(WHOLE) :]), strict=False))
@@ -347,6 +338,13 @@ def _constant_text(
         column = column[::axes] if name == "First" else column
         whole = _is_whole(name, layout)
         values[name] = [text.removesuffix(".0") if whole else text for text in column]
+    return values
+
+
+def constant_block(values: Mapping[str, Sequence[str]], like: BlockSource, layout: str) -> BlockSource:
+    """Write the block of constants of a motion's numbers; what all motions share is that of another block."""
+    shared = {variable.name: variable.initial for variable in like.variables}
+    columns, axes, rows = COLUMNS[layout], len(values["Start"]), len(values[COLUMNS[layout][0]])
     arrays = (*columns, *(PER_AXIS if axes > 1 else ()))
     holes = {
         re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): f"[{', '.join(of)}]" if name in arrays else of[0]
@@ -356,11 +354,12 @@ def _constant_text(
         "row_count": holes.pop("rows"),
         "rows": f"[0..{rows - 1}]",
         "segments": f"[0..{rows // axes - 1}]",
-        "cycle_time": variables["cCycleTime"].initial,
-        "start_tolerance": variables["fStartTolerance"].initial,
-        "block": source.name,
+        "cycle_time": shared["cCycleTime"],
+        "start_tolerance": shared["fStartTolerance"],
+        "block": like.name,
     }
-    return fill(defaultdict(str, holes), layout, axes)
+    written = parse_function_block(fill(defaultdict(str, holes), layout, axes))
+    return attrs.evolve(written, header=like.header)
 
 
 def _taken(variable: BlockVariable) -> BlockVariable:
