@@ -26,7 +26,7 @@ REFUSALS = {
     UNFIT: "The block finds another table in its idle buffer than was written there, as if something else "
     "wrote to it; find out what does, and run this again.",
 }
-UNSECURED = {"security": "none", "policy": "None", "certificate_sha256": "", "user": ""}  # a link's server
+UNSECURED = {"security": "none", "policy": "None", "certificate_sha256": "", "user": ""}
 REOPENED, SENT, LOOKS = 3, 4, 200  # times that a connection, a request, and a reply to it are tried
 PAUSE = 0.005  # s between two looks for a reply
 
@@ -66,7 +66,7 @@ class ControllerLink(MailboxLink, Protocol):
 
 @contextmanager
 def first_connected(link: ControllerLink, url: str, look_at: str) -> Iterator[None]:
-    """Close a link that is not made in the block; say what to look at where nothing answers.
+    """Close a link whose first connection fails, and say what to look at where nothing answers.
 
     Raises
     ------

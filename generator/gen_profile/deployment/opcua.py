@@ -88,9 +88,6 @@ class OpcUaLink:
     def __init__(self, access: OpcUaAccess) -> None:
         self._access, self._runner = access, asyncio.Runner()
         self._client: Any = None
-        self._request: Any = None
-        self._reply: Any = None
-        self._state: Any = None
         self.instance = ""
         self.server: dict[str, str] = {}
         with first_connected(self, access.url, "the address, the port and the network"):
