@@ -23,6 +23,7 @@ _VARIABLE = re.compile(
     r"(?:[ \t]*+\(\*((?:[^*(]++|\*(?!\))|\((?!\*))*)\*\))?"
 )
 _ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.IGNORECASE)
+COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed takes the rest
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
 
 
@@ -83,11 +84,12 @@ class BlockSource:
         return f"{self.header}{self.declaration()}\n{self.body}END_FUNCTION_BLOCK\n"
 
     def program(self) -> tuple[object, ...]:
-        """Give what the block does, however its text is laid out."""
+        """Give what the block does, however its text is laid out, spelled and commented."""
         variables = {
-            (v.section, v.name, v.type, *(v.elements if v.array else [v.initial])) for v in self.variables
+            (v.section, v.name.lower(), bare(v.type), *map(bare, v.elements if v.array else [v.initial]))
+            for v in self.variables
         }
-        return variables, self.body.split()
+        return variables, COMMENT.sub(" ", self.body).lower().split()
 
     def declaration(self) -> str:
         """Everything before the statements, header excepted."""
@@ -145,6 +147,11 @@ def _variables(section: str, text: str) -> list[BlockVariable]:
         for name, type_, initial, comment in _VARIABLE.findall(text)
         if name
     ]
+
+
+def bare(text: str) -> str:
+    """Leave out white space and case, which mean nothing in Structured Text."""
+    return "".join(text.split()).lower()
 
 
 def _declared(variable: BlockVariable) -> str:

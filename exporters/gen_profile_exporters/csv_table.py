@@ -214,26 +214,22 @@ def _numbers(line: int, cells: Sequence[str], header: Sequence[str]) -> list[flo
     numbers = [float(cell) if _NUMBER.fullmatch(cell) else math.nan for cell in cells]
     for number, cell, name in zip(numbers, cells, header, strict=True):
         if not abs(number) <= GREATEST:
-            raise ExportError(
-                f"line {line}: {name.strip()} holds {cell[:40]!r}, which is no finite number of a motion; "
-                "export the table again."
-            )
+            wrong = f"{cell[:40]!r}, which is no finite number of a motion"
+            raise _altered(line, f"{name.strip()} holds {wrong}")
     return numbers
 
 
 def _cycle_time(times: Array, lines: Sequence[int]) -> float:
     """Step of the times, which must rise from 0 in equal steps."""
     if times[0] != 0.0:
-        raise ExportError(f"line {lines[0]}: times must rise from 0 in equal steps; export the table again.")
+        raise _altered(lines[0], "times must rise from 0 in equal steps")
     step = plausible_cycle_time(float(times[1]), lines[1])
     grid = grid_times(len(times) - 1, step)
     wrong = np.flatnonzero(np.abs(times - grid) > GRID_TOLERANCE * grid)
     if wrong.size:
         row = int(wrong[0])
-        raise ExportError(
-            f"line {lines[row]}: time {times[row]:.15g} s stands where {grid[row]:.15g} s is due: "
-            "a line is missing or times were edited; export the table again."
-        )
+        place = f"time {times[row]:.15g} s stands where {grid[row]:.15g} s is due"
+        raise _altered(lines[row], f"{place}: a line is missing or times were edited")
     return step
 
 
@@ -242,7 +238,9 @@ def _check_counts(position: Array, axes: Sequence[AxisScale], lines: Sequence[in
         values = position[:, column]
         wrong = np.flatnonzero(~is_count(values)) if axis.unit == COUNTS else ()
         for row in map(int, wrong):
-            raise ExportError(
-                f"line {lines[row]}: axis {axis.name}: {values[row]:.15g} is no whole 32-bit count; "
-                "export the table again."
-            )
+            raise _altered(lines[row], f"axis {axis.name}: {values[row]:.15g} is no whole 32-bit count")
+
+
+def _altered(line: int, what: str) -> ExportError:
+    """Say what is wrong in a line of a table."""
+    return ExportError(f"line {line}: {what}; export the table again.")

@@ -22,13 +22,13 @@ def test_many_runs(capsys):
     inputs = {"cart.setpoint_acceleration": np.sin(3.0 * TIMES[:-1])}
     for max_step, runs in ((0.01, 2000), (0.001, 500)):
         lengths, steps = np.linspace(0.4, 0.6, runs), np.full(runs, max_step)
-        with ManyRuns(fmu, Version.FMI2) as many:
+        with ManyRuns(fmu) as many:
             parameters = {"L1": lengths, "max_step": steps}
             many.peaks(TIMES, inputs, {"L1": lengths[:1], "max_step": steps[:1]}, ["sway.payload"])
             began = process_time()
             found = many.peaks(TIMES, inputs, parameters, ["sway.payload"])
             ours = (process_time() - began) / runs
-        with ManyRuns(fmu, Version.FMI2, workers=2) as many:
+        with ManyRuns(fmu, workers=2) as many:
             began = perf_counter()
             np.testing.assert_array_equal(many.peaks(TIMES, inputs, parameters, ["sway.payload"]), found)
             shared = (perf_counter() - began) / runs
@@ -45,7 +45,7 @@ def test_many_runs(capsys):
 
 def _bare(fmu, max_step):
     """Seconds that 10 ms of integration take by themselves: in one communication step of 70 s."""
-    with ManyRuns(fmu, Version.FMI2) as many:
+    with ManyRuns(fmu) as many:
         began = process_time()
         many.peaks(
             np.array([0.0, 70.0]),

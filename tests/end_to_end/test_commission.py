@@ -6,9 +6,9 @@ import subprocess
 import numpy as np
 import pytest
 from command_line import PROGRAM, run_here
-from end_to_end.simulated_controllers import free_port, in_thread
+from end_to_end.simulated_controllers import free_port, serving
 
-from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
+from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 from gen_profile.deployment.table import read_table
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.reading import preset_spec, read_spec
@@ -35,17 +35,12 @@ def test_options_answer_everything(site):
     settings = ("--set", "export.plc_tables=variables", "--export", "plc")
     assert run_here("--preset", "bay-crane", *settings, "--no-check", "--out", "first").code == 0
     port = free_port()
-
-    async def controller(ready, end):
-        simulated = SimulatedController(
-            read_table(site / "first" / "bay-crane.st"), PlcSimOptions(port=port, secure=False)
-        )
-        simulated.ended = end
-        await simulated.serve(ready)
-
+    controller = SimulatedOpcUaController(
+        read_table(site / "first" / "bay-crane.st"), PlcSimOptions(port=port, secure=False)
+    )
     identified = ("--measured", "L1=6.2±0.1", "--free", "c1", "--swing", "run.csv", "--signal", "rate:hook")
     deployed = ("--to", f"opc.tcp://127.0.0.1:{port}", "--security", "none", "--by", "me")
-    with in_thread(controller):
+    with serving(controller):
         outcome = run_here(
             "commission", "hall.toml", "--preset", "bay-crane", *identified, *deployed,
             "--set", "move.distance=5", "--export", "plc", "--yes", "--json",

@@ -16,13 +16,13 @@ from command_line import run_here
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from end_to_end.simulated_controllers import BARE, free_port, in_thread
+from end_to_end.simulated_controllers import BARE, free_port, in_thread, serving
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
 from gen_profile.deployment.deploy import deploy
 from gen_profile.deployment.mailbox import Mailbox
 from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
-from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
+from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 from gen_profile.deployment.table import read_table
 from gen_profile.deployment.watching.judge import Judge
 from gen_profile.errors import DeploymentError
@@ -47,14 +47,9 @@ def controller(files, **options):
     port = free_port()
     secure = {} if options.get("secure") is False else {"certificate": files / "plc.pem"}
 
-    async def main(ready, end):
-        table = read_table(files / "old" / "paper.st")
-        simulated = SimulatedController(table, PlcSimOptions(port=port, **secure, **options))
-        simulated.ended = end
-        await simulated.serve(ready)
-
-    with in_thread(main):
-        yield f"opc.tcp://127.0.0.1:{port}"
+    table, options = read_table(files / "old" / "paper.st"), PlcSimOptions(port=port, **secure, **options)
+    with serving(SimulatedOpcUaController(table, options)) as address:
+        yield address
 
 
 @pytest.fixture(scope="module")

@@ -95,7 +95,7 @@ class Bench(SimulatedAdsController):
 
     def __init__(self, tables):
         super().__init__(tables["old"], free_port())
-        self.tables, self._cycle = tables, 1e9  # it does not call it by itself
+        self.tables, self.cycle_time = tables, 1e9  # it does not call it by itself
         self.reset()
 
     def reset(self):
@@ -104,7 +104,7 @@ class Bench(SimulatedAdsController):
         self.turn(60)
 
     def link(self, net_id="127.0.0.1.1.1"):
-        access = {"host": f"127.0.0.1:{self._port}", "net_id": net_id, "port": 851}
+        access = {"host": f"127.0.0.1:{self.port}", "net_id": net_id, "port": 851}
         return FaultyLink(AdsAccess(url="ads://127.0.0.1.1.1:851", **access), self.tables["new"], self)
 
     def used(self):
@@ -254,7 +254,7 @@ def test_an_array_of_another_length_is_refused(bench, monkeypatch):
 
 def test_broken_telegrams_stop_nothing(bench):
     for telegram in (bytes(100), b"\0\0" + struct.pack("<I", 2**31) + bytes(60), b"\xff" * 38):
-        with socket.create_connection(("127.0.0.1", bench._port)) as sent:
+        with socket.create_connection(("127.0.0.1", bench.port)) as sent:
             sent.sendall(telegram)
     bench.reset()
     assert bench.used() == "old"

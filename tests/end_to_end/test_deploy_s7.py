@@ -9,8 +9,6 @@ import pytest
 from command_line import run_here
 from end_to_end.simulated_controllers import BARE, free_port, serving
 from snap7.error import S7ConnectionError, S7TimeoutError
-from snap7.server import Server
-from snap7.type import SrvArea
 
 from gen_profile.deployment.block_state import MotionState, read_state
 from gen_profile.deployment.deploy import deploy, verify
@@ -93,9 +91,7 @@ class Bench:
     def __init__(self, tables):
         self.tables = tables
         self.controller = SimulatedS7Controller(tables["old"], NUMBER, free_port())
-        self.server = Server(log=False)
-        self.server.register_area(SrvArea.DB, NUMBER, self.controller.data)
-        self.server.start_to("127.0.0.1", self.controller._port)
+        self.controller.server.start_to("127.0.0.1", self.controller.port)
         self.reset()
 
     def reset(self):
@@ -105,10 +101,10 @@ class Bench:
         self.turn(60)
 
     def turn(self, cycles=1):
-        self.controller.turn(self.server, cycles)
+        self.controller.turn(cycles)
 
     def link(self, pdu=480):
-        access = {"host": "127.0.0.1", "port": self.controller._port, "rack": 0, "slot": 1, "block": NUMBER}
+        access = {"host": "127.0.0.1", "port": self.controller.port, "rack": 0, "slot": 1, "block": NUMBER}
         link = BenchLink(S7Access(url="s7://127.0.0.1/0/1", **access), self.tables["new"], self)
         link._client.pdu_length = pdu
         return link
@@ -144,7 +140,7 @@ class BenchLink(S7Link):
 def bench(tables):
     bench = Bench(tables)
     yield bench
-    bench.server.stop()
+    bench.controller.server.stop()
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from rich.console import Console
 from gen_profile.streaming import live, live_page, live_terminal
 from gen_profile.streaming import stream as workflow
 from gen_profile_exporters.can.host.port import Port
-from gen_profile_exporters.can.streaming.record import Book, Phase, Recorder
+from gen_profile_exporters.can.streaming.record import Book, Phase
 
 VIEW = live.View(
     name="bay-3",
@@ -47,12 +47,11 @@ def log(tmp_path_factory):
 def begun():
     """Take down half a motion: the second answer is missing, the third cycle was late."""
     book = Book.blank(4, 1)
-    recorder = Recorder(book)
-    recorder.begin(Phase.STREAM)
+    book.begin(Phase.STREAM)
     for cycle, late in enumerate((1000, 2000, 9000)):
-        recorder.take_sent(cycle, late)
-    recorder.take_answer(0, [0])
-    recorder.take_answer(2, [1990])
+        book.take_sent(cycle, late)
+    book.take_answer(0, [0])
+    book.take_answer(2, [1990])
     return book
 
 

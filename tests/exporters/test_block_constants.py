@@ -108,7 +108,7 @@ def test_replay_refuses_any_altered_number(layout, profile):
         value = {"TRUE": True, "FALSE": False}.get(old, float(old) if "." in old else None)
         new = str(int(old) + 1) if value is None else text_of(other(value))
         with pytest.raises(ExportError):
-            structured_text.read_block(text[: number.start()] + new + text[number.end() :], goal)
+            structured_text.read_table(text[: number.start()] + new + text[number.end() :], goal)
 
 
 @pytest.mark.parametrize("container", CONTAINERS, ids=lambda module: module.__name__.rpartition(".")[2])

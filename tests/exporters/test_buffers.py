@@ -84,7 +84,7 @@ def test_it_plays_what_the_block_of_constants_plays(layout, profile):
     rows = play(fb, started(fb))
     for quantity in ("position", "velocity", "acceleration"):
         np.testing.assert_array_equal(column(rows, quantity), getattr(table.played, quantity))
-    replayed = structured_text.read_block(text, goal_of(profile, layout))
+    replayed = structured_text.read_table(text, goal_of(profile, layout)).motion()
     assert replayed.payload_hash() == table.motion().payload_hash()
 
 
@@ -94,7 +94,7 @@ def test_every_format_carries_it(form, profile):
     goal, container = goal_of(profile, "counts"), find_container(form)
     content = container.encode(profile, goal)[0].content
     assert values_of(container.unwrap(content, goal).text()) == values_of(text_of(profile, "counts"))
-    expected = structured_text.read_block(text_of(profile, "counts"), goal)
+    expected = structured_text.read_table(text_of(profile, "counts"), goal).motion()
     assert container.replay(content, goal).payload_hash() == expected.payload_hash()
 
 
@@ -263,7 +263,7 @@ def test_replay_refuses_altered_numbers_and_statements(library):
             if library:
                 read_library(parse_function_block(altered), goal)
             else:
-                structured_text.read_block(altered, goal)
+                structured_text.read_table(altered, goal)
 
 
 @pytest.mark.parametrize(
@@ -279,7 +279,7 @@ def test_it_is_for_its_own_axes_only(layout, names, other):
     export = {"plc_layout": layout, "plc_tables": "variables"}
     elsewhere = target(*names, cycle_time=CYCLE, export=export, **other)
     with pytest.raises(ExportError, match="for other axes"):
-        structured_text.read_block(text_of(ONE, layout), elsewhere)
+        structured_text.read_table(text_of(ONE, layout), elsewhere)
 
 
 @pytest.mark.parametrize("profile", [(ONE, OTHER), (TWO, TWO)], ids=["one axis", "two axes"])
@@ -307,11 +307,11 @@ def test_a_library_plays_each_of_its_motions_and_takes_another_one(layout, profi
 
 def test_a_library_reads_back_to_what_was_put_in():
     text, goal = library_of(ONE, OTHER), goal_of(ONE)
-    hashes = [structured_text.read_block(text_of(one), goal).payload_hash() for one in (ONE, OTHER)]
+    hashes = [structured_text.read_table(text_of(one), goal).motion().payload_hash() for one in (ONE, OTHER)]
     found = read_library(parse_function_block(text), goal)
     assert [motion.payload_hash() for motion in found] == hashes
     with pytest.raises(ExportError, match="is a library of motions"):
-        structured_text.read_block(text, goal)
+        structured_text.read_table(text, goal)
 
 
 def test_a_table_beyond_a_buffer_is_refused():
@@ -346,4 +346,4 @@ def test_hostile_sizes_are_refused_at_once(name):
         text, count = re.subn(r"(aTable : [^:]*:= \[\s*)[\d.]+", r"\g<1>1.0E+30", text)
     assert count == 1
     with pytest.raises(ExportError):
-        structured_text.read_block(text, goal_of(TWO))
+        structured_text.read_table(text, goal_of(TWO))

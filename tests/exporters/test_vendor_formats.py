@@ -375,7 +375,7 @@ class TestTakingApart:
         goal = goal_of(profile, layout)
         text = structured_text.block_text(profile, goal)
         again = parse_function_block(parse_function_block(text).text()).text()
-        assert structured_text.read_block(again, goal).payload_hash()
+        assert structured_text.read_table(again, goal).motion().payload_hash()
         fb, other = checked(text), checked(again)
         rows = play(fb, start(fb))
         np.testing.assert_array_equal(column(play(other, start(other)), "position"), column(rows, "position"))

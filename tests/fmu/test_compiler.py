@@ -74,11 +74,8 @@ def test_no_source_has_a_warning(written, zig_cc, plant, kind, version):
 
 
 def test_no_compiled_loop_has_a_warning(tmp_path, zig_cc):
-    texts = loop_sources()
-    for version in Version:
-        texts |= {
-            name: f"#pragma GCC system_header\n{text}" for name, text in standard_headers(version).items()
-        }
+    headers = standard_headers(Version.FMI2)
+    texts = loop_sources() | {name: f"#pragma GCC system_header\n{text}" for name, text in headers.items()}
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     zig_cc(*STRICT, "-c", "loops.c", "-o", "object.o")

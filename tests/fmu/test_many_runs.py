@@ -19,20 +19,19 @@ INPUTS = {"cart.setpoint_acceleration": np.sin(3.0 * TIMES[:-1])}
 OUTPUTS = ("sway.hook", "sway.payload")
 
 
-@pytest.fixture(params=Version)
-def version(request):
-    return request.param
-
-
 @pytest.fixture
-def many(version):
-    with ManyRuns(cached_fmu(model_of("plant-acceleration", CRANE), version), version) as runs:
+def many():
+    with ManyRuns(fmu_of("plant-acceleration")) as runs:
         yield runs
 
 
-def one_by_one(version, times, values, parameters, since):
+def fmu_of(kind):
+    return cached_fmu(model_of(kind, CRANE), Version.FMI2)
+
+
+def one_by_one(times, values, parameters, since):
     """Greatest magnitudes in one run, without the loop."""
-    instance = Instance(cached_fmu(model_of("plant-acceleration", CRANE), version), version, exchange=False)
+    instance = Instance(fmu_of("plant-acceleration"), Version.FMI2, exchange=False)
     instance.begin(parameters, start=times[0])
     held = dict(zip(times[:-1].tolist(), values, strict=True))
     seen = cosimulate(
@@ -42,39 +41,38 @@ def one_by_one(version, times, values, parameters, since):
     return np.abs(seen[times >= since]).max(axis=0)
 
 
-def test_gives_the_peaks_of_every_run(many, version):
+def test_gives_the_peaks_of_every_run(many):
     parameters = {"L1": np.array([0.4, 0.5, 0.6]), "m2": np.array([0.1, 0.2, 0.3])}
     found = many.peaks(TIMES, INPUTS, parameters, OUTPUTS, since=1.0)
     for row, length, mass in zip(found, *parameters.values(), strict=True):
         values = INPUTS["cart.setpoint_acceleration"]
-        expected = one_by_one(version, TIMES, values, {"L1": length, "m2": mass}, since=1.0)
+        expected = one_by_one(TIMES, values, {"L1": length, "m2": mass}, since=1.0)
         np.testing.assert_array_equal(row, expected)
 
 
-def test_runs_may_have_their_own_inputs_and_times(many, version):
+def test_runs_may_have_their_own_inputs_and_times(many):
     """As for jitter and latency; a parameter of their own they need not have."""
     random = np.random.default_rng(5)
     times = TIMES + 0.002 * random.random((3, len(TIMES)))
     inputs = random.normal(size=(3, len(TIMES) - 1))
     found = many.peaks(times, {"cart.setpoint_acceleration": inputs}, {}, OUTPUTS)
     for row, points, values in zip(found, times, inputs, strict=True):
-        np.testing.assert_array_equal(row, one_by_one(version, points, values, {}, since=0.0))
+        np.testing.assert_array_equal(row, one_by_one(points, values, {}, since=0.0))
     shared = many.peaks(TIMES, {"cart.setpoint_acceleration": inputs}, {"L1": np.array([0.5])}, OUTPUTS)
     assert shared.shape == (3, 2)
 
 
-def test_one_run_needs_nothing_of_its_own(many, version):
+def test_one_run_needs_nothing_of_its_own(many):
     (found,) = many.peaks(TIMES, INPUTS, {}, OUTPUTS)
     values = INPUTS["cart.setpoint_acceleration"]
-    np.testing.assert_array_equal(found, one_by_one(version, TIMES, values, {}, since=0.0))
+    np.testing.assert_array_equal(found, one_by_one(TIMES, values, {}, since=0.0))
 
 
 @pytest.mark.parametrize("workers", [2, 5])
-def test_workers_find_the_same_whatever_their_number(many, version, workers):
+def test_workers_find_the_same_whatever_their_number(many, workers):
     parameters = {"L1": np.linspace(0.4, 0.6, 23)}
     alone = many.peaks(TIMES, INPUTS, parameters, OUTPUTS)
-    fmu = cached_fmu(model_of("plant-acceleration", CRANE), version)
-    with ManyRuns(fmu, version, workers=workers) as together:
+    with ManyRuns(fmu_of("plant-acceleration"), workers=workers) as together:
         np.testing.assert_array_equal(together.peaks(TIMES, INPUTS, parameters, OUTPUTS), alone)
         lengths = np.full(23, 0.5)
         lengths[[7, 20]] = [-1.0, -2.0]
@@ -88,8 +86,8 @@ def test_runs_do_not_depend_on_those_before(many):
     np.testing.assert_array_equal(first, again)
 
 
-def test_a_system_needs_no_inputs(version):
-    with ManyRuns(cached_fmu(model_of("system", CRANE), version), version) as runs:
+def test_a_system_needs_no_inputs():
+    with ManyRuns(fmu_of("system")) as runs:
         found = runs.peaks(TIMES, {}, {"tau": np.array([0.0, 0.1])}, ("cart.velocity",))
     assert found[0, 0] == pytest.approx(0.2, rel=1e-3)
     assert found[1, 0] < found[0, 0]

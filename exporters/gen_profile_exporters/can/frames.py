@@ -113,7 +113,10 @@ def nodes(target: Target) -> tuple[int, ...]:
         There are too few.
     """
     if target.can.nodes:
-        return _stated_nodes(target)
+        stated = tuple(target.can.nodes[axis.name] for axis in target.axes)
+        if max(stated) > LAST_NODE:
+            raise ExportError(f"can.nodes: {MASTER} is the master's own; the last node id is {LAST_NODE}.")
+        return stated
     first, axes = target.can.node, len(target.axes)
     if first + axes - 1 > LAST_NODE:
         raise ExportError(
@@ -121,13 +124,6 @@ def nodes(target: Target) -> tuple[int, ...]:
             f"({MASTER} is the master's)."
         )
     return tuple(range(first, first + axes))
-
-
-def _stated_nodes(target: Target) -> tuple[int, ...]:
-    stated = tuple(target.can.nodes[axis.name] for axis in target.axes)
-    if max(stated) > LAST_NODE:
-        raise ExportError(f"can.nodes: {MASTER} is the master's own; the last node id is {LAST_NODE}.")
-    return stated
 
 
 def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
@@ -196,12 +192,6 @@ def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
         for column, (channel, own) in enumerate(zip(channels(target), cob_ids(target), strict=True))
         for pdo in pdos
     )
-
-
-def commanding_cob_ids(target: Target) -> set[int]:
-    """List the COB-IDs that only the controller of these drives may send: commands and setpoints."""
-    sent = layout(target.can).received
-    return {own[pdo] for own in cob_ids(target) for pdo in sent}
 
 
 def period_digits(can: CanSpec) -> tuple[int, int]:

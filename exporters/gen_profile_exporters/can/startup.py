@@ -200,24 +200,15 @@ def _mapping(node: int, own: Mapping[int, int], can: CanSpec) -> Iterator[Entry]
 def _pdo(
     index: int, cob_id: int, kind: int, fields: Sequence[Field], name: str, *, fixed: bool
 ) -> Iterator[Entry]:
-    """Set up a PDO in the order that CiA 301 asks for: off, mapping, on."""
+    """Set up a PDO in the order that CiA 301 asks for: off, mapping (unless it is fixed), on."""
+    mapping, as_stated = index + 0x200, ", as can.fixed_pdos has them" if fixed else ""
+    count = Entry(mapping, 0, 8, len(fields), f"{name}: entries{as_stated}", fixed=fixed)
     yield Entry(index, 1, 32, OFF | cob_id, f"{name}: off while it changes")
-    yield from (
-        _fixed_entries(index + 0x200, fields, name) if fixed else _entries_of(index + 0x200, fields, name)
-    )
+    yield count if fixed else Entry(mapping, 0, 8, 0, f"{name}: mapping cleared")
+    for number, field in enumerate(fields, start=1):
+        words = f"{name}: {field.name or 'not used'}"
+        yield Entry(mapping, number, 32, field.mapping, words, fixed=fixed)
+    if not fixed:
+        yield count
     yield Entry(index, 2, 8, kind, f"{name}: {'on SYNC' if kind == ON_SYNC else 'at once'}")
     yield Entry(index, 1, 32, cob_id, f"{name}: on")
-
-
-def _entries_of(mapping: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:
-    yield Entry(mapping, 0, 8, 0, f"{name}: mapping cleared")
-    for number, field in enumerate(fields, start=1):
-        yield Entry(mapping, number, 32, field.mapping, f"{name}: {field.name}")
-    yield Entry(mapping, 0, 8, len(fields), f"{name}: entries")
-
-
-def _fixed_entries(mapping: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:
-    """List what a mapping holds that cannot be changed, as the spec states it."""
-    yield Entry(mapping, 0, 8, len(fields), f"{name}: entries, as can.fixed_pdos has them", fixed=True)
-    for number, field in enumerate(fields, start=1):
-        yield Entry(mapping, number, 32, field.mapping, f"{name}: {field.name or 'not used'}", fixed=True)

@@ -15,6 +15,7 @@ from pathlib import Path
 import attrs
 
 from gen_profile.errors import ExportError
+from gen_profile_exporters.block_source import COMMENT, bare
 from gen_profile_exporters.playback.layouts import LAYOUTS
 
 TEMPLATE = (Path(__file__).with_name("text") / "template.st").read_text("ascii")
@@ -24,7 +25,6 @@ _CHECKED = {  # how the value of a constant enters the checksum
     "BOOL": "IF {} THEN fValue := 1.0; END_IF;",
 }
 _DECLARED = {"LREAL~": "$reals", "BOOL~": "$switches"}
-_COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed takes the rest
 _HOLE = re.compile(r"@(\w+)")
 _LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
 _PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")
@@ -67,7 +67,7 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
     tokens, values = _TOKEN.findall(program), dict[str, Token]()
     for number, (piece, (expected, hole)) in enumerate(zip(tokens, due, strict=False)):
         known = values.setdefault(hole, Token(piece, number, program)).text if hole else expected
-        if piece != known and _bare(piece) != _bare(known):
+        if piece != known and bare(piece) != bare(known):
             raise ExportError(
                 f"line {Token(piece, number, program).line}: {piece[:40]!r} stands where the exported block "
                 f"has {known[:40]!r}; only numbers and comments may be edited in it, export it again."
@@ -158,10 +158,6 @@ def _checked(constants: Sequence[tuple[str, str, str, str]], axes: int) -> str:
     return "\n".join([*lines, f"{indent}END_CASE;", ""])
 
 
-def _bare(text: str) -> str:
-    return "".join(text.split()).lower()
-
-
 def _without_comments(text: str) -> str:
     """Leave out comments, but not their line ends."""
-    return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)
+    return COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)

@@ -34,7 +34,7 @@ from gen_profile_exporters.block_source import (
     parse_function_block,
 )
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.block import fill
+from gen_profile_exporters.playback.block import fill, layout_of
 from gen_profile_exporters.playback.layouts import LAYOUTS
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
@@ -146,7 +146,7 @@ def _buffered(
     sources: Sequence[BlockSource], target: Target, capacity: int | None, *, library: bool
 ) -> BlockSource:
     constants = {variable.name: variable for variable in sources[0].variables}
-    layout, axes = _layout(constants), len(_split(constants["cStart"]))
+    layout, axes = layout_of(sources[0].declaration()), len(_split(constants["cStart"]))
     cycle = float(constants["cCycleTime"].initial)
     texts = _texts([_motion_texts(source, layout, axes) for source in sources], cycle, library=library)
     if capacity is None:
@@ -264,9 +264,8 @@ def constant_sources(source: BlockSource, target: Target) -> list[BlockSource]:
             count = int(float(texts[len(HEAD)]))
             starts = [int(float(text)) for text in texts[len(HEAD) + 1 :][:count]]
         parts = [texts[start:end] for start, end in zip(starts, [*starts[1:], len(texts)], strict=True)]
-        back = [
-            parse_function_block(_constant_text(variables, source, part, layout, target)) for part in parts
-        ]
+        axes = len(target.axes)
+        back = [constant_block(_constant_values(part, layout, axes), source, layout) for part in parts]
         again = _buffered(back, target, len(variables[TABLE].elements) // 2, library=library)
     except (KeyError, ValueError, IndexError, OverflowError, ZeroDivisionError) as error:
         raise ExportError(ALTERED) from error
@@ -275,7 +274,7 @@ def constant_sources(source: BlockSource, target: Target) -> list[BlockSource]:
             "The block does not take its numbers from its buffers as it should, or is for other axes: it was "
             "altered; export it again."
         )
-    return [attrs.evolve(one, header=source.header) for one in back]
+    return back
 
 
 def refusing(body: str) -> str:
@@ -283,21 +282,9 @@ def refusing(body: str) -> str:
     return body.replace(_LAST_REFUSAL, _LAST_REFUSAL + _REFUSAL)
 
 
-def without_refusal(body: str) -> str:
-    """Undo `refusing`."""
-    return body.replace(_LAST_REFUSAL + _REFUSAL, _LAST_REFUSAL)
-
-
 def is_library(source: BlockSource) -> bool:
     """Tell whether an input selects what a block plays."""
     return any(variable.name == LIBRARY for variable in source.variables)
-
-
-def _layout(variables: dict[str, BlockVariable]) -> str:
-    if "cPower0" in variables:
-        return "segments"
-    array = variables["cPosition"].array
-    return "counts" if array is not None and array[2] == "DINT" else "samples"
 
 
 def _texts(motions: Sequence[list[str]], cycle: float, *, library: bool) -> list[str]:
@@ -337,12 +324,9 @@ def _as_real(text: str) -> str:
     return text if "." in text else f"{text}.0"
 
 
-def _constant_text(
-    variables: dict[str, BlockVariable], source: BlockSource, texts: list[str], layout: str, target: Target
-) -> str:
-    """Write the block of constants of a motion's values."""
-    axes, columns = len(target.axes), COLUMNS[layout]
-    own = len(SCALARS) + axes * len(PER_AXIS)
+def _constant_values(texts: list[str], layout: str, axes: int) -> dict[str, list[str]]:
+    """Read a motion's numbers, by the names of constants."""
+    columns, own = COLUMNS[layout], len(SCALARS) + axes * len(PER_AXIS)
     rows = (len(texts) - own) // len(columns)
     values = {name: [text.removesuffix(".0")] for name, text in zip(WHOLE, texts, strict=False)}
     values |= dict(zip(SCALARS[len(WHOLE) :], ([text] for text in texts[len(WHOLE) :]), strict=False))
@@ -354,6 +338,13 @@ def _constant_text(
         column = column[::axes] if name == "First" else column
         whole = _is_whole(name, layout)
         values[name] = [text.removesuffix(".0") if whole else text for text in column]
+    return values
+
+
+def constant_block(values: Mapping[str, Sequence[str]], like: BlockSource, layout: str) -> BlockSource:
+    """Write the block of constants of a motion's numbers; what all motions share is that of another block."""
+    shared = {variable.name: variable.initial for variable in like.variables}
+    columns, axes, rows = COLUMNS[layout], len(values["Start"]), len(values[COLUMNS[layout][0]])
     arrays = (*columns, *(PER_AXIS if axes > 1 else ()))
     holes = {
         re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): f"[{', '.join(of)}]" if name in arrays else of[0]
@@ -363,11 +354,12 @@ def _constant_text(
         "row_count": holes.pop("rows"),
         "rows": f"[0..{rows - 1}]",
         "segments": f"[0..{rows // axes - 1}]",
-        "cycle_time": variables["cCycleTime"].initial,
-        "start_tolerance": variables["fStartTolerance"].initial,
-        "block": source.name,
+        "cycle_time": shared["cCycleTime"],
+        "start_tolerance": shared["fStartTolerance"],
+        "block": like.name,
     }
-    return fill(defaultdict(str, holes), layout, axes)
+    written = parse_function_block(fill(defaultdict(str, holes), layout, axes))
+    return attrs.evolve(written, header=like.header)
 
 
 def _taken(variable: BlockVariable) -> BlockVariable:

@@ -1,9 +1,10 @@
 """Many motions in one playback block: an input selects which one it plays.
 
-The block is that of a single motion (`structured_text`), with a handful of changes that can be undone: tables
-of all motions stand one after the other in the same arrays, everything else that is a motion's own becomes an
-array, and the statements look these up at the motion that is selected. So every motion keeps its literals and
-its own checksum, and what is known of the single block holds for the library.
+The block is that of a single motion (`structured_text`), with a handful of changes: tables of all motions
+stand one after the other in the same arrays, everything else that is a motion's own becomes an array, and the
+statements look these up at the motion that is selected. So every motion keeps its literals and its own
+checksum, and what is known of the single block holds for the library. Reading writes the single blocks of the
+numbers found, and a library of these, which must be the same.
 """
 
 import re
@@ -17,42 +18,33 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.buffers import (
-    buffered,
-    constant_sources,
-    is_buffered,
-    is_library,
-    refusing,
-    without_refusal,
-)
+from gen_profile_exporters.playback import buffers
+from gen_profile_exporters.playback.block import layout_of
+from gen_profile_exporters.playback.buffers import buffered, constant_sources, is_buffered, is_library
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
     block_name,
     plain,
-    read_block,
     read_table,
     table_checksum,
 )
 from gen_profile_exporters.playback.table import MOST_SAMPLES
 
-SCALARS = ("cLast", "cRows", "cChecks", "cPlayOn", "cSlope", "cSlopeRate", "cChecksum", "cLastSegment")
-PER_AXIS = ("cRoom", "cInverse", "cStopJerk", "cStart", "cTarget", "cLeastScale", "cMirrors", "cShifts")
-TABLES = ("cPosition", "cVelocity", "cAcceleration", *(f"cPower{power}" for power in range(6)))
-SEGMENTS = "cFirst"
+SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.SCALARS, buffers.PER_AXIS))
+*POWERS, SEGMENTS = (f"c{name}" for name in buffers.COLUMNS["segments"])
+TABLES = (*(f"c{name}" for name in buffers.SAMPLED), *POWERS)
 ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
 
 SELECTION = Path(__file__).with_name("text").joinpath("selection.st").read_text("ascii") + "\n"
 
 OUTPUTS = ("fPosition",)  # which begins at the start
 OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *OUTPUTS)
-ADDED = ("nProfile", "nSelected", "cProfiles", FIRST_ROW, FIRST_SEGMENT)
 
 _SCALAR = re.compile(rf"\b({'|'.join((*SCALARS, *PER_AXIS))})\b(?!\[)")
 _AXIS = re.compile(rf"\b({'|'.join(PER_AXIS)})\[nAxis\]")
 _TABLE = re.compile(rf"\b({'|'.join(TABLES)})\[([^\[\]]*)\]")
 _SEGMENT = re.compile(rf"\b{SEGMENTS}\[([^\[\]]*)\]")
 
-_OFFSET = re.compile(rf"\b(\w+)\[(?:{FIRST_ROW}|{FIRST_SEGMENT})\[nSelected\] \+ ([^\[\]]*)\]")
 _WAIT = re.compile(r"(\d+) cycles after power-up")
 
 
@@ -124,7 +116,7 @@ def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, 
         The block is no such library, or was altered.
     """
     singles = constant_sources(library, target) if is_buffered(library) else _singles(library)
-    return tuple(read_block(single.text(), target) for single in singles)
+    return tuple(read_table(single.text(), target).motion() for single in singles)
 
 
 def constant_singles(source: BlockSource) -> list[BlockSource]:
@@ -135,9 +127,11 @@ def constant_singles(source: BlockSource) -> list[BlockSource]:
 def _singles(library: BlockSource) -> list[BlockSource]:
     """Take a library's motions out, and make sure that it selects them as it should."""
     arrays = {variable.name: variable.elements for variable in library.variables if variable.array}
+    layout = layout_of(library.declaration())
     try:
-        singles = [_single(library, arrays, number) for number in range(len(arrays[FIRST_ROW]))]
-    except (KeyError, ValueError, IndexError) as error:
+        numbers = range(len(arrays[FIRST_ROW]))
+        singles = [buffers.constant_block(_values(arrays, number), library, layout) for number in numbers]
+    except (KeyError, ValueError, IndexError, ZeroDivisionError) as error:
         raise ExportError("The block is no library of motions, or was altered; export it again.") from error
     if _assembled(singles, library.header, library.name).program() != library.program():
         raise ExportError(
@@ -221,13 +215,11 @@ def _selecting(body: str) -> str:
     body = _AXIS.sub(r"\1[nSelected * cAxes + nAxis - 1]", body)
     body = _TABLE.sub(rf"\1[{FIRST_ROW}[nSelected] + \2]", body)
     body = _SEGMENT.sub(rf"{SEGMENTS}[{FIRST_SEGMENT}[nSelected] + \1]", body)
-    return SELECTION + refusing(body)
+    return SELECTION + buffers.refusing(body)
 
 
-def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) -> BlockSource:
-    """Undo all that, for one motion."""
-    body = _OFFSET.sub(r"\1[\2]", without_refusal(library.body.removeprefix(SELECTION)))
-    body = body.replace("[nSelected * cAxes + nAxis - 1]", "[nAxis]").replace("[nSelected]", "")
+def _values(arrays: Mapping[str, list[str]], number: int) -> dict[str, list[str]]:
+    """Take a motion's numbers out of all, by the names that they have in a buffer."""
     axes = len(arrays["cStart"]) // len(arrays[FIRST_ROW])
     rows, first_row = int(arrays[ROWS][number]), int(arrays[FIRST_ROW][number])
     parts = {name: slice(number, number + 1) for name in SCALARS}
@@ -236,28 +228,7 @@ def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) 
     if SEGMENTS in arrays:
         first_segment = int(arrays[FIRST_SEGMENT][number])
         parts[SEGMENTS] = slice(first_segment, first_segment + rows // axes)
-    variables = [
-        _part(variable, arrays, parts, axes) for variable in library.variables if variable.name not in ADDED
-    ]
-    return attrs.evolve(library, variables=tuple(variables), body=body)
-
-
-def _part(
-    variable: BlockVariable, arrays: Mapping[str, list[str]], parts: Mapping[str, slice], axes: int
-) -> BlockVariable:
-    """Declare a variable as the block of a single motion does."""
-    source = "cStart" if variable.name in OUTPUTS else variable.name
-    if source not in parts:
-        return variable
-    values, type_ = arrays[source][parts[source]], variable.array[2] if variable.array else variable.type
-    if variable.name in SCALARS or (axes == 1 and variable.name in (*PER_AXIS, *OUTPUTS)):
-        return attrs.evolve(variable, type=type_, initial=values[0])
-    low = 1 if variable.name in (*PER_AXIS, *OUTPUTS) else 0
-    return attrs.evolve(
-        variable,
-        type=f"ARRAY [{low}..{len(values) - 1 + low}] OF {type_}",
-        initial=f"[{', '.join(values)}]",
-    )
+    return {name.removeprefix("c"): arrays[name][part] for name, part in parts.items() if name in arrays}
 
 
 def _header(entries: Sequence[LibraryEntry], target: Target) -> str:

@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
@@ -70,7 +71,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     ExportError
         The text is no such block, was altered or cut off, or is for other axes than the target's.
     """
-    return read_block(content.decode("latin-1"), target)
+    return read_table(content.decode("latin-1"), target).motion()
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
@@ -99,11 +100,6 @@ def block_text(profile: Profile, target: Target) -> str:
     return buffered([parse_function_block(text)], target).text()
 
 
-def read_block(text: str, target: Target) -> SampledProfile:
-    """Work out what a block issues, see `replay`."""
-    return read_table(text, target).motion()
-
-
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
     if TABLE in text and is_buffered(source := parse_function_block(text)):
@@ -126,7 +122,7 @@ def read_table(text: str, target: Target) -> PlaybackTable:
 
 def replays(unwrap: Callable[[bytes, Target], BlockSource]) -> Callable[[bytes, Target], SampledProfile]:
     """Make the `replay` of a format from how it reads its first block; raises as both do."""
-    return lambda content, target: read_block(unwrap(content, target).text(), target)
+    return lambda content, target: read_table(unwrap(content, target).text(), target).motion()
 
 
 def block_name(name: str) -> str:
@@ -190,9 +186,9 @@ def _constants(table: PlaybackTable) -> dict[str, str]:
         "stop_jerk": _per_axis(limits.jerk),
         "start": _per_axis(table.start),
         "target": _per_axis(table.target),
-        "least_scale": _per_axis(np.array([variant.least_scale for variant in table.variants])),
-        "mirrors": _switches([variant.mirror for variant in table.variants]),
-        "shifts": _switches([variant.shift for variant in table.variants]),
+        "least_scale": _per_axis([variant.least_scale for variant in table.variants]),
+        "mirrors": _per_axis([variant.mirror for variant in table.variants]),
+        "shifts": _per_axis([variant.shift for variant in table.variants]),
     }
 
 
@@ -213,7 +209,7 @@ def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
         "axis_lines": "\n".join(axis_lines(table)),
         "units": units[0] if len(set(units)) == 1 else ", ".join(units),
         "sha256": table.motion().payload_hash(),
-        "start_tolerance": _per_axis(np.array([START_TOLERANCE * abs(axis.factor) for axis in table.axes])),
+        "start_tolerance": _per_axis([START_TOLERANCE * abs(axis.factor) for axis in table.axes]),
     }
 
 
@@ -261,10 +257,7 @@ def _table(tokens: Mapping[str, Token], layout: str, target: Target) -> Playback
     cycle, last = tokens["cycle_time"], _number(tokens["last"].text, tokens["last"])
     cycles = rows // len(axes) - 1 if first is None else last
     if last != cycles or not 1 <= last <= MOST_CYCLES or (first is not None and not _rise(first, last)):
-        raise ExportError(
-            f"line {tokens['last'].line}: cLast = {last:g} does not belong to the table; "
-            "export the block again."
-        )
+        raise _altered(tokens["last"], f"cLast = {last:g} does not belong to the table")
     columns_by_axis = np.array(columns).reshape(len(names), -1, len(axes))
     return PlaybackTable(
         layout=layout,
@@ -282,19 +275,15 @@ def _table(tokens: Mapping[str, Token], layout: str, target: Target) -> Playback
 def _within(token: Token, last: float) -> int:
     number = _number(token.text, token)
     if not (0.0 <= number <= last and number.is_integer()):
-        raise ExportError(
-            f"line {token.line}: {token.text[:40]} is no cycle of the motion; export the block again."
-        )
+        raise _altered(token, f"{token.text[:40]} is no cycle of the motion")
     return int(number)
 
 
 def _variants(tokens: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[AxisVariants, ...]:
     columns = [_array(tokens[name]) for name in ("least_scale", "mirrors", "shifts")]
     if any(len(column) != len(axes) for column in columns):
-        raise ExportError(
-            f"line {tokens['least_scale'].line}: {len(axes)} axes, but values for another number of them; "
-            "export the block again."
-        )
+        wrong = f"{len(axes)} axes, but values for another number of them"
+        raise _altered(tokens["least_scale"], wrong)
     return tuple(
         AxisVariants(least_scale=float(scale), mirror=bool(mirror), shift=bool(shift))
         for scale, mirror, shift in zip(*columns, strict=True)
@@ -304,9 +293,7 @@ def _variants(tokens: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[A
 def _end(token: Token, axes: Sequence[AxisScale]) -> Array:
     target = _array(token)
     if len(target) != len(axes):
-        raise ExportError(
-            f"line {token.line}: {len(target)} targets for {len(axes)} axes; export the block again."
-        )
+        raise _altered(token, f"{len(target)} targets for {len(axes)} axes")
     return target
 
 
@@ -328,26 +315,18 @@ def _verify(tokens: Mapping[str, Token], table: PlaybackTable) -> None:
     for name, token in tokens.items():
         same = token.text == due.get(name, token.text)  # as it was exported: no number need be read
         if not same and _numbers(token) != _numbers(Token(due[name])):
-            raise ExportError(
-                f"line {token.line}: {token.text[:40]} stands where the table asks for {due[name][:40]}; "
-                "export the block again."
-            )
+            raise _altered(token, f"{token.text[:40]} stands where the table asks for {due[name][:40]}")
     end_error = np.abs(table.arrival() - table.target)
     factor = np.abs([axis.factor for axis in table.axes])
     if (end_error > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
-        raise ExportError(
-            f"line {tokens['target'].line}: cTarget = {tokens['target'].text[:40]} is not where the table "
-            "ends; export the block again."
-        )
+        wrong = f"cTarget = {tokens['target'].text[:40]} is not where the table ends"
+        raise _altered(tokens["target"], wrong)
 
 
-def _per_axis(values: Array) -> str:
-    texts = [literal(value) for value in values.tolist()]
-    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
-
-
-def _switches(values: Sequence[bool]) -> str:
-    texts = [str(value).upper() for value in values]
+def _per_axis(values: ArrayLike) -> str:
+    """Write a number, or TRUE or FALSE, for each axis."""
+    known = np.asarray(values).tolist()
+    texts = [str(value).upper() if isinstance(value, bool) else literal(value) for value in known]
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
@@ -380,7 +359,10 @@ def _number(text: str, token: Token, below: int = 0) -> float:
     text = _SWITCH.get(text.strip().upper(), text)
     number = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise ExportError(
-            f"line {token.line + below}: {text.strip()[:40]!r} is no finite number; export the block again."
-        )
+        raise _altered(token, f"{text.strip()[:40]!r} is no finite number", below)
     return number
+
+
+def _altered(token: Token, what: str, below: int = 0) -> ExportError:
+    """Say what is wrong with a token, so many lines below where that begins."""
+    return ExportError(f"line {token.line + below}: {what}; export the block again.")

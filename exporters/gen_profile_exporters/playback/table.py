@@ -194,35 +194,26 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     """
     motion = sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
     axes = counted_axes(target, target.export.plc_layout)
-    variants = target.variants or (AxisVariants(),) * len(axes)
+    first, last = None, len(motion.position) - 1
     if target.export.plc_layout == "segments":
         segments = fit(_quantities(motion), motion.cycle_time)
+        first = segments.first[:-1].astype(np.float64)
         factor = np.array([axis.factor for axis in axes])
-        coefficients = in_axis_units(np.moveaxis(segments.coefficients, 1, 0), factor)
-        return PlaybackTable(
-            layout="segments",
-            cycle_time=motion.cycle_time,
-            axes=axes,
-            first=segments.first[:-1].astype(np.float64),
-            columns=_literal(coefficients),
-            last=int(segments.first[-1]),
-            target=_literal(in_axis_units(segments.target, factor)),
-            variants=variants,
-        )
-    table = axis_table(motion, axes)
-    columns = _quantities(table)
-    if target.export.plc_layout == "counts":
-        columns = _whole(columns, axes)
-    columns = _literal(columns)
+        columns = _literal(in_axis_units(np.moveaxis(segments.coefficients, 1, 0), factor))
+        end = _literal(in_axis_units(segments.target, factor))
+    else:
+        columns = _quantities(axis_table(motion, axes))
+        columns = _literal(_whole(columns, axes) if target.export.plc_layout == "counts" else columns)
+        end = columns[0, -1]
     return PlaybackTable(
         layout=target.export.plc_layout,
         cycle_time=motion.cycle_time,
         axes=axes,
-        first=None,
+        first=first,
         columns=columns,
-        last=len(table.position) - 1,
-        target=columns[0, -1],
-        variants=variants,
+        last=last,
+        target=end,
+        variants=target.variants or (AxisVariants(),) * len(axes),
     )
 
 

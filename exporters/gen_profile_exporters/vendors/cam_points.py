@@ -11,7 +11,7 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.structured_text import literal
-from gen_profile_exporters.playback.table import PlaybackTable, tabulate
+from gen_profile_exporters.playback.table import tabulate
 
 Indices = NDArray[np.int64]
 
@@ -41,7 +41,8 @@ class QuinticPoints:
 
 def quintic_points(profile: Profile, target: Target) -> QuinticPoints:
     """Take the knots of the quintic segments, see `gen_profile_exporters.playback.quintic_segments`."""
-    table = segments_of(profile, target)
+    export = attrs.evolve(target.export, plc_layout="segments")  # whatever layout the target asks for
+    table = tabulate(profile, attrs.evolve(target, export=export))
     first = np.zeros(0) if table.first is None else table.first
     still = np.zeros((1, len(table.axes)))
     position, velocity, half = table.columns[:3]
@@ -51,11 +52,6 @@ def quintic_points(profile: Profile, target: Target) -> QuinticPoints:
         velocity=np.concatenate([velocity, still]),
         acceleration=np.concatenate([2.0 * half, still]),
     )
-
-
-def segments_of(profile: Profile, target: Target) -> PlaybackTable:
-    """Tabulate in segments, whatever layout the target asks for."""
-    return tabulate(profile, attrs.evolve(target, export=attrs.evolve(target.export, plc_layout="segments")))
 
 
 def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *, single: bool) -> Indices:

@@ -68,11 +68,11 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
             f"siemens-scl: the block's numbers take {size / 1000:.1f} kB, a data block holds "
             f"{MOST_BYTES / 1000:g} kB; take {cure}."
         )
-    wrappers = axis_wrappers(source, len(target.axes), SIEMENS)
-    parts = [source, *wrappers]
+    wrappers, others = axis_wrappers(source, len(target.axes), SIEMENS), []
     if is_buffered(source):
-        parts = [source, *(_wired(wrapper, source) for wrapper in wrappers)]
-    text = "\n".join([*map(_scl, parts), *([_mailbox(source)] if is_buffered(source) else [])])
+        wrappers = tuple(_wired(wrapper, source) for wrapper in wrappers)
+        others = [_mailbox(source)]
+    text = "\n".join([*map(_scl, (source, *wrappers)), *others])
     return (File(filename=f"{target.name}.scl", content=text.encode("ascii")),)
 
 
@@ -89,7 +89,7 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     if match is None:
         raise ExportError("There is no SCL block of this export; export it again.")
     header, name, declarations, body = match.groups()
-    portable = _unmarked(body)
+    portable = body.replace("#", "")
     declarations = re.sub(r'"(FB_\w+)";', r"\1;", declarations.lstrip())
     source = parse_function_block(
         f"{header}FUNCTION_BLOCK {name}\n{declarations}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
@@ -148,16 +148,12 @@ def _scl(source: BlockSource) -> str:
     )
     declaration = attrs.evolve(source, variables=variables, name=f'"{source.name}"').declaration()
     first, rest = declaration.split("\n", 1)
+    quoted = re.sub(r": (FB_\w+);", r': "\1";', rest)  # names of other blocks used as types
     body = _marked(source.body, {variable.name for variable in source.variables})
     return (
         f"{source.header}{first}\n{{ S7_Optimized_Access := 'TRUE' }}\nVERSION : 0.1\n"
-        f"{_quoted(rest)}\nBEGIN\n{body}END_FUNCTION_BLOCK\n"
+        f"{quoted}\nBEGIN\n{body}END_FUNCTION_BLOCK\n"
     )
-
-
-def _quoted(declarations: str) -> str:
-    """Quote the names of other blocks used as types."""
-    return re.sub(r": (FB_\w+);", r': "\1";', declarations)
 
 
 def _marked(body: str, own: set[str]) -> str:
@@ -171,11 +167,6 @@ def _marked(body: str, own: set[str]) -> str:
         return f"#{word[0]}" if name in own and not (word[1] and depth) else word[0]
 
     return _WORD.sub(mark, body)
-
-
-def _unmarked(body: str) -> str:
-    """Take the marks off."""
-    return body.replace("#", "")
 
 
 def _is_table(variable: BlockVariable) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Coordinate, Plant
-from gen_profile_fmu.model.nominals import smooth_move
+from gen_profile_fmu.model.nominals import rounded_up, smooth_move
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 from gen_profile_fmu.model.variables import VariableTable
 
@@ -33,6 +33,9 @@ _ERROR = (
     "<p>In co-simulation the loads are integrated by the classical Runge-Kutta method of fourth order, in "
     "steps of at most max_step; a hundredth of the shortest period of oscillation leaves less than a "
     "millionth of the swing a period. The axes' motion is exact.</p>"
+)
+_CALLS = (  # of a block
+    "In co-simulation the cycles that begin within a step are called with the inputs of the step's beginning."
 )
 _BEGINNING = (
     "It begins at start_time or, with wait_for_trigger, as soon as trigger is true from then on. Before, it "
@@ -83,10 +86,7 @@ def system_page(name: str, machine: PlantInstance, command: Profile, table: Vari
 
 def block_page(name: str, words: str, table: VariableTable) -> str:
     """Describe a planner block, in HTML, by its own words."""
-    text = (
-        "<p>A planner block as a sampled controller: it is called once in every cycle. In co-simulation the "
-        "cycles that begin within a step are called with the inputs of the step's beginning.</p>"
-    )
+    text = f"<p>A planner block as a sampled controller: it is called once in every cycle. {_CALLS}</p>"
     return _page(name, (text, f"<h2>The block</h2><pre>{escape(words)}</pre>", _variables(table)))
 
 
@@ -94,9 +94,7 @@ def planned_system_page(name: str, machine: PlantInstance, words: str, table: Va
     """Describe a plant that a planner drives, in HTML."""
     parts = (
         f"<p>{_capital(machine.plant.summary)}, whose drives go from setpoint to setpoint of a planner "
-        "block, which is called once in every cycle, behind a first-order lag where τ &gt; 0. In "
-        "co-simulation the cycles that begin within a step are called with the inputs of the step's "
-        "beginning.</p>",
+        f"block, which is called once in every cycle, behind a first-order lag where τ &gt; 0. {_CALLS}</p>",
         _equations(machine.plant),
         _ERROR,
         f"<h2>The block</h2><pre>{escape(words)}</pre>",
@@ -204,9 +202,7 @@ def _plot(times: Array, columns: Array, names: Sequence[str], title: str) -> str
 
 def _ticks(low: float, high: float, place: Callable[[Array], Array]) -> list[tuple[str, str]]:
     """List round values between two ends, at most seven, and where they are."""
-    coarse = (high - low) / 6.0
-    power = 10.0 ** math.floor(math.log10(coarse))
-    step = next(power * factor for factor in (1.0, 2.0, 5.0, 10.0) if power * factor >= coarse * (1.0 - 1e-9))
+    step = rounded_up((high - low) / 6.0)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     values = np.array([step * number for number in range(first, last + 1)])
     return [(f"{value:.6g}", f"{at:.1f}") for value, at in zip(values, place(values), strict=True)]

@@ -75,11 +75,11 @@ def state_nominals(
 def _sizes(names: Sequence[str], columns: Array) -> dict[str, float]:
     peaks = _SHARE * np.abs(columns).max(axis=0)
     least = _LEAST * float(peaks.max())
-    return {name: _rounded(max(float(peak), least)) for name, peak in zip(names, peaks, strict=True)}
+    return {name: rounded_up(max(float(peak), least)) for name, peak in zip(names, peaks, strict=True)}
 
 
-def _rounded(size: float) -> float:
-    """Round up, so that all computers agree; 1 for nothing."""
+def rounded_up(size: float) -> float:
+    """Round to 1, 2 or 5 times a power of ten, so that all computers agree; 1 for nothing."""
     if size == 0.0:
         return 1.0
     power = math.floor(math.log10(size))

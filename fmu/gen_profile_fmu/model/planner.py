@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 import attrs
 
@@ -45,8 +45,8 @@ class _PlacedBlock:
 
     Attributes
     ----------
-    source : BlockSource
-    code : Translation
+    text : str
+        Its own.
     axes : mapping of str to str
         Names of those that it plans, by what its inputs and outputs end in.
     live : tuple of str
@@ -54,11 +54,20 @@ class _PlacedBlock:
         Inputs of the block that are none of the FMU's.
     """
 
-    source: BlockSource
-    code: Translation
+    text: str
     axes: Mapping[str, str]
     live: tuple[str, ...]
     inside: tuple[str, ...]
+
+    @cached_property
+    def source(self) -> BlockSource:
+        """Its parts."""
+        return parse_function_block(self.text)
+
+    @property
+    def code(self) -> Translation:
+        """The same in C."""
+        return translate(self.text)
 
     @property
     def given(self) -> list[StVariable]:
@@ -98,9 +107,7 @@ def planner_model(name: str, text: str, axes: Mapping[str, str], live: tuple[str
     ExportError
         The text is no function block.
     """
-    block = _PlacedBlock(
-        source=parse_function_block(text), code=translate(text), axes=axes, live=live, inside=(CYCLE,)
-    )
+    block = _PlacedBlock(text=text, axes=axes, live=live, inside=(CYCLE,))
     orders, issued = _orders(block), _issued(block)
     table = VariableTable(blocks={**orders, **issued, "TIME": (time_variable(),)})
     require_good_names("Planner", [*axes.values(), *live], table)
@@ -143,17 +150,9 @@ def planned_system_model(
     """
     plant, equations = machine.plant, dynamics(machine.plant)
     stands = tuple(f"{STANDS}{suffix}" for suffix in axes)
-    block = _PlacedBlock(
-        source=parse_function_block(text),
-        code=translate(text),
-        axes=axes,
-        live=live,
-        inside=(
-            CYCLE,
-            *stands,
-            *(f"{MOVES}{suffix}" for suffix in axes),
-        ),  # the axes stand where they were led to
-    )
+    moves = tuple(f"{MOVES}{suffix}" for suffix in axes)
+    # the axes stand where they were led to
+    block = _PlacedBlock(text=text, axes=axes, live=live, inside=(CYCLE, *stands, *moves))
     names = [axis.name for axis in plant.actuated]
     planned = [names.index(axis) for axis in axes.values()]
     table = planned_system_variables(machine, planned, _orders(block), _issued(block))

@@ -1,7 +1,7 @@
 """The variables of FMUs that hold a plant, a motion, or both."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Any
 
@@ -11,7 +11,6 @@ from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile_fmu.model.variables import (
     DERIVATIVES,
-    STATES,
     FmuVariable,
     Kind,
     Type,
@@ -77,11 +76,10 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
     CosimulationError
         When two variables would share a name, or a name is none that importers take.
     """
-    axes, words = machine.plant.actuated, "position at rest at the start"
     table = VariableTable(
         blocks={
             **_parameters(machine, kind),
-            "START": _at(machine.position, _each(axes, "{}.start", words, 0, Kind.FIXED_PARAMETER)),
+            "START": _start(machine),
             "INPUTS": _inputs(machine, kind),
             "PERIOD": _period(machine.period, kind),
             **_states_and_outputs(machine),
@@ -133,17 +131,15 @@ def planned_system_variables(
     axes = machine.plant.actuated
     words = "position to reach in a cycle, of an axis that the block does not plan"
     left = [number for number in range(len(axes)) if number not in planned]
-    others = _at(
-        [machine.position[number] for number in left],
-        _each([axes[number] for number in left], "{}.setpoint", words, 0, Kind.INPUT),
-    )
-    start = _each(axes, "{}.start", "position at rest at the start", 0, Kind.FIXED_PARAMETER)
+    places = [machine.position[number] for number in left]
     table = VariableTable(
         blocks={
             **_parameters(machine, InputKind.SETPOINT),
-            "START": _at(machine.position, start),
+            "START": _start(machine),
             **orders,
-            "OTHERS": others,
+            "OTHERS": _each(
+                [axes[number] for number in left], "{}.setpoint", words, 0, Kind.INPUT, start=places
+            ),
             **_states_and_outputs(machine),
             **issued,
             "TIME": (time_variable(),),
@@ -166,24 +162,16 @@ def _parameters(machine: PlantInstance, kind: InputKind) -> Blocks:
         )
         for parameter in machine.plant.parameters
     )
-    lag = () if kind is InputKind.ACCELERATION else (_lag(machine.tau),)
-    return {"P": parameters, "TAU": lag, "MAX_STEP": (_longest_step(),)}
-
-
-def _lag(tau: float) -> FmuVariable:
     # fixed: position + tau * velocity is the interpolated setpoint only while tau stays as it is
-    return FmuVariable(
+    tau = FmuVariable(
         name=TAU,
         description="time constant of the drives' first-order lag; 0: ideal drives",
         unit="s",
         kind=Kind.FIXED_PARAMETER,
-        start=tau,
+        start=machine.tau,
         lower=0.0,
     )
-
-
-def _longest_step() -> FmuVariable:
-    return FmuVariable(
+    longest_step = FmuVariable(
         name=MAX_STEP,
         description="longest integration step in co-simulation (Runge-Kutta, fourth order)",
         unit="s",
@@ -192,6 +180,8 @@ def _longest_step() -> FmuVariable:
         lower=1e-6,
         upper=1.0,
     )
+    lag = () if kind is InputKind.ACCELERATION else (tau,)
+    return {"P": parameters, "TAU": lag, "MAX_STEP": (longest_step,)}
 
 
 def _period(period: float, kind: InputKind) -> tuple[FmuVariable, ...]:
@@ -214,10 +204,10 @@ def _period(period: float, kind: InputKind) -> tuple[FmuVariable, ...]:
 
 def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
     """List the parameters that shift and scale a motion; an axis that comes back to its start only shifts."""
-    start = motion.coefficients[0, 0]
+    start = motion.coefficients[0, 0].tolist()
     distances = _each(axes, "{}.distance", "how far the motion leads, scaled", 0, Kind.FIXED_PARAMETER)
     return {
-        "START": _at(start, _each(axes, "{}.start", "where the motion begins", 0, Kind.FIXED_PARAMETER)),
+        "START": _each(axes, "{}.start", "where the motion begins", 0, Kind.FIXED_PARAMETER, start=start),
         "DISTANCE": tuple(
             attrs.evolve(variable, start=float(distance))
             if abs(distance) > _STANDING
@@ -228,26 +218,30 @@ def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
 
 
 def _each(
-    coordinates: Iterable[Coordinate], pattern: str, description: str, order: int, kind: Kind
+    coordinates: Sequence[Coordinate],
+    pattern: str,
+    description: str,
+    order: int,
+    kind: Kind,
+    *,
+    start: Sequence[float] | None = None,
 ) -> tuple[FmuVariable, ...]:
-    """List a quantity of every coordinate; `order` is that of the time derivative."""
+    """List a quantity of every coordinate; `order` is that of the time derivative, `start` 0 if not given."""
     return tuple(
         FmuVariable(
-            name=pattern.format(q.name), description=description, unit=_unit(q.unit, order), kind=kind
+            name=pattern.format(q.name),
+            description=description,
+            unit=q.unit + ("", "/s", "/s^2", "/s^3")[order],
+            kind=kind,
+            start=float(value),
         )
-        for q in coordinates
+        for q, value in zip(coordinates, [0.0] * len(coordinates) if start is None else start, strict=True)
     )
 
 
-def _unit(unit: str, order: int) -> str:
-    return (unit, f"{unit}/s", f"{unit}/s^2", f"{unit}/s^3")[order]
-
-
-def _at(position: Iterable[float], variables: tuple[FmuVariable, ...]) -> tuple[FmuVariable, ...]:
-    return tuple(
-        attrs.evolve(variable, start=float(start))
-        for variable, start in zip(variables, position, strict=True)
-    )
+def _start(machine: PlantInstance) -> tuple[FmuVariable, ...]:
+    words = "position at rest at the start"
+    return _each(machine.plant.actuated, "{}.start", words, 0, Kind.FIXED_PARAMETER, start=machine.position)
 
 
 def _inputs(machine: PlantInstance, kind: InputKind) -> tuple[FmuVariable, ...]:
@@ -259,50 +253,38 @@ def _inputs(machine: PlantInstance, kind: InputKind) -> tuple[FmuVariable, ...]:
             return _each(axes, "{}.setpoint_velocity", "velocity that the drive follows", 1, Kind.INPUT)
         case InputKind.SETPOINT:
             words = "position to reach at the end of the step"
-            return _at(machine.position, _each(axes, "{}.setpoint", words, 0, Kind.INPUT))
+            return _each(axes, "{}.setpoint", words, 0, Kind.INPUT, start=machine.position)
 
 
 def _states_and_outputs(machine: PlantInstance) -> Blocks:
-    blocks = _of_plant(machine)
-    sized = {
-        block: tuple(
-            attrs.evolve(state, nominal=machine.nominal.get(state.name, 1.0)) for state in blocks[block]
-        )
-        for block in STATES
-    }
-    return {**blocks, **sized}
-
-
-def _of_plant(machine: PlantInstance) -> Blocks:
     plant, axes = machine.plant, machine.plant.actuated
-    accelerations = _each(axes, "{}.velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
-    velocities = _each(axes, "{}.position", "velocity of the axis", 1, Kind.DERIVATIVE)
-    return {
-        "Q_U": _swinging(
-            machine.initial, _each(plant.unactuated, "{}", "unactuated coordinate", 0, Kind.STATE)
-        ),
-        "DQ_U": _swinging(
-            machine.initial,
-            _each(plant.unactuated, "{}.rate", "rate of an unactuated coordinate", 1, Kind.STATE),
-        ),
+    rate, swings = "rate of an unactuated coordinate", plant.unactuated
+    states: Blocks = {
+        "Q_U": _each(swings, "{}", "unactuated coordinate", 0, Kind.STATE),
+        "DQ_U": _each(swings, "{}.rate", rate, 1, Kind.STATE),
         "Q_A": _each(axes, "{}.position", "position of the axis", 0, Kind.OUTPUT),
         "DQ_A": _each(axes, "{}.velocity", "velocity of the axis", 1, Kind.OUTPUT),
+    }
+    begun = {variable_name(name): value for name, value in machine.initial.items()}
+    return {
+        **{
+            block: tuple(
+                attrs.evolve(one, start=begun.get(one.name, 0.0), nominal=machine.nominal.get(one.name, 1.0))
+                for one in of
+            )
+            for block, of in states.items()
+        },
         DERIVATIVES: (
-            *_each(plant.unactuated, "der({})", "rate of an unactuated coordinate", 1, Kind.DERIVATIVE),
-            *_each(plant.unactuated, "der({}.rate)", "its acceleration", 2, Kind.DERIVATIVE),
-            *(attrs.evolve(variable, name=f"der({variable.name})") for variable in velocities),
-            *(attrs.evolve(variable, name=f"der({variable.name})") for variable in accelerations),
+            *_each(swings, "der({})", rate, 1, Kind.DERIVATIVE),
+            *_each(swings, "der({}.rate)", "its acceleration", 2, Kind.DERIVATIVE),
+            *_each(axes, "der({}.position)", "velocity of the axis", 1, Kind.DERIVATIVE),
+            *_each(axes, "der({}.velocity)", "acceleration of the axis", 2, Kind.DERIVATIVE),
         ),
         "SWAY": _of_loads(plant, "sway", "m", "horizontal distance from the place at rest", "mm"),
         "HEIGHT": _of_loads(plant, "height", "m", "height above the suspension point", "m"),
         "ANGLE": _of_loads(plant, "angle", "rad", "angle of the rope from the vertical", "deg"),
         **_of_bodies(plant),
     }
-
-
-def _swinging(initial: Mapping[str, float], states: tuple[FmuVariable, ...]) -> tuple[FmuVariable, ...]:
-    started = {variable_name(name): value for name, value in initial.items()}
-    return tuple(attrs.evolve(state, start=started.get(state.name, 0.0)) for state in states)
 
 
 def _of_loads(

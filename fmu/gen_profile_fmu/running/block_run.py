@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
-from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.running.instances import CalledFmu, called, compiled_loops, doubles, instance, unsigned
+from gen_profile_fmu.running.instances import CalledFmu, compiled_loops, doubles, instance, unsigned
 
 NO_NUMBER = -1  # a block's fault: a setpoint is none, or beyond all that a machine can follow
 
@@ -254,9 +253,8 @@ class BlockFollower:
         self._loads = [v.name for v in fmu.variables.blocks["SWAY"]]
         self._setpoints = [v.name for v in fmu.variables.blocks["INPUTS"]]
         self._loop = _loop()
-        self._instance = instance(fmu, Version.FMI2)
+        self._instance = instance(fmu)
         self._messages = self._instance.messages
-        self._fmu = called(self._instance.slave, Version.FMI2)
 
     def __enter__(self) -> Self:
         return self
@@ -316,7 +314,7 @@ class BlockFollower:
         axes, inputs = len(block.axes), script.inputs.shape[1]
         room = np.empty(2 * outputs + loads + axes + inputs + len(self._setpoints))
         self._loop(
-            byref(self._fmu),
+            byref(self._instance.called),
             byref(_called(block, script)),
             byref(self._history(script, values, led, hoists, marks=marks, shown=shown)),
             doubles(room),

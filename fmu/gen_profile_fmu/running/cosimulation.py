@@ -16,9 +16,8 @@ from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
-from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.running.instances import Instance, called, compiled_loops, doubles, instance, unsigned
+from gen_profile_fmu.running.instances import Instance, compiled_loops, doubles, instance, unsigned
 
 # blocks of variables that are read after every step, and what a Response calls them
 _OBSERVED = {
@@ -80,9 +79,9 @@ class PlantCosimulation:
     def __init__(self, plant: Plant, progress: Progress = no_progress) -> None:
         self._plant = plant
         self._fmu = plant_fmu(plant, progress)
-        self._instance: Instance | None = instance(self._fmu, Version.FMI2)
+        self._instance: Instance | None = instance(self._fmu)
         self._slave, self._messages = self._instance.slave, self._instance.messages
-        self._called = called(self._slave, Version.FMI2)
+        self._called = self._instance.called
         variables = self._fmu.variables
         self._setpoints = unsigned(variables.references("INPUTS"))
         self._outputs = unsigned(variables.references(*_OBSERVED))

@@ -1,4 +1,4 @@
-"""An FMU of ours in memory, by FMPy, with its messages kept, and its functions for compiled loops."""
+"""An FMU of ours in memory (FMI 2), by FMPy, with its messages kept, and its functions for compiled loops."""
 
 import ctypes
 import logging
@@ -20,7 +20,6 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
     fmi2OK,
 )
-from fmpy.fmi3 import FMU3Slave
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
@@ -32,6 +31,23 @@ from gen_profile_fmu.description.fmu_files import Version, digest, standard_head
 from gen_profile_fmu.model.c_sources import hand_written
 
 _logger = logging.getLogger(__name__)
+_HEADER, _SOURCE, _NAME = "called_fmu.h", "loops.c", "loops"
+_LOOPS = ("many_runs", "sampled_run", "block_run")  # each a C file and the function in it
+_FUNCTIONS = (
+    "fmi2Reset",
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2SetReal",
+    "fmi2GetReal",
+    "fmi2DoStep",
+)
+
+
+class CalledFmu(Structure):
+    """What called_fmu.h calls `Fmu`: functions of an FMU, and the instance."""
+
+    _fields_ = [*((name, c_void_p) for name in _FUNCTIONS), ("instance", c_void_p)]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -41,10 +57,10 @@ class Instance:
     Attributes
     ----------
     fmu : PlantFmu
-    version : Version
-        That the FMU is of.
-    slave : FMU2Slave or FMU3Slave
+    slave : FMU2Slave
         Of FMPy.
+    called : CalledFmu
+        The same for compiled loops.
     messages : list of str
         What the instance has said of failures since this was last cleared.
     logs : bool
@@ -52,36 +68,33 @@ class Instance:
     """
 
     fmu: PlantFmu
-    version: Version
     slave: Any
+    called: CalledFmu
     messages: list[str]
     logs: bool
 
     def give_back(self) -> None:
         """Leave the instance to the next run of the same FMU; those of others are freed."""
-        while _idle and not _idle[-1].is_like(self.fmu, self.version, logs=self.logs):
+        while _idle and not _idle[-1].is_like(self.fmu, logs=self.logs):
             _idle.pop().slave.freeInstance()
         _idle.append(self)
 
-    def is_like(self, fmu: PlantFmu, version: Version, *, logs: bool) -> bool:
+    def is_like(self, fmu: PlantFmu, *, logs: bool) -> bool:
         """Whether it is what `instance` would make."""
-        asked = (fmu.folder, fmu.guid, version, logs)
-        return (self.fmu.folder, self.fmu.guid, self.version, self.logs) == asked
+        return (self.fmu.folder, self.fmu.guid, self.logs) == (fmu.folder, fmu.guid, logs)
 
 
 # all of one FMU: loading it takes longer than a run, and every run begins by a reset
 _idle: list[Instance] = []
 
 
-def instance(fmu: PlantFmu, version: Version) -> Instance:
+def instance(fmu: PlantFmu) -> Instance:
     """Take an idle instance for co-simulation, or load the FMU and make one.
 
     Parameters
     ----------
     fmu : PlantFmu
-        Of this computer.
-    version : Version
-        That the FMU is of.
+        Of this computer, and of FMI 2.
 
     Raises
     ------
@@ -91,92 +104,42 @@ def instance(fmu: PlantFmu, version: Version) -> Instance:
     logs = _logger.isEnabledFor(logging.DEBUG)
     with suppress(IndexError):
         idle = _idle.pop()
-        if idle.is_like(fmu, version, logs=logs):
+        if idle.is_like(fmu, logs=logs):
             idle.messages.clear()
             return idle
         idle.give_back()
     messages: list[str] = []
 
-    def log(environment: object, status: int, category: bytes, message: bytes) -> None:
-        del environment
+    def log(environment: object, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+        del environment, instance
         text = message.decode("utf-8", errors="replace")
-        if status == fmi2OK:  # FMI 3 has the same numbers
+        if status == fmi2OK:
             _logger.debug("%s: %s", category.decode("utf-8"), text)
         else:
             _logger.warning("%s: %s", category.decode("utf-8"), text)
             messages.append(text)
 
-    first = version is Version.FMI2
-    reports = {"callbacks": _callbacks(log)} if first else {"logMessage": log}
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(log)
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
     try:
-        made = (FMU2Slave if first else FMU3Slave)(
+        made = FMU2Slave(
             guid=fmu.guid,
             modelIdentifier=fmu.model_identifier,
             unzipDirectory=str(fmu.folder),
             instanceName=fmu.model_identifier,
         )
-        made.instantiate(loggingOn=logs, **reports)
+        made.instantiate(loggingOn=logs, callbacks=callbacks)
     except Exception as error:  # FMPy raises nothing more special
         reason = " ".join(messages) or str(error)
         raise CosimulationError(
             f"The FMU in {fmu.folder} cannot be loaded: {reason} "
             f"If programs must not be loaded from there, name another folder in {ENVIRONMENT_VARIABLE}."
         ) from error
-    return Instance(fmu=fmu, version=version, slave=made, messages=messages, logs=logs)
-
-
-def _callbacks(log: Any) -> Any:
-    """Make the callbacks of FMI 2, which names the instance in a message, too."""
-
-    def named(environment: object, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-        del instance
-        log(environment, status, category, message)
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(named)
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    return callbacks
-
-
-_HEADER, _SOURCE, _NAME = "called_fmu.h", "loops.c", "loops"
-_LOOPS = ("many_runs", "sampled_run", "block_run")  # each a C file and the function in it
-_FUNCTIONS = {
-    Version.FMI2: (
-        "fmi2Reset",
-        "fmi2SetupExperiment",
-        "fmi2EnterInitializationMode",
-        "fmi2ExitInitializationMode",
-        "fmi2SetReal",
-        "fmi2GetReal",
-        "fmi2DoStep",
-    ),
-    Version.FMI3: (
-        "fmi3Reset",
-        "fmi3EnterInitializationMode",
-        "fmi3ExitInitializationMode",
-        "fmi3SetFloat64",
-        "fmi3GetFloat64",
-        "fmi3DoStep",
-    ),
-}
-
-
-class CalledFmu(Structure):
-    """What called_fmu.h calls `Fmu`: functions of one version, those of the other null, and the instance."""
-
-    _fields_ = [
-        *((name, c_void_p) for names in _FUNCTIONS.values() for name in names),
-        ("instance", c_void_p),
-    ]
-
-
-def called(slave: Any, version: Version) -> CalledFmu:
-    """Take the functions of an instance in memory."""
-    fmu = CalledFmu(instance=slave.component)
-    for name in _FUNCTIONS[version]:
-        setattr(fmu, name, ctypes.cast(getattr(slave.dll, name), c_void_p).value)
-    return fmu
+    addresses = {name: ctypes.cast(getattr(made.dll, name), c_void_p).value for name in _FUNCTIONS}
+    called = CalledFmu(instance=made.component, **addresses)
+    return Instance(fmu=fmu, slave=made, called=called, messages=messages, logs=logs)
 
 
 def doubles(array: Array) -> Any:
@@ -205,8 +168,7 @@ def compiled_loops() -> Any:
         There is no compiler, it fails, or no cache folder can be written.
     """
     compiler, library, texts = find_compiler(), f"{_NAME}{fmpy.sharedLibraryExtension}", loop_sources()
-    for version in Version:
-        texts |= standard_headers(version)
+    texts |= standard_headers(Version.FMI2)
 
     def make(cache: Path) -> dict[str, bytes]:
         return {library: compile_texts(texts, _SOURCE, compiler, library, cache)}

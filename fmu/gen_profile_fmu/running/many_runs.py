@@ -5,14 +5,19 @@ from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
 from typing import Any, Self
 
-import attrs
 import numpy as np
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
-from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.running.instances import CalledFmu, called, compiled_loops, doubles, instance, unsigned
+from gen_profile_fmu.running.instances import (
+    CalledFmu,
+    Instance,
+    compiled_loops,
+    doubles,
+    instance,
+    unsigned,
+)
 
 
 class _PerRun(Structure):
@@ -38,9 +43,7 @@ class ManyRuns:
     Parameters
     ----------
     fmu : PlantFmu
-        Of this computer.
-    version : Version
-        That the FMU is of.
+        Of this computer, and of FMI 2.
     workers : int
         Instances that share the runs, each in a thread: compiled code, they run side by side. What is found
         does not depend on their number.
@@ -51,9 +54,9 @@ class ManyRuns:
         When the FMU cannot be loaded, or the loop cannot be compiled (once).
     """
 
-    def __init__(self, fmu: PlantFmu, version: Version, *, workers: int = 1) -> None:
-        self._variables = fmu.variables
-        self._workers = [_Worker(fmu, version) for _ in range(workers)]
+    def __init__(self, fmu: PlantFmu, *, workers: int = 1) -> None:
+        self._variables, self._loop = fmu.variables, _loop()
+        self._workers = [instance(fmu) for _ in range(workers)]
         self._threads = ThreadPoolExecutor(workers)  # which start when they are needed
 
     def __enter__(self) -> Self:
@@ -62,7 +65,7 @@ class ManyRuns:
     def __exit__(self, *_: object) -> None:
         self._threads.shutdown()
         for worker in self._workers:
-            worker.close()
+            worker.give_back()
 
     def peaks(
         self,
@@ -100,12 +103,10 @@ class ManyRuns:
         CosimulationError
             A name is unknown, lengths differ, or the FMU refuses a value or a step.
         """
-        given = _Given.of(times, inputs, parameters)
+        given = _given(times, inputs, parameters)
         plan = _Plan(
-            times=_per_run(given.times),
-            inputs=_per_run(given.inputs),
-            parameters=_per_run(given.parameters),
-            steps=given.times.shape[1] - 1,
+            **{name: _per_run(rows) for name, rows in given.items()},
+            steps=given["times"].shape[1] - 1,
             n_inputs=len(inputs),
             n_parameters=len(parameters),
             n_outputs=len(outputs),
@@ -115,66 +116,45 @@ class ManyRuns:
             n_components=components,
             since=since * (1.0 - 1e-12),
         )
-        return self._run(plan, np.empty((given.runs, len(outputs) + (components > 0))))
+        runs = next((len(rows) for rows in given.values() if len(rows) != 1), 1)
+        return self._run(plan, np.empty((runs, len(outputs) + (components > 0))))
 
     def _run(self, plan: _Plan, rows: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""
         edges = [len(rows) * number // len(self._workers) for number in range(len(self._workers) + 1)]
         shares = list(zip(self._workers, edges, edges[1:], strict=False))
         if len(shares) == 1:
-            reached = [self._workers[0].run(plan, 0, len(rows), rows)]
+            reached = [self._fill(plan, rows, *shares[0])]
         else:
-            reached = list(self._threads.map(lambda part: part[0].run(plan, *part[1:], rows), shares))
+            reached = list(self._threads.map(lambda share: self._fill(plan, rows, *share), shares))
         for run, (worker, _, end) in zip(reached, shares, strict=True):
             if run < end:
                 reason = " ".join(worker.messages)
                 raise CosimulationError(f"The FMU could not go on in run {run}, counted from 0: {reason}")
         return rows
 
-
-class _Worker:
-    """An instance with the loop over its functions."""
-
-    def __init__(self, fmu: PlantFmu, version: Version) -> None:
-        self._loop = _loop()
-        self._instance = instance(fmu, version)
-        self.messages = self._instance.messages
-        self._fmu = called(self._instance.slave, version)
-
-    def run(self, plan: _Plan, first: int, end: int, rows: Array) -> int:
-        """Fill rows of what is to be found; the first bad run, or `end`."""
-        self.messages.clear()
+    def _fill(self, plan: _Plan, rows: Array, worker: Instance, first: int, end: int) -> int:
+        """Have a worker fill rows of what is to be found; the first bad run, or `end`."""
+        worker.messages.clear()
         room = np.empty(plan.n_outputs)
-        return int(self._loop(byref(self._fmu), byref(plan), first, end, doubles(room), doubles(rows)))
-
-    def close(self) -> None:
-        """Give the instance back."""
-        self._instance.give_back()
+        return int(self._loop(byref(worker.called), byref(plan), first, end, doubles(room), doubles(rows)))
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class _Given:
-    """What runs are given: arrays of one row for all runs, or one row for each of them."""
-
-    times: Array
-    inputs: Array
-    parameters: Array
-    runs: int
-
-    @classmethod
-    def of(cls, times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array | float]) -> Self:
-        """Order and check what a caller gives by name."""
-        points = np.ascontiguousarray(np.atleast_2d(times), dtype=np.float64)
-        columns = {name: np.reshape(values, (-1, 1)) for name, values in parameters.items()}
-        rows = {
-            "times": points,
-            "inputs": _stacked("inputs", inputs, points.shape[1] - 1),
-            "parameters": _stacked("parameters", columns, 1),
-        }
-        counts = {len(array) for array in rows.values()} - {1}
-        if len(counts) > 1:
-            raise CosimulationError(f"Times, inputs and parameters are of {sorted(counts)} runs.")
-        return cls(runs=counts.pop() if counts else 1, **rows)
+def _given(
+    times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array | float]
+) -> dict[str, Array]:
+    """Order and check what a caller gives: arrays of one row for all runs, or one row for each of them."""
+    points = np.ascontiguousarray(np.atleast_2d(times), dtype=np.float64)
+    columns = {name: np.reshape(values, (-1, 1)) for name, values in parameters.items()}
+    rows = {
+        "times": points,
+        "inputs": _stacked("inputs", inputs, points.shape[1] - 1),
+        "parameters": _stacked("parameters", columns, 1),
+    }
+    counts = {len(array) for array in rows.values()} - {1}
+    if len(counts) > 1:
+        raise CosimulationError(f"Times, inputs and parameters are of {sorted(counts)} runs.")
+    return rows
 
 
 def _stacked(what: str, arrays: Mapping[str, Array], length: int) -> Array:

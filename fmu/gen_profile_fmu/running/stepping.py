@@ -2,34 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 
-import attrs
 import numpy as np
 
-from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.evaluation.simulation import Response
+from gen_profile.motion.profile import SampledProfile
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.cosimulation import PlantCosimulation, Steps
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Instant:
-    """A machine at one instant.
-
-    Attributes
-    ----------
-    position : (axes,) array
-        Of the axes, in m (or rad).
-    sway : (outputs,) array
-        Of the loads, in m.
-    q_u, dq_u : (n_u,) array
-        Coordinates that swing, and their rates.
-    """
-
-    position: Array
-    sway: Array
-    q_u: Array
-    dq_u: Array
 
 
 class SteppedPlant(PlantCosimulation):
@@ -70,8 +50,13 @@ class SteppedPlant(PlantCosimulation):
         self._begin(rest, parameters, {TAU: tau, MAX_STEP: max_step})
         self._time = 0.0
 
-    def advance(self, position: Sequence[float], duration: float) -> Instant:
+    def advance(self, position: Sequence[float], duration: float) -> Response:
         """Lead the axes evenly to a position, which ideal drives reach after `duration` s.
+
+        Returns
+        -------
+        Response
+            Before and after.
 
         Raises
         ------
@@ -84,6 +69,6 @@ class SteppedPlant(PlantCosimulation):
             sizes=np.array([duration]),
             setpoints=np.array([position], dtype=np.float64),
         )
-        observed = self._observe(step)
+        response = Response(times=step.times, **self._observe(step))
         self._time = end
-        return Instant(**{name: observed[name][-1] for name in ("position", "sway", "q_u", "dq_u")})
+        return response

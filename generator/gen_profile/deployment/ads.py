@@ -16,7 +16,7 @@ import numpy as np
 import pyads
 from pyads.constants import ADSIGRP_SYM_VALBYHND
 
-from gen_profile.deployment.mailbox import LinkLostError
+from gen_profile.deployment.mailbox import UNSECURED, LinkLostError, first_connected
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
@@ -74,21 +74,13 @@ class AdsLink:
         self._access, self._handles = access, dict[str, int]()
         self._lengths = {REQUEST: LENGTH, REPLY: LENGTH, STATE: state_length(table.constant("cAxes"))}
         self._connection = pyads.Connection(access.net_id, access.port, access.host)
-        try:
+        self.server = {"url": access.url}
+        look_at = "the address and the NetId, whether the controller has a route to this computer, and at the"
+        with first_connected(self, access.url, f"{look_at} network"):
             self._connect()
             self._instance = self._found()
             self._take_handles()
-        except LinkLostError as error:
-            self.close()
-            raise DeploymentError(
-                f"{access.url} cannot be reached ({error}); look at the address and the NetId, whether the "
-                "controller has a route to this computer, and at the network."
-            ) from error
-        except BaseException:
-            self.close()
-            raise
-        none = {"security": "none", "policy": "None", "certificate_sha256": "", "user": ""}
-        self.server = {"url": access.url, "instance": self._instance, **none}
+        self.server |= {"instance": self._instance, **UNSECURED}
 
     def close(self) -> None:
         """End the connection, if it stands."""

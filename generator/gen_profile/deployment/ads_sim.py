@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from socketserver import StreamRequestHandler, ThreadingTCPServer
 
 import numpy as np
 
-from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedBlock
+from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedController
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 
@@ -36,44 +37,36 @@ class _Server(ThreadingTCPServer):
     daemon_threads = True
 
 
-class SimulatedAdsController:
+class SimulatedAdsController(SimulatedController):
     """The server: the block as ``MAIN.fbMotion``, with its inputs, which clients write, and its outputs.
 
     Parameters
     ----------
     table : BlockTable
     port : int
-        On the loopback interface.
     """
 
     def __init__(self, table: BlockTable, port: int) -> None:
-        self.block, self._port = SimulatedBlock(table), port
-        self._type, self._cycle = table.source.name, table.spec.export.cycle_time
-        self.lock, self.ended = threading.Lock(), threading.Event()
+        super().__init__(table, INSTANCE, port)
+        self._type = table.source.name
+        self.lock = threading.Lock()
         self.handles: dict[int, str] = {}
 
-    def serve(self, ready: Callable[[str], None]) -> None:
-        """Play until `ended` is set; report the address once it answers.
-
-        Raises
-        ------
-        OutputError
-            The port cannot be had.
-        """
+    @contextmanager
+    def _served(self) -> Iterator[str]:
         try:
-            server = _Server((LOOPBACK, self._port), self._handler())
+            server = _Server((LOOPBACK, self.port), self._handler())
         except OSError as error:
-            raise OutputError(f"port {self._port}: {error.strerror}; name another one.") from error
+            raise OutputError(f"port {self.port}: {error.strerror}; name another one.") from error
         with server:
             threading.Thread(target=server.serve_forever, daemon=True).start()
             try:
-                ready(f"ads://{LOOPBACK}:{self._port}/{NET_ID}:{AMS_PORT}")
-                self.block.play(self.turn, self._cycle, self.ended)
+                yield f"ads://{LOOPBACK}:{self.port}/{NET_ID}:{AMS_PORT}"
             finally:
                 server.shutdown()
 
     def turn(self, cycles: int) -> None:
-        """Call the block."""
+        """Call the block, with which its variables are shown."""
         with self.lock:
             self.block.run(cycles)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import attrs
@@ -25,6 +26,7 @@ REFUSALS = {
     UNFIT: "The block finds another table in its idle buffer than was written there, as if something else "
     "wrote to it; find out what does, and run this again.",
 }
+UNSECURED = {"security": "none", "policy": "None", "certificate_sha256": "", "user": ""}
 REOPENED, SENT, LOOKS = 3, 4, 200  # times that a connection, a request, and a reply to it are tried
 PAUSE = 0.005  # s between two looks for a reply
 
@@ -60,6 +62,24 @@ class ControllerLink(MailboxLink, Protocol):
 
     def close(self) -> None:
         """End the connection, if it stands."""
+
+
+@contextmanager
+def first_connected(link: ControllerLink, url: str, look_at: str) -> Iterator[None]:
+    """Close a link whose first connection fails, and say what to look at where nothing answers.
+
+    Raises
+    ------
+    DeploymentError
+    """
+    try:
+        yield
+    except LinkLostError as error:
+        link.close()
+        raise DeploymentError(f"{url} cannot be reached ({error}); look at {look_at}.") from error
+    except BaseException:
+        link.close()
+        raise
 
 
 def _whole() -> Any:

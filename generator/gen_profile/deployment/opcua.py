@@ -17,7 +17,7 @@ from asyncua.crypto import security_policies
 from asyncua.crypto.uacrypto import CertProperties, x509_from_der
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate, require_current
-from gen_profile.deployment.mailbox import LinkLostError
+from gen_profile.deployment.mailbox import LinkLostError, first_connected
 from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.playback.buffers import LENGTH, REPLY, REQUEST, STATE
@@ -88,21 +88,10 @@ class OpcUaLink:
     def __init__(self, access: OpcUaAccess) -> None:
         self._access, self._runner = access, asyncio.Runner()
         self._client: Any = None
-        self._request: Any = None
-        self._reply: Any = None
-        self._state: Any = None
         self.instance = ""
         self.server: dict[str, str] = {}
-        try:
+        with first_connected(self, access.url, "the address, the port and the network"):
             self._run(self._connect())
-        except LinkLostError as error:
-            self.close()
-            raise DeploymentError(
-                f"{access.url} cannot be reached ({error}); look at the address, the port and the network."
-            ) from error
-        except BaseException:
-            self.close()
-            raise
 
     def close(self) -> None:
         """End the connection, if it stands."""

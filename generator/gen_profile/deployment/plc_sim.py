@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
-import logging
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,14 +12,15 @@ import attrs
 import numpy as np
 from asyncua import Server, ua
 from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.sync import ThreadLoop
 
 from gen_profile.deployment.certificates import fingerprint, own_certificate
-from gen_profile.deployment.simulated_block import LONGEST, LOOPBACK, SimulatedBlock
+from gen_profile.deployment.opcua import POLICIES
+from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedController
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 
 NAMESPACE = "urn:gen-profile:plc-sim"
-logging.getLogger("asyncua").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
 
 @attrs.frozen(kw_only=True)
@@ -38,7 +37,7 @@ class PlcSimOptions:
     password: str = attrs.field(default="", repr=False)
 
 
-class SimulatedController:
+class SimulatedOpcUaController(SimulatedController):
     """The server.
 
     Parameters
@@ -48,25 +47,28 @@ class SimulatedController:
     """
 
     def __init__(self, table: BlockTable, options: PlcSimOptions) -> None:
-        self.block, self._options = SimulatedBlock(table), options
-        self.name, self._cycle = table.source.name, table.spec.export.cycle_time
+        super().__init__(table, table.source.name, options.port)
+        self._options, self._loop = options, ThreadLoop()
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
-        self.fingerprint = ""
-        self.ended = asyncio.Event()
 
-    async def serve(self, ready: Callable[[str, str], None]) -> None:
-        """Play until `ended` is set; tell the address and the certificate's fingerprint once it answers.
+    @contextmanager
+    def _served(self) -> Iterator[str]:
+        server = Server(user_manager=_Users(self._options) if self._options.user else None)
+        address = f"opc.tcp://{LOOPBACK}:{self.port}"
+        with self._loop:
+            self._loop.post(self._start(server, address))
+            try:
+                yield address
+            finally:
+                self._loop.post(server.stop())
 
-        Raises
-        ------
-        OutputError
-            The port cannot be had.
-        """
-        users = _Users(self._options) if self._options.user else None
-        server = Server(user_manager=users)
+    def turn(self, cycles: int) -> None:
+        """Take the inputs over, call the block, show the outputs."""
+        self._loop.post(self._turn(cycles))
+
+    async def _start(self, server: Any, address: str) -> None:
         await server.init()
-        address = f"opc.tcp://{LOOPBACK}:{self._options.port}"
         server.set_endpoint(address)
         server.set_server_name("gen-profile plc-sim")
         await self._secure(server)
@@ -74,12 +76,7 @@ class SimulatedController:
         try:
             await server.start()
         except OSError as error:
-            raise OutputError(f"port {self._options.port}: {error.strerror}; name another one.") from error
-        try:
-            ready(address, self.fingerprint)
-            await self._play()
-        finally:
-            await server.stop()
+            raise OutputError(f"port {self.port}: {error.strerror}; name another one.") from error
 
     async def _secure(self, server: Any) -> None:
         if not self._options.secure:
@@ -91,9 +88,8 @@ class SimulatedController:
         await server.load_certificate(own.der)
         await server.load_private_key(own.key, format="pem")
         self.fingerprint = fingerprint(own.der)
-        kinds = ("Aes256Sha256RsaPss", "Basic256Sha256", "Aes128Sha256RsaOaep")
         server.set_security_policy(
-            [getattr(ua.SecurityPolicyType, f"{kind}_SignAndEncrypt") for kind in kinds]
+            [getattr(ua.SecurityPolicyType, f"{policy}_SignAndEncrypt") for policy in POLICIES]
         )
         user = ua.UserNameIdentityToken if self._options.user else ua.AnonymousIdentityToken
         server.set_identity_tokens([user])
@@ -101,7 +97,7 @@ class SimulatedController:
     async def _show(self, server: Any) -> None:
         """Add the instance, with its inputs, which clients write, and its outputs."""
         space = await server.register_namespace(NAMESPACE)
-        instance = await server.nodes.objects.add_object(space, self.name)
+        instance = await server.nodes.objects.add_object(space, self.instance)
         for name in self.block.names:
             node = await instance.add_variable(space, name, _shown(name, self.block.get(name)))
             await node.set_writable()
@@ -109,18 +105,7 @@ class SimulatedController:
         for name, values in self.block.outputs.items():
             self._outputs[name] = await instance.add_variable(space, name, _shown(name, values))
 
-    async def _play(self) -> None:
-        """Call the block as often as the time that has passed asks for."""
-        begun, called = time.monotonic(), 0
-        while not self.ended.is_set():
-            due = int((time.monotonic() - begun) / self._cycle)
-            if due > called:
-                await self.turn(due - called)
-                called = due
-            await asyncio.sleep(min(self._cycle, LONGEST))
-
-    async def turn(self, cycles: int) -> None:
-        """Take the inputs over, call the block, show the outputs."""
+    async def _turn(self, cycles: int) -> None:
         for name, node in self._inputs.items():
             given = np.ravel(np.asarray(await node.read_value(), dtype=np.float64))
             if len(given) == len(self.block.inputs[name]):
@@ -145,9 +130,7 @@ class _Users:
 
 def _shown(name: str, values: np.ndarray[Any, Any]) -> Any:
     """Give a variable of the block the type that its name tells."""
-    type_ = {"b": ua.VariantType.Boolean, "n": ua.VariantType.Int32, "r": ua.VariantType.Double}.get(
-        name[0], ua.VariantType.Double
-    )
-    convert = {ua.VariantType.Boolean: bool, ua.VariantType.Int32: int}.get(type_, float)
+    others = {"b": (ua.VariantType.Boolean, bool), "n": (ua.VariantType.Int32, int)}
+    type_, convert = others.get(name[0], (ua.VariantType.Double, float))
     listed = [convert(value) for value in values.tolist()]
     return ua.Variant(listed if len(listed) > 1 else listed[0], type_)

@@ -19,7 +19,7 @@ from snap7.client import Client
 from snap7.error import S7Error, S7PacketLostError, S7ProtocolError, S7StalePacketError
 
 from gen_profile.deployment.block_state import read_state
-from gen_profile.deployment.mailbox import LinkLostError
+from gen_profile.deployment.mailbox import UNSECURED, LinkLostError, first_connected
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import DeploymentError
 from gen_profile.motion.profile import Array
@@ -78,19 +78,9 @@ class S7Link:
         self._access, self._client = access, Client()
         self._axes, self._kind, self._name = table.constant("cAxes"), table.constant("cKind"), table.path.name
         self._state = table.state
-        try:
+        self.server = {"url": access.url, "instance": f"DB{access.block}", **UNSECURED}
+        with first_connected(self, access.url, "the address, rack and slot, and the network"):
             self._connect()
-        except LinkLostError as error:
-            self.close()
-            raise DeploymentError(
-                f"{access.url} cannot be reached ({error}); look at the address, rack and slot, and the "
-                "network."
-            ) from error
-        except BaseException:
-            self.close()
-            raise
-        none = {"policy": "None", "certificate_sha256": "", "user": ""}
-        self.server = {"url": access.url, "instance": f"DB{access.block}", "security": "none", **none}
 
     def close(self) -> None:
         """End the connection, if it stands."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
-import threading
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from snap7.error import S7Error
@@ -13,15 +11,13 @@ from snap7.server import Server
 from snap7.type import SrvArea
 
 from gen_profile.deployment.s7 import DOUBLE, REPLY_AT, STATE_AT
-from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedBlock
+from gen_profile.deployment.simulated_block import LOOPBACK, SimulatedController
 from gen_profile.deployment.table import BlockTable
 from gen_profile.errors import OutputError
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, state_length
 
-logging.getLogger("snap7").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
-
-class SimulatedS7Controller:
+class SimulatedS7Controller(SimulatedController):
     """The server: the block's arrays in a data block, `bExecute` in the first bit of the bit memory (M0.0).
 
     Parameters
@@ -30,41 +26,32 @@ class SimulatedS7Controller:
     number : int
         Of the data block.
     port : int
-        On the loopback interface.
     """
 
     def __init__(self, table: BlockTable, number: int, port: int) -> None:
-        self.block, self._port, self._number = SimulatedBlock(table), port, number
-        self._cycle = table.spec.export.cycle_time
+        super().__init__(table, f"DB{number}", port)
+        self._number = number
         self.data = bytearray(STATE_AT + DOUBLE.itemsize * state_length(table.constant("cAxes")))
         self.memory = bytearray(1)
-        self.ended = threading.Event()
+        self.server = Server(log=False)
+        self.server.register_area(SrvArea.DB, number, self.data)
+        self.server.register_area(SrvArea.MK, 0, self.memory)
 
-    def serve(self, ready: Callable[[str], None]) -> None:
-        """Play until `ended` is set; report the address once it answers.
-
-        Raises
-        ------
-        OutputError
-            The port cannot be had.
-        """
-        server = Server(log=False)
-        server.register_area(SrvArea.DB, self._number, self.data)
-        server.register_area(SrvArea.MK, 0, self.memory)
-        self.turn(server, 1)
+    @contextmanager
+    def _served(self) -> Iterator[str]:
+        self.turn(1)
         try:
-            server.start_to(LOOPBACK, self._port)
+            self.server.start_to(LOOPBACK, self.port)
         except (S7Error, OSError) as error:
-            raise OutputError(f"port {self._port}: cannot be had; name another one.") from error
+            raise OutputError(f"port {self.port}: cannot be had; name another one.") from error
         try:
-            ready(f"s7://{LOOPBACK}:{self._port}/0/1")
-            self.block.play(partial(self.turn, server), self._cycle, self.ended)
+            yield f"s7://{LOOPBACK}:{self.port}/0/1"
         finally:
-            server.stop()
+            self.server.stop()
 
-    def turn(self, server: Server, cycles: int) -> None:
+    def turn(self, cycles: int) -> None:
         """Take the request over, call the block, show the reply and the state."""
-        server.lock_area(SrvArea.DB, self._number)
+        self.server.lock_area(SrvArea.DB, self._number)
         try:
             self.block.set(REQUEST, np.frombuffer(bytes(self.data[:REPLY_AT]), DOUBLE))
             self.block.set("bExecute", np.array([float(self.memory[0] & 1)]))
@@ -73,4 +60,4 @@ class SimulatedS7Controller:
                 content = self.block.outputs[name].astype(DOUBLE).tobytes()
                 self.data[at : at + len(content)] = content
         finally:
-            server.unlock_area(SrvArea.DB, self._number)
+            self.server.unlock_area(SrvArea.DB, self._number)

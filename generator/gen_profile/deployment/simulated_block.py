@@ -1,9 +1,11 @@
-"""A playback block in a controller that is simulated: its own text, compiled, called cycle by cycle."""
+"""A block in a simulated controller: its own text, compiled, called cycle by cycle behind a server."""
 
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from threading import Event
 
 import numpy as np
@@ -64,15 +66,6 @@ class SimulatedBlock:
             for name in self._followed:
                 self.set(name, self.outputs[name.replace("Act", "", 1)])
 
-    def play(self, turn: Callable[[int], None], cycle: float, ended: Event) -> None:
-        """Until an event is set, take a turn of so many cycles as the time that has passed asks for."""
-        begun, called = time.monotonic(), 0
-        while not ended.wait(min(cycle, LONGEST)):
-            due = int((time.monotonic() - begun) / cycle)
-            if due > called:
-                turn(due - called)
-                called = due
-
 
 def _places(elements: Iterable[str]) -> dict[str, list[int]]:
     """Gather the places of each variable's elements: those of ``a[0]`` and ``a[1]`` under ``a``."""
@@ -80,3 +73,51 @@ def _places(elements: Iterable[str]) -> dict[str, list[int]]:
     for number, name in enumerate(elements):
         places.setdefault(name.partition("[")[0], []).append(number)
     return places
+
+
+class SimulatedController(ABC):
+    """A simulated block behind a server on the loopback interface.
+
+    Parameters
+    ----------
+    table : BlockTable
+    instance : str
+        What clients call the block.
+    port : int
+
+    Attributes
+    ----------
+    ended : Event
+        Set to end it.
+    fingerprint : str
+        SHA-256 of the server's certificate, once it answers; empty where it has none.
+    """
+
+    def __init__(self, table: BlockTable, instance: str, port: int) -> None:
+        self.block, self.cycle_time = SimulatedBlock(table), table.spec.export.cycle_time
+        self.instance, self.port, self.ended, self.fingerprint = instance, port, Event(), ""
+
+    def serve(self, ready: Callable[[str], None]) -> None:
+        """Call the block as often as the time that has passed asks for; report the address once it answers.
+
+        Raises
+        ------
+        OutputError
+            The port cannot be had.
+        """
+        with self._served() as address:
+            ready(address)
+            begun, called = time.monotonic(), 0
+            while not self.ended.wait(min(self.cycle_time, LONGEST)):
+                due = int((time.monotonic() - begun) / self.cycle_time)
+                if due > called:
+                    self.turn(due - called)
+                    called = due
+
+    @abstractmethod
+    def turn(self, cycles: int) -> None:
+        """Take over what clients wrote, call the block, show what it gives."""
+
+    @abstractmethod
+    def _served(self) -> AbstractContextManager[str]:
+        """Have the server answer; gives its address."""

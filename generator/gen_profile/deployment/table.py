@@ -156,22 +156,6 @@ class PlannerTable(BlockTable):
         return BlockJudgement(path=self.path, text=text, spec=self.spec, check=proof, manifest="none")
 
 
-def _planner(path: Path, content: bytes) -> PlannerTable:
-    """Read a planner block, whether its numbers are constants or variables; raises as `read_table`."""
-    spec, manifest = spec_and_manifest(path, content, None, planner=True)
-    for fault in alterations(path, provenance(manifest, content, spec)):
-        raise CheckFailed(fault)
-    source = buffered_planner(parse_function_block(block_in(path, content)))
-    values = np.array(list(map(float, buffer_texts(source))))
-    hashes = {
-        "artefact_sha256": artefact_of("", path.name, content).sha256,
-        "payload_sha256": "",
-        "spec_sha256": spec.sha256(),
-        "table_sha256": table_hash(values),
-    }
-    return PlannerTable(path=path, specs=(spec,), source=source, values=values, hashes=hashes)
-
-
 def read_table(path: Path) -> BlockTable:
     """Read a written block: of a motion, a library or a planner; its numbers are constants or variables.
 
@@ -183,16 +167,26 @@ def read_table(path: Path) -> BlockTable:
         It is not the file that was exported.
     """
     container, content = find_container(container_of(path)), read_artefact(path)
-    if is_planner_block(path):
-        return _planner(path, content)
-    specs = _listed_specs(path, content)
-    if not specs:
-        spec, manifest = spec_and_manifest(path, content, None)
-        for fault in alterations(path, provenance(manifest, content, spec)):
-            raise CheckFailed(fault)
-        specs = (spec,)
+    kind: type[BlockTable] = PlannerTable if is_planner_block(path) else BlockTable
+    if kind is PlannerTable:
+        specs: tuple[Spec, ...] = (_exported_spec(path, content, planner=True),)
+        source, setpoints = buffered_planner(parse_function_block(block_in(path, content))), ""
+    else:
+        specs = _listed_specs(path, content) or (_exported_spec(path, content),)
+        source, setpoints = _played(path, container.unwrap(content, target_of(specs[0])), specs)
+    values = np.array(list(map(float, buffer_texts(source))))
+    hashes = {
+        "artefact_sha256": artefact_of("", path.name, content).sha256,
+        "payload_sha256": setpoints,
+        "spec_sha256": _joint([spec.sha256() for spec in specs]),
+        "table_sha256": table_hash(values),
+    }
+    return kind(path=path, specs=specs, source=source, values=values, hashes=hashes)
+
+
+def _played(path: Path, source: BlockSource, specs: Sequence[Spec]) -> tuple[BlockSource, str]:
+    """Put variables in place of a playback block's constants, and hash its setpoints."""
     target = target_of(specs[0])
-    source = container.unwrap(content, target)
     if any(one.section == "VAR_IN_OUT" for one in source.variables):
         raise ExportError(f"{path}: is a wrapper; name the file of the playback block.")
     constants = constant_sources(source, target) if is_buffered(source) else constant_singles(source)
@@ -201,14 +195,15 @@ def read_table(path: Path) -> BlockTable:
         raise ExportError(f"{path}: is a library, and nothing beside it tells its specs; make it again.")
     if not is_buffered(source):
         source = buffered(constants, target, library=is_library(source))
-    values = np.array(list(map(float, buffer_texts(source))))
-    hashes = {
-        "artefact_sha256": artefact_of("", path.name, content).sha256,
-        "payload_sha256": _joint([motion.payload_hash() for motion in motions]),
-        "spec_sha256": _joint([spec.sha256() for spec in specs]),
-        "table_sha256": table_hash(values),
-    }
-    return BlockTable(path=path, specs=specs, source=source, values=values, hashes=hashes)
+    return source, _joint([motion.payload_hash() for motion in motions])
+
+
+def _exported_spec(path: Path, content: bytes, *, planner: bool = False) -> Spec:
+    """Read the spec that a block was exported with; refuse one that was altered since."""
+    spec, manifest = spec_and_manifest(path, content, None, planner=planner)
+    for fault in alterations(path, provenance(manifest, content, spec)):
+        raise CheckFailed(fault)
+    return spec
 
 
 def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:

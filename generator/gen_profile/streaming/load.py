@@ -8,13 +8,14 @@ import numpy as np
 from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.metrics import length, peak
 from gen_profile.planner.machine import shown_by_sensors
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import max_step
 from gen_profile_exporters.can.sensor_frame import frame_of
-from gen_profile_fmu.running.stepping import Instant, SteppedPlant
+from gen_profile_fmu.running.stepping import SteppedPlant
 
 
 class CraneLoad:
@@ -43,7 +44,7 @@ class CraneLoad:
         self._end_load = spec.machine().end_load
         self._position: Sequence[float] = spec.move.start
         self._spec = spec
-        self._now: Instant | None = None
+        self._latest: Response | None = None
         self._fmu = SteppedPlant(
             spec.machine(),
             spec.move.start,
@@ -61,15 +62,15 @@ class CraneLoad:
 
     def advance(self, position: Sequence[float], duration: float) -> Sequence[float]:
         """Lead every axis evenly to a position in m (or rad), and return where the axes then are."""
-        self._position, self._now = position, self._fmu.advance(position, duration)
-        return [float(at) for at in self._now.position]
+        self._position, self._latest = position, self._fmu.advance(position, duration)
+        return [float(at) for at in self._latest.position[-1]]
 
     def sensor_frames(self) -> Sequence[tuple[int, bytes]]:
         """Give COB-IDs and data of what sensors of the load send now, if the spec states some on the bus."""
-        frames, now = self._spec.can.sensor, self._now
-        if frames is None or now is None:
+        frames, latest = self._spec.can.sensor, self._latest
+        if frames is None or latest is None:
             return ()
-        values = shown_by_sensors(self._spec, now.q_u, now.dq_u, now.sway)
+        values = shown_by_sensors(self._spec, latest.q_u[-1], latest.dq_u[-1], latest.sway[-1])
         return (frame_of(values.tolist(), frames),)
 
     def residual_sway(self) -> float:
@@ -77,5 +78,6 @@ class CraneLoad:
         if self._settle:
             self._fmu.advance(self._position, self._settle)
         step = self._watch / (RESIDUAL_SAMPLES - 1)
-        sway = [self._fmu.advance(self._position, step).sway[self._end_load] for _ in range(RESIDUAL_SAMPLES)]
+        responses = [self._fmu.advance(self._position, step) for _ in range(RESIDUAL_SAMPLES)]
+        sway = [response.sway[-1, self._end_load] for response in responses]
         return float(peak(length(np.array(sway)))[0])

@@ -120,16 +120,10 @@ def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float
         name, _, number = text.partition("=")
         if name not in axes:
             raise SpecError(f"jog {text}: unknown axis{suggestion(name, axes)}")
-        distances[name] = _metres(text, number)
+        try:
+            distances[name] = float(number)
+        except ValueError:
+            distances[name] = math.nan
+        if not math.isfinite(distances[name]):
+            raise SpecError(f"jog {text}: state the distance as a number of metres (or rad), as {name}=0.05.")
     return distances
-
-
-def _metres(text: str, number: str) -> float:
-    try:
-        distance = float(number)
-    except ValueError:
-        distance = math.nan
-    if not math.isfinite(distance):
-        name = text.partition("=")[0]
-        raise SpecError(f"jog {text}: state the distance as a number of metres (or rad), as {name}=0.05.")
-    return distance

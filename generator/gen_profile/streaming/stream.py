@@ -258,7 +258,8 @@ def stream(
         before = 0 if simulation is None else simulation.clock.catch_up()
         record = streamer.run()
     if simulation is None:
-        sway, remarks = None, port.remarks(record.launched, _several_buses(source))
+        several = frames.buses(source.plan.target) if source.spec.can.channels else ()
+        sway, remarks = None, port.remarks(record.launched, several)
     else:
         sway, remarks = simulation.sway, _stalls(simulation.clock.stalled - before)
     said = (*notes, *refused, *remarks, *source.plan.remarks, *_afterwards(record))
@@ -328,10 +329,6 @@ class _Simulation:
 
     clock: SharedClock
     sway: float | None = None
-
-
-def _several_buses(source: Source) -> tuple[str, ...]:
-    return frames.buses(source.plan.target) if source.spec.can.channels else ()
 
 
 def _afterwards(record: Record) -> tuple[str, ...]:

@@ -16,7 +16,6 @@ from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
-from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.many_runs import ManyRuns
 
@@ -57,7 +56,7 @@ def on_processors(count: int) -> Iterator[None]:
 @contextmanager
 def many_machines(plant: Plant, progress: Progress = no_progress) -> Iterator[ManyRuns]:
     """Load the plant's FMU once for every processor that this process may use."""
-    with ManyRuns(plant_fmu(plant, progress), Version.FMI2, workers=processors()) as runs:
+    with ManyRuns(plant_fmu(plant, progress), workers=processors()) as runs:
         yield runs
 
 

@@ -70,13 +70,16 @@ def read(content: bytes) -> Iterator[Frame]:
     for number, text in enumerate(lines, start=1):
         match = _FRAME.fullmatch(text.rstrip("\r"))
         if match is None:
-            raise ExportError(
-                f"line {number}: {text[:60]!r} is no frame in candump's format; export the log again."
-            )
+            raise altered(number, f"{text[:60]!r} is no frame in candump's format")
         seconds, microseconds, channel, cob_id, data = match.groups()
         instant = int(seconds) * MICROSECONDS + int(microseconds)
         frame = Frame(instant, int(cob_id, 16), bytes.fromhex(data), number, channel)
         if frame.stamp < stamp:
-            raise ExportError(f"line {number}: the stamp falls; export the log again.")
+            raise altered(number, "the stamp falls")
         stamp = frame.stamp
         yield frame
+
+
+def altered(line: int, what: str) -> ExportError:
+    """Say what is wrong in a line of a log."""
+    return ExportError(f"line {line}: {what}; export the log again.")

@@ -10,13 +10,6 @@ from gen_profile_exporters.can.scaling import exact
 from gen_profile_exporters.exporter import Target
 
 MASTER_NAME = "Controller"
-NAMES = {
-    "command": "Command",
-    "setpoint": "Setpoint",
-    "feed_forward": "FeedForward",
-    "feedback": "Feedback",
-    "position": "Position",
-}
 
 
 def dbc(target: Target) -> bytes:
@@ -28,14 +21,10 @@ def dbc(target: Target) -> bytes:
     blocks = ['VERSION ""', "NS_ :", "BS_:", f"BU_: {MASTER_NAME} {' '.join(names)}"]
     blocks.append(f"BO_ {frames.SYNC} Sync: 0 {MASTER_NAME}")
     for name, axis, own in zip(names, target.axes, frames.cob_ids(target), strict=True):
-        blocks += [
-            _message(own[pdo], f"{name}_{NAMES[layout.role(pdo)]}", fields, axis, (MASTER_NAME, name))
-            for pdo, fields in layout.received.items()
-        ]
-        blocks += [
-            _message(own[pdo], f"{name}_{NAMES[layout.role(pdo)]}", fields, axis, (name, MASTER_NAME))
-            for pdo, fields in layout.transmitted.items()
-        ]
+        for pdo, fields in {**layout.received, **layout.transmitted}.items():
+            role = layout.role(pdo).title().replace("_", "")
+            way = (MASTER_NAME, name) if pdo in layout.received else (name, MASTER_NAME)
+            blocks.append(_message(own[pdo], f"{name}_{role}", fields, axis, way))
     return ("\n\n".join(blocks) + "\n").encode("ascii")
 
 

@@ -15,7 +15,7 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.export import candump, database, traces
-from gen_profile_exporters.can.export.candump import Frame
+from gen_profile_exporters.can.export.candump import Frame, altered
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
 from gen_profile_exporters.can.scaling import Setpoints, demand_of, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target
@@ -63,27 +63,19 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 def played(taken: frames.Integers, stamps: Sequence[Frame], target: Target) -> SampledProfile:
     """Tell where setpoints of all cycles lead the axes, by the stamps of their SYNCs."""
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
-    if target.can.mode == "csv":
-        return _led_by_velocity(taken[:, :, 0], _cycle_time(stamps), target)
-    velocity = None
+    period, least, velocity = _cycle_time(stamps), 1.0, None
+    if target.can.mode == "csv":  # velocities, which are kept from each SYNC to the next one
+        position = np.array(target.start) + in_si(travelled(taken[:, :, 0], period), counts_per_si)
+        least = period
+    else:
+        position = in_si(taken[:, :, 0].astype(np.float64), counts_per_si)
     if pdos.VELOCITY_OFFSET in pdos.setpoint_fields(target.can):
         velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
     return SampledProfile(
-        cycle_time=_cycle_time(stamps),
-        position=in_si(taken[:, :, 0].astype(np.float64), counts_per_si),
-        velocity=velocity,
-        resolution=in_si(np.ones(len(target.axes)), np.abs(counts_per_si)),
-    )
-
-
-def _led_by_velocity(velocity: frames.Integers, period: float, target: Target) -> SampledProfile:
-    """Tell where velocities lead the axes, which are kept from each SYNC to the next one."""
-    counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
-    distance = in_si(travelled(velocity, period), counts_per_si)
-    return SampledProfile(
         cycle_time=period,
-        position=np.array(target.start) + distance,
-        resolution=in_si(np.full(len(target.axes), period), np.abs(counts_per_si)),
+        position=position,
+        velocity=velocity,
+        resolution=in_si(np.full(len(target.axes), least), np.abs(counts_per_si)),
     )
 
 
@@ -137,10 +129,8 @@ def _on_their_channels(
         elif frame.cob_id in expected:
             own = expected[frame.cob_id].channel
         if frame.channel != own:
-            raise ExportError(
-                f"line {frame.line}: frame {frame.cob_id:03X}h is on the channel {frame.channel} instead of "
-                f"{own}; export the log again."
-            )
+            there = f"is on the channel {frame.channel} instead of {own}"
+            raise altered(frame.line, f"frame {frame.cob_id:03X}h {there}")
         yield frame
 
 
@@ -148,7 +138,7 @@ def _all_synced(synced: Sequence[str], latest: Frame, target: Target) -> bool:
     """Tell whether a cycle's SYNC was sent on every bus, and require that it was once on each, in turn."""
     buses = frames.buses(target)
     if target.can.channels and tuple(synced) != buses[: len(synced)]:
-        raise ExportError(f"line {latest.line}: SYNC on {latest.channel} out of turn; export the log again.")
+        raise altered(latest.line, f"SYNC on {latest.channel} out of turn")
     return len(synced) == len(buses)
 
 
@@ -165,9 +155,7 @@ def _setpoints(pending: Mapping[int, tuple[int, ...]], layout: Iterable[Setpoint
 
 def _require_complete(pending: Container[int], expected: Iterable[int], sync: Frame) -> None:
     if sync.data:
-        raise ExportError(
-            f"line {sync.line}: SYNC with data, which this format has not; export the log again."
-        )
+        raise altered(sync.line, "SYNC with data, which this format has not")
     missing = [cob_id for cob_id in expected if cob_id not in pending]
     if missing:
         raise ExportError(
@@ -183,21 +171,14 @@ def _require_expected(frame: Frame, pending: Container[int], expected: Mapping[i
             f"line {frame.line}: frame {frame.cob_id:03X}h is none of this target's ({known}); "
             "check the log with the spec that it was exported with, or export it again."
         )
+    setpoint, size = f"setpoint {frame.cob_id:03X}h", expected[frame.cob_id].packing.size
     if frame.cob_id in pending:
-        raise ExportError(
-            f"line {frame.line}: second setpoint {frame.cob_id:03X}h before a SYNC; export the log again."
-        )
-    size = expected[frame.cob_id].packing.size
+        raise altered(frame.line, f"second {setpoint} before a SYNC")
     if len(frame.data) != size:
-        raise ExportError(
-            f"line {frame.line}: setpoint {frame.cob_id:03X}h with {len(frame.data)} data bytes instead of "
-            f"{size}; export the log again."
-        )
+        raise altered(frame.line, f"{setpoint} with {len(frame.data)} data bytes instead of {size}")
     if not expected[frame.cob_id].keeps_constants(frame.data):
-        raise ExportError(
-            f"line {frame.line}: setpoint {frame.cob_id:03X}h with another controlword or mode than "
-            "a drive that follows gets; export the log again."
-        )
+        wrong = "another controlword or mode than a drive that follows gets"
+        raise altered(frame.line, f"{setpoint} with {wrong}")
 
 
 def _cycle_time(syncs: Sequence[Frame]) -> float:
@@ -205,8 +186,6 @@ def _cycle_time(syncs: Sequence[Frame]) -> float:
     period = syncs[1].stamp - syncs[0].stamp
     for before, sync in pairwise(syncs):
         if sync.stamp - before.stamp != period:
-            raise ExportError(
-                f"line {sync.line}: SYNC {sync.stamp - before.stamp} µs after the one before, where "
-                f"{period} µs lie between the first two; export the log again."
-            )
+            due = f"where {period} µs lie between the first two"
+            raise altered(sync.line, f"SYNC {sync.stamp - before.stamp} µs after the one before, {due}")
     return plausible_cycle_time(float(Decimal(period) / MICROSECONDS), syncs[1].line)

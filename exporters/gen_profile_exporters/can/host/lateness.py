@@ -21,13 +21,10 @@ class Lateness:
         Their numbers.
     late : (n,) integer array
         ns after the due instant.
-    period : int
-        ns.
     """
 
     cycles: NDArray[np.int64]
     late: NDArray[np.int64]
-    period: int
 
     def percentile(self, percent: float) -> float:
         """Lateness in µs that `percent` percent of the cycles keep; 0 without any."""
@@ -65,4 +62,4 @@ def rehearse(clock: Clock, period: int, count: int) -> Lateness:
     for cycle in range(count):
         clock.sleep_until(start + cycle * period)
         late[cycle] = clock.now() - (start + cycle * period)
-    return Lateness(cycles=np.arange(count), late=late, period=period)
+    return Lateness(cycles=np.arange(count), late=late)

@@ -6,7 +6,7 @@ axis stands.
 """
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
 
@@ -51,6 +51,7 @@ START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
 RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
 STOP_PATIENCE = 2 * NANOSECONDS  # for one that lost its streamer to brake
+LOOK_AGAIN = NANOSECONDS // 50  # at its state
 SCALING = {0x608F, 0x6091, 0x6092}  # of positions, in the drive
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
 
@@ -107,7 +108,8 @@ def configure(
         if reset_fault:
             _reset_fault(link, node)
         watched = _upload(link, node, *HEARTBEAT_WATCHED, optional=True)
-        _await_own_stop(link, node, watched)
+        if patience := time_of_ours(watched):  # its streamer was killed just now, and it stops by itself
+            _wait_while(link, node, MOVING, patience + STOP_PATIENCE)
         _require_rest(link, node)
         restoration.remember_watch(node.number, watched)
         _download(link, node, *HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
@@ -219,19 +221,14 @@ def _reset_fault(link: Link, node: Node) -> None:
             channel.download(0x6040, 0, word.to_bytes(2, "little"))
     except (SdoError, struct.error) as error:
         raise _silent(node, error) from error
-    deadline = link.clock.now() + RESET_PATIENCE
-    while state_of(_read(link, node, 0x6041, bits=16)) in FAULTS and link.clock.now() < deadline:
-        link.wait_until(link.clock.now() + RESET_PATIENCE // 10)
+    _wait_while(link, node, FAULTS, RESET_PATIENCE)
 
 
-def _await_own_stop(link: Link, node: Node, watched: bytes | None) -> None:
-    """Let a drive stop by itself whose streamer was killed just now, and is still waited for."""
-    patience = time_of_ours(watched)
-    if not patience:
-        return
-    deadline = link.clock.now() + patience + STOP_PATIENCE
-    while state_of(_read(link, node, 0x6041, bits=16)) in MOVING and link.clock.now() < deadline:
-        link.wait_until(link.clock.now() + STOP_PATIENCE // 100)
+def _wait_while(link: Link, node: Node, states: Container[State], patience: int) -> None:
+    """Wait as long as a drive is in one of some states, at most for so long, in ns."""
+    deadline = link.clock.now() + patience
+    while state_of(_read(link, node, 0x6041, bits=16)) in states and link.clock.now() < deadline:
+        link.wait_until(link.clock.now() + LOOK_AGAIN)
 
 
 def _require_rest(link: Link, node: Node) -> None:

@@ -51,7 +51,11 @@ class Pacer:
 
     def __init__(self, link: Link, target: Target) -> None:
         self.link, self._clock = link, link.clock
-        self._commands = _Commands(target)
+        layout, carriers = pdos.layout(target.can), frames.command_frames(target)
+        offset = layout.offset(pdos.CONTROLWORD, layout.received[layout.command])
+        self._places = {frame.cob_id: offset for frame in carriers}  # of controlwords
+        still = [[0] * carriers[0].width] * len(carriers)
+        self._own = () if layout.shared else tuple(frames.message(f.cob_id, f.pack(still)) for f in carriers)
         self._by_velocity = target.can.mode == "csv"
         self.last_sent: Cycle = ()
         self.period = frames.period_microseconds(target.can) * 1000
@@ -118,37 +122,15 @@ class Pacer:
 
     def within(self, word: int, setpoints: Cycle) -> Cycle:
         """Make a cycle whose setpoints' frames hold a controlword, where they hold one."""
-        return self._commands.within(word, setpoints)
+        return tuple(self._with(word, message) for message in setpoints)
 
     def commanding(self, word: int, setpoints: Cycle) -> Cycle:
         """Make a cycle that commands each drive as well, in frames of their own or in the setpoints'."""
-        return (*self._commands.alone(word), *self._commands.within(word, setpoints))
+        return self.within(word, (*self._own, *setpoints))
 
     def commands(self, word: int) -> Cycle:
         """Make controlwords, one for each drive, which lead no axis any further."""
-        return self._commands.alone(word) or self._commands.within(word, self.last_sent)
-
-
-class _Commands:
-    """Controlwords: in frames of their own, or in the setpoints' where the drives' mapping has them there."""
-
-    def __init__(self, target: Target) -> None:
-        layout, carriers = pdos.layout(target.can), frames.command_frames(target)
-        self._shared = layout.shared
-        offset = layout.offset(pdos.CONTROLWORD, layout.received[layout.command])
-        self._places = {frame.cob_id: offset for frame in carriers}
-        still = [[0] * carriers[0].width] * len(carriers)
-        self._own = () if layout.shared else tuple(frames.message(f.cob_id, f.pack(still)) for f in carriers)
-
-    def alone(self, word: int) -> Cycle:
-        """Make frames with nothing else to follow; none where there are no such frames."""
-        return tuple(self._with(word, message) for message in self._own)
-
-    def within(self, word: int, setpoints: Cycle) -> Cycle:
-        """Make setpoints' frames that hold the controlword, where they hold one."""
-        if not self._shared:
-            return setpoints
-        return tuple(self._with(word, message) for message in setpoints)
+        return self.within(word, self._own or self.last_sent)
 
     def _with(self, word: int, message: can.Message) -> can.Message:
         place = self._places.get(message.arbitration_id)

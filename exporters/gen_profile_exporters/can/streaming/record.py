@@ -105,60 +105,30 @@ class Book:
         """Where the streamer is."""
         return list(Phase)[int(self.phase[0])]
 
-
-class Recorder:
-    """Takes down what was sent and answered, cycle by cycle.
-
-    Parameters
-    ----------
-    book : Book
-        To be written; nothing here waits for those who read it.
-
-    Attributes
-    ----------
-    sent : int
-        How many cycles were sent.
-    """
-
-    def __init__(self, book: Book) -> None:
-        self._book = book
-        self.sent = 0
-
     def begin(self, phase: Phase) -> None:
-        """Take down where the streamer is."""
-        self._book.phase[0] = list(Phase).index(phase)
+        """Take down where the streamer is; nothing here waits for those who read it."""
+        self.phase[0] = list(Phase).index(phase)
 
     def take_sent(self, cycle: int, late: int) -> None:
         """Take down that a cycle was sent, and how late, in ns."""
-        self._book.late[cycle] = 1 + max(0, late)
-        self.sent += 1
+        self.late[cycle] = 1 + max(0, late)
 
     def take_answer(self, cycle: int, position: Sequence[int]) -> None:
         """Take down where the drives were at a cycle's SYNC."""
-        self._book.actual[cycle] = position
-        self._book.answered[cycle] = 1
+        self.actual[cycle] = position
+        self.answered[cycle] = 1
 
-    def record(
-        self,
-        phase: Phase,
-        reason: str,
-        final: tuple[int, ...],
-        *,
-        aftermath: str,
-        launched: bool,
-        period: int,
-    ) -> Record:
-        """Make the record; the period is that of SYNC, in ns."""
-        book = self._book
-        cycles = np.flatnonzero(book.late)
+    def record(self, reason: str, final: tuple[int, ...], *, aftermath: str, launched: bool) -> Record:
+        """Make the record of a stream that is over."""
+        cycles = np.flatnonzero(self.late)
         return Record(
-            phase=phase,
+            phase=self.state,
             reason=reason,
             aftermath=aftermath,
             launched=launched,
-            sent=self.sent,
-            lateness=Lateness(cycles=cycles, late=book.late[cycles] - 1, period=period),
-            actual=book.actual.copy(),
-            answered=book.answered != 0,
+            sent=len(cycles),
+            lateness=Lateness(cycles=cycles, late=self.late[cycles] - 1),
+            actual=self.actual.copy(),
+            answered=self.answered != 0,
             final=final,
         )

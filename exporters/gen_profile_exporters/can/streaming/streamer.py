@@ -13,7 +13,7 @@ import can
 import numpy as np
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames, pdos, startup
+from gen_profile_exporters.can import pdos
 from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
 from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.frames import Integers
@@ -25,12 +25,11 @@ from gen_profile_exporters.can.streaming.following import Following
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.plan import Cycle, SetpointSource, Step, cycles_of, preload
-from gen_profile_exporters.can.streaming.record import Book, Phase, Record, Recorder
+from gen_profile_exporters.can.streaming.record import Book, Phase, Record
 from gen_profile_exporters.can.streaming.restoration import Restoration
-from gen_profile_exporters.can.streaming.standing import STILL, Standing, trembling
+from gen_profile_exporters.can.streaming.standing import STILL
 from gen_profile_exporters.can.streaming.stopping import quick_stop
-from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch, WatchedAxis
-from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
@@ -54,6 +53,11 @@ class Streamer:
         Whether drives that are in fault are reset first.
     book : Book, optional
         Where to take down how it goes.
+
+    Attributes
+    ----------
+    cycles_sent : int
+        Of the motion, so far.
     """
 
     def __init__(
@@ -71,18 +75,12 @@ class Streamer:
         self._reset_fault = reset_fault
         self._link = Link(bus, clock)
         self._pacer = Pacer(self._link, target)
-        self._watch = Watch(
-            _watched(target),
-            clock,
-            period=self._pacer.period,
-            heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
-            timeout=self._pacer.timeout,
-            ours=frames.commanding_cob_ids(target),
-        )
+        self._watch = Watch(target, clock)
         self._link.subscribe(self._watch.take)
         self._link.subscribe(source.take)
         self._following = Following(self._watch.axes, target, windows(source.demand, target))
-        self._recorder = Recorder(book or Book.blank(source.most, len(target.axes)))
+        self._book = book or Book.blank(source.most, len(target.axes))
+        self.cycles_sent = 0
         self._found = Restoration()
         self._left: tuple[str, ...] = ()  # of the settings found, what could not be put back
         self._stops_asked = deque[str]()
@@ -98,11 +96,6 @@ class Streamer:
         Without sway, where the source plans such a stop, unless it was asked for before.
         """
         self._stops_asked.append(reason)
-
-    @property
-    def cycles_sent(self) -> int:
-        """How many setpoints of the motion have been sent."""
-        return self._recorder.sent
 
     def run(self) -> Record:
         """Go through all phases; always ends with drives that do not move, or says so."""
@@ -125,7 +118,7 @@ class Streamer:
         return self._record(Phase.DONE, "")
 
     def _begin(self, phase: Phase) -> None:
-        self._recorder.begin(phase)
+        self._book.begin(phase)
         self._say(phase.value)
 
     def _say(self, words: str) -> None:
@@ -206,7 +199,8 @@ class Streamer:
                 continue
             pacer.send(last.messages)
             self._sent_at = self._clock.now()
-            self._recorder.take_sent(cycle, self._sent_at - pacer.due)
+            self._book.take_sent(cycle, self._sent_at - pacer.due)
+            self.cycles_sent += 1
             self._following.lead(last.at_sync)
             self._answers_for = cycle
             sent, cycle = last, cycle + 1
@@ -295,7 +289,7 @@ class Streamer:
         self._require_well()
         answered = all(axis.heard >= self._sent_at for axis in self._watch.axes)
         if answered and self._answers_for >= 0:
-            self._recorder.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
+            self._book.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
         self._answers_for = -1
         self._following.require()
 
@@ -322,28 +316,11 @@ class Streamer:
     def _record(self, phase: Phase, reason: str) -> Record:
         if phase is Phase.ABORTED:
             self._begin(phase)
-        self._recorder.begin(phase)
+        self._book.begin(phase)
         fault = self._watch.fault if phase is Phase.DONE else None
-        return self._recorder.record(
-            phase,
+        return self._book.record(
             reason,
             tuple(axis.position for axis in self._watch.axes),
             aftermath=" ".join(filter(None, [fault, *self._left])),
             launched=self._link.launching is not None,
-            period=self._pacer.period,
         )
-
-
-def _watched(target: Target) -> list[WatchedAxis]:
-    """Make an axis to be watched for each of a target's."""
-    transmitted = pdos.layout(target.can).transmitted
-    drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), strict=True)
-    return [
-        WatchedAxis(
-            name=axis.name,
-            node=node,
-            feedback={own[pdo]: fields for pdo, fields in transmitted.items()},
-            standstill=Standing(trembling(axis)),
-        )
-        for axis, node, own in drives
-    ]

@@ -1,6 +1,6 @@
 """What the drives say on the bus, and which of it must end a stream."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from functools import partial
 
@@ -8,11 +8,12 @@ import attrs
 import can
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames, pdos
+from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.pdos import Field
-from gen_profile_exporters.can.streaming.standing import Standing
+from gen_profile_exporters.can.streaming.standing import Standing, trembling
+from gen_profile_exporters.exporter import Target
 
 OPERATIONAL = 5
 # command specifiers of SDO requests (CiA 301) that change nothing: upload, its segments, abort, block upload
@@ -100,30 +101,18 @@ class Watch:
 
     Parameters
     ----------
-    axes : sequence of WatchedAxis
+    target : Target
+        Whose drives are watched.
     clock : Clock
-    period, heartbeat : int
-        SYNC period, and period of the drives' heartbeats, in ns.
-    timeout : int
-        How long a drive may leave SYNC unanswered, in ns.
-    ours : iterable of int
-        COB-IDs of commands and setpoints, which no other node may send.
     """
 
-    def __init__(
-        self,
-        axes: Sequence[WatchedAxis],
-        clock: Clock,
-        *,
-        period: int,
-        heartbeat: int,
-        timeout: int,
-        ours: Iterable[int],
-    ) -> None:
-        self.axes = tuple(axes)
+    def __init__(self, target: Target, clock: Clock) -> None:
+        self.axes = _watched(target)
         self.alert = SupervisionLevel.LISTENING
         self.fault: str | None = None
-        self._clock, self._period, self._heartbeat, self._timeout = clock, period, heartbeat, timeout
+        self._clock, self._period = clock, frames.period_microseconds(target.can) * 1000
+        self._heartbeat = startup.heartbeat_ms(target.can) * NANOSECONDS // 1000
+        self._timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000  # for an answer to SYNC
         self._demanded = 0  # instant since when drives are to answer
         self._takers: dict[int, Callable[[bytes], None]] = {}
         for axis in self.axes:
@@ -132,7 +121,9 @@ class Watch:
             self._takers[frames.EMCY + axis.node] = partial(self._take_emergency, axis)
             self._takers[frames.HEARTBEAT + axis.node] = partial(self._take_heartbeat, axis)
             self._takers[frames.SDO_REQUEST + axis.node] = partial(self._take_request, axis)
-        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER, *ours}
+        commands = pdos.layout(target.can).received
+        commanding = {own[pdo] for own in frames.cob_ids(target) for pdo in commands}
+        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER} | commanding
 
     def take(self, message: can.Message) -> None:
         """Take in one frame, whatever it is."""
@@ -234,3 +225,18 @@ class Watch:
             self._find(f"axis {axis.name}: the drive went to the state {axis.state.words!r}.")
         elif not axis.statusword & FOLLOWS:
             self._find(f"axis {axis.name}: the drive no longer follows the setpoints (statusword bit 12).")
+
+
+def _watched(target: Target) -> tuple[WatchedAxis, ...]:
+    """Make an axis to be watched for each of a target's."""
+    transmitted = pdos.layout(target.can).transmitted
+    drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), strict=True)
+    return tuple(
+        WatchedAxis(
+            name=axis.name,
+            node=node,
+            feedback={own[pdo]: fields for pdo, fields in transmitted.items()},
+            standstill=Standing(trembling(axis)),
+        )
+        for axis, node, own in drives
+    )

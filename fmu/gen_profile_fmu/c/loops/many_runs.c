@@ -1,5 +1,5 @@
 /*
- * Many co-simulations of one instance, by its own functions of FMI 2 or 3: no interpreter within a run.
+ * Many co-simulations of one instance, by its own functions: no interpreter within a run.
  * For each run: reset, set the parameters, initialise, step through the inputs, keep the outputs' peaks.
  */
 #include <math.h>

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, closing
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -26,10 +27,12 @@ from gen_profile.cli.signing import require_signature, signed_by_option, signing
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from gen_profile.artefacts.signature import Key
     from gen_profile.deployment.mailbox import ControllerLink
+    from gen_profile.deployment.simulated_block import SimulatedController
     from gen_profile.deployment.table import BlockTable
     from gen_profile.progress import Progress
 
@@ -223,59 +226,42 @@ def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool,
             f"{option}: {protocol} has no security; add --no-security, which lets any program of this "
             "computer in."
         )
+    make = _simulated(data_block, ads=ads, **options)
+    from gen_profile.deployment.table import read_table
+
+    def ready(address: str) -> None:
+        name, shown = controller.instance, controller.fingerprint
+        document = {"address": address, "instance": name, "fingerprint": shown}
+        certified = f"\nSHA-256 of its certificate: {shown}" if shown else ""
+        print_outcome(document, f"{name} runs behind {address}{certified}\nCtrl-C ends it.", as_json)
+
     try:
-        if ads:
-            _simulate_ads(artefact, options["port"], as_json)
-        elif data_block is not None:
-            _simulate_s7(artefact, data_block, options["port"], as_json)
-        else:
-            _simulate_opcua(artefact, as_json, **options)
+        with progress() as tell:
+            tell("compiling the block")
+            controller = make(read_table(artefact))
+        controller.serve(ready)
     except KeyboardInterrupt:
         click.echo("The simulated controller is switched off.", err=True)
 
 
-def _simulate_opcua(
-    artefact: Path, as_json: bool, *, port: int, certificate: Path | None, user: str, no_security: bool
-) -> None:
-    require_opcua()
-    import asyncio
+def _simulated(
+    data_block: int | None, *, ads: bool, port: int, certificate: Path | None, user: str, no_security: bool
+) -> Callable[[BlockTable], SimulatedController]:
+    """Choose the controller that is made of a table."""
+    if ads:
+        require_ads()
+        from gen_profile.deployment.ads_sim import SimulatedAdsController
 
-    from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
-    from gen_profile.deployment.table import read_table
+        return partial(SimulatedAdsController, port=port)
+    if data_block is not None:
+        require_s7()
+        from gen_profile.deployment.s7_sim import SimulatedS7Controller
+
+        return partial(SimulatedS7Controller, number=data_block, port=port)
+    require_opcua()
+    from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 
     options = PlcSimOptions(
         port=port, secure=not no_security, certificate=certificate, user=user, password=password(user)
     )
-    with progress() as tell:
-        tell("compiling the block")
-        controller = SimulatedController(read_table(artefact), options)
-    name = controller.name
-    asyncio.run(controller.serve(lambda address, shown: _show_simulated(name, address, shown, as_json)))
-
-
-def _simulate_s7(artefact: Path, data_block: int, port: int, as_json: bool) -> None:
-    require_s7()
-    from gen_profile.deployment.s7_sim import SimulatedS7Controller
-    from gen_profile.deployment.table import read_table
-
-    with progress() as tell:
-        tell("compiling the block")
-        controller = SimulatedS7Controller(read_table(artefact), data_block, port)
-    controller.serve(lambda address: _show_simulated(f"DB{data_block}", address, "", as_json))
-
-
-def _simulate_ads(artefact: Path, port: int, as_json: bool) -> None:
-    require_ads()
-    from gen_profile.deployment.ads_sim import INSTANCE, SimulatedAdsController
-    from gen_profile.deployment.table import read_table
-
-    with progress() as tell:
-        tell("compiling the block")
-        controller = SimulatedAdsController(read_table(artefact), port)
-    controller.serve(lambda address: _show_simulated(INSTANCE, address, "", as_json))
-
-
-def _show_simulated(name: str, address: str, fingerprint: str, as_json: bool) -> None:
-    document = {"address": address, "instance": name, "fingerprint": fingerprint}
-    shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
-    print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
+    return partial(SimulatedOpcUaController, options=options)
