@@ -19,9 +19,8 @@ def identification_figure(identified: Identification) -> Figure:
     """Draw the first log beside the identified machine."""
     log, swing = identified.logs[0], identified.estimate.swings[0]
     left = log.values - swing
-    natural = linearize(
-        identified.spec.machine(), identified.spec.plant.parameters, identified.q_a
-    ).frequencies
+    spec = identified.spec
+    natural = linearize(spec.machine(), spec.plant.parameters, identified.q_a).frequencies
     shown = spectrum(log.times, left, float(natural[-1]))
     amplitude, chance = (2.0 * np.sqrt(power / len(left)) for power in (shown.power, shown.threshold))
     greatest = max(float(amplitude.max()), float(np.max(chance)))

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
+from gen_profile.identification.fit import Fit, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.identification.misfit import Misfit, elsewhere, explanations, misfits
-from gen_profile.identification.swing_model import swing_model
+from gen_profile.identification.swing_model import SwingingMachine, swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import AND, OR_WITH, Phrase, joined
@@ -93,7 +93,7 @@ def estimate(
     InfeasibleProblem
         The measurements do not determine the parameters.
     """
-    models = [swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs]
+    models = [swing_model(machine, log) for log in logs]
     fit = fit_of(machine, names, readings, models)
     progress("fitting")
     try:

@@ -17,26 +17,15 @@ from scipy.optimize import least_squares
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.measurements import DirectReading, Period
-from gen_profile.identification.swing_model import STEP, SwingModel
+from gen_profile.identification.swing_model import STEP, SwingingMachine, SwingModel
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import AND, joined
-from gen_profile.plants.plant import Plant
-from gen_profile.problem.linearization import linearize
 
 NOISE_ROUNDS = 2
 HELD = 0.3  # relative, by which a parameter may leave the spec's while only a part of a log is looked at
 TOLERANCE = 1e-6  # relative, of the sum of squares: it has as many terms as the logs have samples
 HALF = 0.5  # of a swing, which is left where two have the same phase within a twelfth of a period
 STEPS = 30  # of a search; near a solution five are enough
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class SwingingMachine:
-    """What is known beforehand: the machine, all its parameters, and where its axes stood."""
-
-    plant: Plant
-    parameters: Mapping[str, float]
-    q_a: tuple[float, ...]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -120,7 +109,7 @@ class Fit:
 
     def beginning(self, parameters: Mapping[str, float]) -> Fit:
         """Begin the search at other parameters."""
-        return attrs.evolve(self, machine=attrs.evolve(self.machine, parameters=dict(parameters)))
+        return attrs.evolve(self, machine=self.machine.of(parameters))
 
     def small(self) -> Fit:
         """Take all swings to be small."""
@@ -196,7 +185,7 @@ class Fit:
     def predicted(self, unknowns: Array) -> Array:
         """Say what the readings would be on a machine."""
         parameters = self.parameters(unknowns)
-        linear = linearize(self.machine.plant, parameters, self.machine.q_a)
+        linear = self.machine.of(parameters).linear
         damped = linear.frequencies * np.sqrt(np.maximum(1.0 - linear.damping_ratios**2, 1e-12))
         return np.array(
             [

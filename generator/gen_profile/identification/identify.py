@@ -12,7 +12,6 @@ import tomli_w
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, INITIAL_RESIDUAL_RATIO, Estimate, estimate
-from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
     GREATEST,
@@ -24,7 +23,7 @@ from gen_profile.identification.measurements import (
     SwingLog,
     parse_swing,
 )
-from gen_profile.identification.swing_model import shortened
+from gen_profile.identification.swing_model import SwingingMachine, shortened
 from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.one_thread import one_thread
 from gen_profile.phrase import AND, Phrase, joined
@@ -262,19 +261,11 @@ def identify(
         raise SpecError(
             "at: must be places in m or rad, found {places}.", places=", ".join(f"{x:g}" for x in stood)
         )
-    logs = tuple(
-        shortened(log, plant, spec.plant.parameters, stood)
-        for log in measurements
-        if isinstance(log, SwingLog)
-    )
+    machine = SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood)
+    logs = tuple(shortened(log, machine) for log in measurements if isinstance(log, SwingLog))
     with one_thread():
-        estimated = estimate(
-            SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
-            [q.name for q in plant.parameters if q.name in asked],
-            readings,
-            logs,
-            progress,
-        )
+        names = [q.name for q in plant.parameters if q.name in asked]
+        estimated = estimate(machine, names, readings, logs, progress)
     return Identification(
         given=spec,
         spec=_identified(spec, estimated),

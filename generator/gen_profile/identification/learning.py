@@ -22,10 +22,10 @@ from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.evaluation.simulation import driven_swing, motion_of
 from gen_profile.identification.driven_model import COARSE, DrivenModel, driven_model, through
 from gen_profile.identification.estimation import taken_as_exact
-from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
+from gen_profile.identification.fit import Fit, fit_of
 from gen_profile.identification.measurements import DirectReading, SwingLog
 from gen_profile.identification.misfit import GROSS, Explanation, likeliest, misfits, nothing_left
-from gen_profile.identification.swing_model import STILL, shortened
+from gen_profile.identification.swing_model import STILL, SwingingMachine, shortened
 from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile
@@ -109,12 +109,12 @@ def narrowed_by_log(
         No machine of the ranges shows this log; or it is of no run of this motion.
     """
     progress("comparing the run with machines of the ranges")
-    drawn, plant = machines.drawn(DRAWN), machines.plant
-    stood = tuple(map(float, played.position[-1]))
-    model = driven_model(plant, drawn[0], played, shortened(log, plant, drawn[0], stood, SAMPLES))
+    drawn, stood = machines.drawn(DRAWN), tuple(map(float, played.position[-1]))
+    middle = SwingingMachine(plant=machines.plant, parameters=drawn[0], q_a=stood)
+    model = driven_model(middle, played, shortened(log, middle, SAMPLES))
     starts, residual = model.guesses(drawn)
     model = attrs.evolve(model, lead=max(float(starts[np.argmin(residual), -3]), 0.0) + model.fastest)
-    free = _free_fit(machines, drawn[0], model)
+    free = _free_fit(machines, model)
     fit = attrs.evolve(free, bounds=np.array([machines.ranges[name] for name in free.names]).T / free.scale)
     best = np.argsort(residual)[:BEST]
     begun = [np.array([drawn[k][name] for name in fit.names]) / fit.scale for k in best]
@@ -203,14 +203,14 @@ def narrowed_by_sight(
     return Lesson(machines=machines.within(kept), evidence=evidence)
 
 
-def _free_fit(machines: Machines, middle: Mapping[str, float], model: DrivenModel) -> Fit:
+def _free_fit(machines: Machines, model: DrivenModel) -> Fit:
     """Pose the fit of what has ranges, as far as the plant takes it; what a log does not tell stays near."""
+    middle = model.machine.parameters
     known = [
         DirectReading(parameter=name, value=middle[name], uncertainty=LOOSE * (high - low) / 2.0)
         for name, (low, high) in machines.ranges.items()
     ]
-    machine = SwingingMachine(plant=machines.plant, parameters=middle, q_a=model.q_a)
-    return fit_of(machine, list(machines.ranges), known, [model])
+    return fit_of(model.machine, list(machines.ranges), known, [model])
 
 
 def _fitted(fit: Fit, begun: Sequence[Array]) -> tuple[Array, Array]:

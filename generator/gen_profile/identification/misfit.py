@@ -17,7 +17,6 @@ from gen_profile.identification.fit import Fit
 from gen_profile.identification.swing_model import SwingModel, shortened
 from gen_profile.identification.uncertainty import WIDEST, uncertainty
 from gen_profile.motion.profile import Array
-from gen_profile.problem.linearization import linearize
 
 HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
 MOST_LINES = 2000
@@ -105,8 +104,8 @@ def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
 
 def misfit(model: SwingModel, parameters: Mapping[str, float], residuals: Array) -> Misfit | None:
     """Look for lines in the residuals of a log, in rad or m; None where there is nothing but noise."""
-    log, fastest = model.log, linearize(model.plant, parameters, model.q_a).frequencies[-1]
-    periodogram = spectrum(log.times, residuals, float(fastest))
+    log, fastest = model.log, float(model.machine.of(parameters).linear.frequencies[-1])
+    periodogram = spectrum(log.times, residuals, fastest)
     lines = periodogram.power > periodogram.threshold
     if not lines.any():
         return None
@@ -175,9 +174,7 @@ def elsewhere(fit: Fit) -> Explanation | None:
 
 def _rough(fit: Fit) -> Fit:
     """Fit fewer averages of the logs."""
-    parameters = fit.machine.parameters
-    logs = [shortened(m.log, m.plant, parameters, m.q_a, ROUGHLY) for m in fit.models]
-    models = (attrs.evolve(m, log=log) for m, log in zip(fit.models, logs, strict=True))
+    models = (attrs.evolve(one, log=shortened(one.log, fit.machine, ROUGHLY)) for one in fit.models)
     return attrs.evolve(fit, models=tuple(models))
 
 
