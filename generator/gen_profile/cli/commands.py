@@ -28,7 +28,7 @@ from gen_profile.cli.options import (
 )
 from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
-from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
+from gen_profile.cli.signing import require_signature, sign, signed_by_option, signing_key, signing_option
 from gen_profile.errors import CertificateError, OutputError, SpecError
 from gen_profile.suggestion import suggestion
 
@@ -66,7 +66,7 @@ def cli() -> None:
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
 @certify_option
-@sign_option
+@signing_option("manifest")
 @output_options
 def design(
     chosen: SpecChoice,
@@ -161,6 +161,62 @@ def compare(
         comparison = run(spec, tell)
         draw(comparison, picture, tell, every=every)
     print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
+
+
+@cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")
+@spec_options
+@click.option(
+    "--parameter",
+    "parameters",
+    metavar="NAME",
+    multiple=True,
+    help="What is off: once for a curve, twice for a map; the first uncertain parameter by default.",
+)
+@click.option(
+    "--method",
+    "methods",
+    metavar="NAME",
+    multiple=True,
+    help="Method to try, as compare names them. Repeatable; all by default.",
+)
+@click.option(
+    "--range",
+    "half_range",
+    metavar="SHARE",
+    type=click.FloatRange(0.0, 0.9, min_open=True),
+    help="Greatest relative error, such as 0.3; one and a half times the spec's range by default.",
+)
+@click.option(
+    "--points",
+    type=Count(3, 1001),
+    help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
+)
+@plot_option
+@click.option("--csv", "path", type=OutputFile(), help="Write the numbers as a table.")
+@output_options
+def robustness(
+    chosen: SpecChoice,
+    *,
+    parameters: tuple[str, ...],
+    methods: tuple[str, ...],
+    half_range: float | None,
+    points: int | None,
+    picture: Path | None,
+    path: Path | None,
+    as_json: bool,
+) -> None:
+    """Show residual sway over one or two parameters, optimal motions beside shapers."""
+    spec = chosen.spec()
+    from gen_profile.artefacts.writing import deliver
+    from gen_profile.cli import words
+    from gen_profile.comparison.robustness import robustness as run
+
+    with progress() as tell:
+        curves = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
+        draw(curves, picture, tell)
+        if path is not None:
+            deliver(path, curves.table().encode("utf-8"))
+    print_outcome(curves.to_dict(), words.robustness(curves), as_json)
 
 
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")

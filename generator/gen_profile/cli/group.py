@@ -1,5 +1,7 @@
 """Command groups of which one command runs when none is named."""
 
+from typing import Any
+
 import click
 from click.shell_completion import CompletionItem
 
@@ -10,7 +12,9 @@ from gen_profile.suggestion import suggestion
 class DefaultGroup(click.Group):
     """Put `default` before arguments that begin with neither a command nor an option of the group."""
 
-    default = "design"
+    def __init__(self, *arguments: Any, default: str = "design", **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.default = default
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, the default command put in."""

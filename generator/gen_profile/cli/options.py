@@ -194,6 +194,17 @@ def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return choosing
 
 
+def with_options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Add several options, which the help lists in this order."""
+
+    def decorate(command: Any) -> Any:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
 def version_option(command: Command) -> Command:
     """Add ``--version``, which tells the commit, too, where the distribution was built from a checkout."""
 
@@ -271,18 +282,14 @@ certify_option = click.option(
 def output_options(command: Command) -> Command:
     """Add how every command says what came of it; let none write over what it reads."""
 
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
+    @click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks.")
     @wraps(command)
     def careful(**values: Any) -> Any:
         _require_apart(click.get_current_context())
         return command(**values)
 
-    guarded = cast("Command", careful)
-    for decorate in (
-        click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."),
-        click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout."),
-    ):
-        guarded = decorate(guarded)
-    return guarded
+    return cast("Command", careful)
 
 
 def _require_apart(context: click.Context) -> None:

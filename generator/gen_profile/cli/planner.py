@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
@@ -24,10 +24,11 @@ from gen_profile.cli.options import (
     output_options,
     scheduler_option,
     spec_options,
+    with_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
-from gen_profile.cli.signing import sign, sign_option, signing_key
+from gen_profile.cli.signing import sign, signing_key, signing_option
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.progress import Progress
 
@@ -39,12 +40,6 @@ if TYPE_CHECKING:
 CLEARED = "\r\x1b[K"  # the line, of a terminal
 
 
-class PlannerGroup(DefaultGroup):
-    """Write where no command is named."""
-
-    default = "write"
-
-
 def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import containers
 
@@ -52,7 +47,9 @@ def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> l
     return [CompletionItem(name) for name in known if name.startswith(incomplete)]
 
 
-@cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner --preset bay-crane --out deploy")
+@cli.group(
+    cls=DefaultGroup, default="write", epilog="Example: gen-profile planner --preset bay-crane --out deploy"
+)
 def planner() -> None:
     """Write a PLC block that plans every motion itself, and execute it.
 
@@ -81,7 +78,7 @@ def planner() -> None:
 @click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")
 @block_plot_option
-@sign_option
+@signing_option("manifest")
 @output_options
 def write(
     chosen: SpecChoice,
@@ -233,56 +230,28 @@ def _read(path: Path, what: str = "commands") -> str:
         raise OutputError(f"Cannot read the {what} {path}: it is no UTF-8 text.") from error
 
 
-def planner_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add what tells of a planner and its commands."""
-    for decorate in (
-        click.option(
-            "--live-parameter",
-            "live_parameters",
-            metavar="NAME=VALUE",
-            multiple=True,
-            help="What a live parameter of --planner is from the start. Repeatable.",
-        ),
-        click.option(
-            "--commands",
-            "commands_path",
-            type=InputFile(),
-            help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
-        ),
-        click.option(
-            "--planner",
-            "block",
-            metavar="BLOCK",
-            type=PathType(),
-            help="Stream what this written planner block issues.",
-        ),
-    ):
-        command = decorate(command)
-    return command
-
-
-def require_no_others(given: Mapping[str, object]) -> None:
-    """Refuse options that do not go with others that were given.
-
-    Raises
-    ------
-    SpecError
-    """
-    for option, value in given.items():
-        if value:
-            raise SpecError(f"{option}: not with --planner; leave one of them out.")
-
-
-def require_planner(commands_path: Path | None, live_parameters: tuple[str, ...]) -> None:
-    """Refuse what only a planner takes.
-
-    Raises
-    ------
-    SpecError
-    """
-    for option, value in (("--commands", commands_path), ("--live-parameter", live_parameters)):
-        if value:
-            raise SpecError(f"{option}: commands a planner block; name it by --planner.")
+planner_options = with_options(
+    click.option(
+        "--planner",
+        "block",
+        metavar="BLOCK",
+        type=PathType(),
+        help="Stream what this written planner block issues.",
+    ),
+    click.option(
+        "--commands",
+        "commands_path",
+        type=InputFile(),
+        help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
+    ),
+    click.option(
+        "--live-parameter",
+        "live_parameters",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="What a live parameter of --planner is from the start. Repeatable.",
+    ),
+)
 
 
 def planned(

@@ -15,17 +15,16 @@ from gen_profile.cli.deployment.access import (
     access_options,
     controller_options,
     password,
-    require_ads,
-    require_opcua,
-    require_s7,
+    require_protocol,
 )
-from gen_profile.cli.options import Count, InputFile, OutputFile, PathType, output_options
+from gen_profile.cli.options import Count, OutputFile, PathType, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
-from gen_profile.cli.signing import require_signature, signed_by_option, signing_key
+from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from gen_profile.artefacts.signature import Key
@@ -49,12 +48,7 @@ if TYPE_CHECKING:
 )
 @click.option("--rollback", is_flag=True, help="Go back to this table, which the idle buffer holds.")
 @click.option("--by", default="", metavar="NAME", help="Who deploys, for the record; the user by default.")
-@click.option(
-    "--sign",
-    "key_path",
-    type=InputFile(),
-    help="Sign the record with this secret key, made by minisign -GW.",
-)
+@signing_option("record")
 @signed_by_option
 @output_options
 def deploy(
@@ -223,59 +217,41 @@ def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool,
             f"{option}: {protocol} has no security; add --no-security, which lets any program of this "
             "computer in."
         )
+    secret = password(options["user"])
     try:
-        if ads:
-            _simulate_ads(artefact, options["port"], as_json)
-        elif data_block is not None:
-            _simulate_s7(artefact, data_block, options["port"], as_json)
-        else:
-            _simulate_opcua(artefact, as_json, **options)
+        with progress() as tell:
+            tell("compiling the block")
+            name, serve = _simulated(artefact, data_block, ads=ads, password=secret, **options)
+
+        def show(address: str, fingerprint: str = "") -> None:
+            document = {"address": address, "instance": name, "fingerprint": fingerprint}
+            shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
+            print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
+
+        serve(show)
     except KeyboardInterrupt:
         click.echo("The simulated controller is switched off.", err=True)
 
 
-def _simulate_opcua(
-    artefact: Path, as_json: bool, *, port: int, certificate: Path | None, user: str, no_security: bool
-) -> None:
-    require_opcua()
+def _simulated(
+    artefact: Path, data_block: int | None, *, ads: bool, port: int, no_security: bool, **access: Any
+) -> tuple[str, Callable[[Callable[..., None]], None]]:
+    """Make a controller, and give its block's name and what serves it."""
+    require_protocol("ADS" if ads else "OPC UA" if data_block is None else "S7")
+    from gen_profile.deployment.table import read_table
+
+    table = read_table(artefact)
+    if ads:
+        from gen_profile.deployment.ads_sim import INSTANCE, SimulatedAdsController
+
+        return INSTANCE, SimulatedAdsController(table, port).serve
+    if data_block is not None:
+        from gen_profile.deployment.s7_sim import SimulatedS7Controller
+
+        return f"DB{data_block}", SimulatedS7Controller(table, data_block, port).serve
     import asyncio
 
     from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedController
-    from gen_profile.deployment.table import read_table
 
-    options = PlcSimOptions(
-        port=port, secure=not no_security, certificate=certificate, user=user, password=password(user)
-    )
-    with progress() as tell:
-        tell("compiling the block")
-        controller = SimulatedController(read_table(artefact), options)
-    name = controller.name
-    asyncio.run(controller.serve(lambda address, shown: _show_simulated(name, address, shown, as_json)))
-
-
-def _simulate_s7(artefact: Path, data_block: int, port: int, as_json: bool) -> None:
-    require_s7()
-    from gen_profile.deployment.s7_sim import SimulatedS7Controller
-    from gen_profile.deployment.table import read_table
-
-    with progress() as tell:
-        tell("compiling the block")
-        controller = SimulatedS7Controller(read_table(artefact), data_block, port)
-    controller.serve(lambda address: _show_simulated(f"DB{data_block}", address, "", as_json))
-
-
-def _simulate_ads(artefact: Path, port: int, as_json: bool) -> None:
-    require_ads()
-    from gen_profile.deployment.ads_sim import INSTANCE, SimulatedAdsController
-    from gen_profile.deployment.table import read_table
-
-    with progress() as tell:
-        tell("compiling the block")
-        controller = SimulatedAdsController(read_table(artefact), port)
-    controller.serve(lambda address: _show_simulated(INSTANCE, address, "", as_json))
-
-
-def _show_simulated(name: str, address: str, fingerprint: str, as_json: bool) -> None:
-    document = {"address": address, "instance": name, "fingerprint": fingerprint}
-    shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
-    print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
+    controller = SimulatedController(table, PlcSimOptions(port=port, secure=not no_security, **access))
+    return controller.name, lambda show: asyncio.run(controller.serve(show))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
+from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options, with_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
@@ -27,17 +27,12 @@ FEW_ROWS, CELL = 10_000, 16  # of a log of unknown length, and bytes of a number
 _MISSES = ("extrapolate", "hold", "stop")
 
 
-def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for decorate in (
-        click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
-        click.option(
-            "--interface",
-            metavar="NAME",
-            help="Interface as python-can names it: socketcan, pcan, slcan …",
-        ),
-    ):
-        command = decorate(command)
-    return command
+_bus_options = with_options(
+    click.option(
+        "--interface", metavar="NAME", help="Interface as python-can names it: socketcan, pcan, slcan …"
+    ),
+    click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
+)
 
 
 @cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
@@ -208,7 +203,8 @@ def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None
 
     from gen_profile.artefacts.writing import deliver
 
-    code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [_aborted(outcome)])
+    aborted = f"Stream aborted: {outcome.record.reason}"
+    code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [aborted])
     unwritten: dict[str, Any] | None = None
     if table is not None:
         try:
@@ -224,14 +220,12 @@ def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None
     refusals = [refusal for refusal in said if refusal is not None]
     if refusals and not code:
         raise refusals[0]
-    if refusals:
-        _lead_nowhere()
+    if refusals:  # else Python would try again at its end, and end in a code of its own
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for number in (1, 2):
+            os.dup2(nowhere, number)
     if code:
         sys.exit(code)
-
-
-def _aborted(outcome: StreamOutcome) -> str:
-    return f"Stream aborted: {outcome.record.reason}"
 
 
 def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Exception | None:
@@ -241,10 +235,3 @@ def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Excep
     except (OSError, OutputError) as error:
         return error
     return None
-
-
-def _lead_nowhere() -> None:
-    """Give up streams that took nothing: Python would try again at its end, and end in a code of its own."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for number in (1, 2):
-        os.dup2(nowhere, number)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import attrs
 
 from gen_profile.cli.options import SpecChoice
-from gen_profile.cli.planner import planned, require_no_others, require_planner, status_line
+from gen_profile.cli.planner import planned, status_line
 from gen_profile.cli.progress import progress
 from gen_profile.cli.streaming.words import lateness_words
 from gen_profile.errors import SpecError
@@ -66,16 +66,24 @@ class StreamRequest:
                 "--live terminal: standard error is no terminal to draw on; "
                 "leave it out, or use --live browser."
             )
-        if self.block is None:
-            require_planner(self.commands_path, self.live_parameters)
-        else:
-            specs = {
+        wrong = "commands a planner block; name it by --planner"
+        given: dict[str, object] = {
+            "--commands": self.commands_path,
+            "--live-parameter": self.live_parameters,
+        }
+        if self.block is not None:
+            wrong = "not with --planner; leave one of them out"
+            given = {
                 "A spec or log": self.chosen.path,
                 "--preset": self.chosen.preset,
                 "--set, --mode or --node": self._changed().overrides,
+                "--to-start": self.to_start,
+                "--jog": self.jog,
+                "--live": self.live,
             }
-            slow = {"--to-start": self.to_start, "--jog": self.jog, "--live": self.live}
-            require_no_others({**specs, **slow})
+        for option, value in given.items():
+            if value:
+                raise SpecError(f"{option}: {wrong}.")
 
     def source(self, tell: Progress) -> Source:
         """Take an artefact or a planner block, or design a motion for a spec, once there is a bus for it.
