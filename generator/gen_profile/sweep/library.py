@@ -50,15 +50,9 @@ class Library:
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        return {
-            "path": str(self.path),
-            "index": str(self.index),
-            "format": self.format,
-            "files": [str(path) for path in self.files],
-            "block": self.block,
-            "bytes": self.bytes,
-            "profiles": list(self.profiles),
-        }
+        return attrs.asdict(
+            self, value_serializer=lambda _, __, one: str(one) if isinstance(one, Path) else one
+        )
 
 
 def write_library(folder: Path | str, path: Path | str, progress: Progress = no_progress) -> Library:

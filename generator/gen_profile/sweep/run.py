@@ -156,7 +156,7 @@ def sweep(
         unfinished = [case for case in range(len(grid)) if not kept.is_finished(case)]
         if unfinished:
             _work(store, kept, unfinished, scheduler=scheduler, workers=workers, progress=progress)
-        table = kept.gather()
+        table = store.gather()
     for row in swept_table(store.folder, grid, ["case", "status", "reason"]).to_pylist():
         statuses[row["status"]] += 1
         if row["status"] != PASSED:
@@ -190,7 +190,7 @@ def _work(
     def keep(outcomes: Sequence[CaseOutcome]) -> None:
         nonlocal done, failures
         for outcome in outcomes:
-            kept.keep(outcome.record["case"], outcome)
+            kept.keep(outcome)
             done, failures = done + 1, failures + (not outcome.passed)
             progress(STAGE, done, total, f"{failures} failed" if failures else "")
 
