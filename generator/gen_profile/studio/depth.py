@@ -17,7 +17,8 @@ from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.orders import Question
-from gen_profile.studio.views import Part, point
+from gen_profile.studio.views import point
+from gen_profile.studio.workers import Part
 
 CURVES = 3  # parameters that have a robustness curve
 MAP_POINTS = 15  # of each parameter's error

@@ -356,15 +356,12 @@ def _axes(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
 
 def _with_slider(knob: Knob, before: Any) -> Knob:
     """Choose the ends of a knob's slider: around the value to begin with, so that they stand still."""
+    known: list[float] = []
     if knob.kind == "interval":
-        ends = [end for value in (before, knob.value) if value for end in value]
-        return attrs.evolve(knob, span=_around(knob, min(ends), max(ends)) if ends else None)
-    if knob.kind != "number" or isinstance(knob.value, bool):
-        return knob
-    known = [value for value in (before, knob.value, knob.usual) if isinstance(value, int | float)]
-    if not known:
-        return knob
-    return attrs.evolve(knob, span=_around(knob, min(known), max(known)))
+        known = [end for value in (before, knob.value) if value for end in value]
+    elif knob.kind == "number":
+        known = [value for value in (before, knob.value, knob.usual) if isinstance(value, int | float)]
+    return attrs.evolve(knob, span=_around(knob, min(known), max(known))) if known else knob
 
 
 def _around(knob: Knob, low: float, high: float) -> tuple[float, float]:

@@ -25,12 +25,11 @@ from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.orders import LogQuestion
 from gen_profile.studio.state import command_of
+from gen_profile.studio.workers import Part
 from gen_profile.work import OutOfWork
 
 MOST_COLUMNS = 64  # of a table that are offered
 MOVED = 0.3  # of the planned way, from which on a log is one of a move
-
-Part = dict[str, Any]
 
 
 def log(asked: LogQuestion) -> Iterator[Part]:
