@@ -97,9 +97,7 @@ def profile_figure(profile: Profile) -> Figure:
             title=quantity,
             y_label=f"{quantity.lower()} ({unit.format('m')} or {unit.format('rad')})",
             lines=[
-                derivative_line(
-                    f"axis {axis + 1}", profile, order, axis, Style(colour=PALETTE[axis % len(PALETTE)])
-                )
+                derivative_line(f"axis {axis + 1}", profile, order, axis, Style(colour=colour))
                 for axis, colour in zip(range(profile.axes), cycle(PALETTE), strict=False)
             ],
         )

@@ -191,52 +191,36 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
 
 def _remains_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw what remains by the strongest gust, and by the first live parameter where there is one."""
-    sensed = [(one, one.history.sensed) for one in _sound(proof)]
-    gusts = [max(abs(gust.acceleration) for gust in sensor.gusts) for _, sensor in sensed if sensor]
-    shares = 100.0 * np.array([proof.fraction(one) for one, _ in sensed])
-    title, gust_label, stated = "What remains after gusts", "strongest gust (m/s²)", spec.planner.disturbance
+    judged, stated, live = _sound(proof), spec.planner.disturbance, spec.planner.live
     assert stated is not None and stated.gust is not None
-    panel: Panel | Map = Panel(
-        title=title,
-        x_label=gust_label,
-        y_label="share of its limit (%)",
-        lines=[Line(name="history", x=np.array(gusts), y=shares, style=Style(dash="points"))],
-        levels=[Level(value=100.0)],
+    sensors = [one.history.sensed for one in judged]
+    gusts = [max(abs(gust.acceleration) for gust in sensor.gusts) for sensor in sensors if sensor]
+    names = [*live][:1]
+    panel = _shares_panel(
+        "What remains after gusts",
+        [*(_labelled(spec, name) for name in names), "strongest gust (m/s²)"],
+        np.array([*([one.history.live[name] for one in judged] for name in names), gusts]),
+        [*(live[name] for name in names), (0.0, stated.gust.acceleration)],
+        [proof.fraction(one) for one in judged],
     )
-    for name, across in [*spec.planner.live.items()][:1]:
-        places = np.array([[one.history.live[name] for one, _ in sensed], gusts])
-        labels = (_labelled(spec, name), gust_label)
-        panel = _map(title, labels, places, (across, (0.0, stated.gust.acceleration)), shares)
-    return Figure(
-        caption="Every history with a sound sensor and gusts; white: none there.", panels=[panel], columns=1
-    )
+    caption = "Every history with a sound sensor and gusts; white: none there."
+    return Figure(caption=caption, panels=[panel], columns=1)
 
 
 def map_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw the worst share of the limit in cells of two live parameters, or of every history over one."""
     live = spec.planner.live
-    shares = 100.0 * np.array([proof.fraction(one) for one in proof.judged])
-    title = "Worst residual sway"
-    if len(live) == 2:
-        places = np.array([[one.history.live[name] for one in proof.judged] for name in live])
-        labels = [_labelled(spec, name) for name in live]
-        panel: Panel | Map = _map(title, labels, places, [*live.values()], shares)
-    else:
-        name = next(iter(live), "")
-        places = np.array([one.history.live.get(name, one.number) for one in proof.judged])
-        order = np.argsort(places, kind="stable")
-        panel = Panel(
-            title=title,
-            x_label=_labelled(spec, name) if name else "history",
-            y_label="share of its limit (%)",
-            lines=[Line(name="history", x=places[order], y=shares[order], style=Style(dash="points"))],
-            levels=[Level(value=100.0)],
-        )
-    return Figure(
-        caption="Over what the block is given; white: no history there.",
-        panels=[panel],
-        columns=1,
+    names = [*live] if len(live) == 2 else [*live][:1]
+    places = [[one.history.live[name] for one in proof.judged] for name in names]
+    panel = _shares_panel(
+        "Worst residual sway",
+        [_labelled(spec, name) for name in names] or ["history"],
+        np.array(places or [[one.number for one in proof.judged]]),
+        [live[name] for name in names],
+        [proof.fraction(one) for one in proof.judged],
     )
+    caption = "Over what the block is given; white: no history there."
+    return Figure(caption=caption, panels=[panel], columns=1)
 
 
 def _labelled(spec: Spec, name: str) -> str:
@@ -274,14 +258,27 @@ def _centres(ends: tuple[float, float]) -> Array:
     return low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
 
 
-def _map(
+def _shares_panel(
     title: str,
     labels: Sequence[str],
     places: Array,
     ranges: Sequence[tuple[float, float]],
-    shares: Array,
-) -> Map:
-    """Draw the greatest share in each cell of two ranges; where no history was, not a number."""
+    fractions: Sequence[float],
+) -> Panel | Map:
+    """Draw histories' shares of the limit over one quantity, or the greatest in each cell of two ranges.
+
+    Places have the shape (quantities, histories). A cell in which no history was is not a number.
+    """
+    shares = 100.0 * np.array(fractions)
+    if len(labels) == 1:
+        order = np.argsort(places[0], kind="stable")
+        return Panel(
+            title=title,
+            x_label=labels[0],
+            y_label="share of its limit (%)",
+            lines=[Line(name="history", x=places[0][order], y=shares[order], style=Style(dash="points"))],
+            levels=[Level(value=100.0)],
+        )
     worst = np.full((CELLS, CELLS), np.nan)
     for place, share in zip(places.T.tolist(), shares, strict=True):
         cell = tuple(

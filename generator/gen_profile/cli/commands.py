@@ -316,20 +316,13 @@ def _check_motion(
     artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **options: Any
 ) -> Judgement:
     from gen_profile.artefacts.writing import deliver
-    from gen_profile.verification.check import check_artefact
-    from gen_profile.verification.scenario_table import table
+    from gen_profile.verification.check import check_artefact, scenario_table
 
     with progress() as tell:
         tell("checking by co-simulation")
-        judgement = check_artefact(
-            artefact,
-            spec,
-            row=scenario,
-            progress=tell,
-            **options,
-        )
+        judgement = check_artefact(artefact, spec, row=scenario, progress=tell, **options)
     if table_path is not None:
-        deliver(table_path, table(judgement.spec, judgement.check).encode("utf-8"))
+        deliver(table_path, scenario_table(judgement).encode("utf-8"))
     return judgement
 
 

@@ -8,12 +8,10 @@ from typing import Any
 import attrs
 import tomli_w
 
-from gen_profile.artefacts.manifest import sha256, versions
+from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.charts.proof import damping_figures, history_figure, map_figure, worst_damped
 from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, number
-from gen_profile.planner.commands import Command
-from gen_profile.planner.interface import BlockAxis
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.check import BlockJudgement, check_block
 from gen_profile.proof.closed_loop import Trace, trace
@@ -78,14 +76,12 @@ def _page(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Pa
     live = ", ".join(
         f"{name} {low:g} to {high:g} {units[name]}" for name, (low, high) in spec.planner.live.items()
     )
-    libraries = ", ".join(f"{library} {number}" for library, number in versions())
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
         verdicts=[_verdict(proof, judgement.path)],
         facts=_facts(proof),
         sections=[*_sections(judgement, followed, gusty)],
-        colophon=f"Made by {libraries}.",
     )
 
 
@@ -179,17 +175,11 @@ def _worst_load(proof: Proof, judged: JudgedHistory) -> str:
 
 def _commands(history: History) -> str:
     """Write a history's commands as the table that `planner play` reads."""
-    axes = list(history.axes.values())
-    rows = [
-        ",".join([f"{command.time:.6g}", command.command, *_cells(command, axes)])
-        for command in history.commands
-    ]
-    return "\n".join([",".join(["time_s", "command", *(axis.of("value") for axis in axes)]), *rows])
-
-
-def _cells(command: Command, axes: Sequence[BlockAxis]) -> list[str]:
-    """Write a command's values, empty where it has none."""
-    return [f"{value:.6g}" for value in command.values] or [""] * len(axes)
+    rows = [["time_s", "command", *(axis.of("value") for axis in history.axes.values())]]
+    for one in history.commands:
+        values = [f"{value:.6g}" for value in one.values] or [""] * len(history.axes)
+        rows.append([f"{one.time:.6g}", one.command, *values])
+    return "\n".join(map(",".join, rows))
 
 
 def _ranking(spec: Spec, proof: Proof) -> Table:

@@ -16,22 +16,25 @@ from gen_profile.charts.curves import (
     sway_figure,
 )
 from gen_profile.charts.figure import PLAIN
+from gen_profile.charts.robustness import curves_figure, maps_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison
+from gen_profile.comparison.robustness import Robustness, error_grid, robustness_of
 from gen_profile.designs.design import Design
 from gen_profile.evaluation.demands import demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
 from gen_profile.motion.metrics import extremes
-from gen_profile.report.actors import animation
+from gen_profile.report.animation import animation
 from gen_profile.report.content import Block, Listing, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.measured import Measured
 from gen_profile.report.measured_section import measured_section
-from gen_profile.report.robustness import robustness_section
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 from gen_profile.verification.verdict import Check
 
+MOST_CURVES = 4  # parameters that have a curve each
+MAPPED = 4  # methods that have a map each
 MOST_LISTED = 40  # scenarios; the worst of them say enough
 GROUPED = ("how many", "median (mm)", "99 % (mm)", "worst (mm)", "verdict")
 # head → figure, and how many of the head's unit make one of the figure's
@@ -176,7 +179,7 @@ def _scenarios(check: Check) -> Iterator[Table]:
     if len(groups) > 1:
         yield Table(head=("scenarios", "", *GROUPED), rows=[_group(group) for group in groups], words=2)
     loads = list(check.limit)
-    worst_first = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))
+    worst_first = sorted(check.findings, key=check.fraction_after, reverse=True)
     listed = worst_first[:MOST_LISTED]
     what = "scenario" if len(listed) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
     yield Table(
@@ -186,7 +189,7 @@ def _scenarios(check: Check) -> Iterator[Table]:
                 cells=(
                     machine(finding.scenario.name),
                     *(number(1e3 * finding.residual[load]) for load in loads),
-                    Share(_demand(check, finding.residual)),
+                    Share(check.fraction_after(finding)),
                     "passed" if check.keeps_limit(finding) else "failed",
                 ),
                 mark="" if check.keeps_limit(finding) else "failed",
@@ -211,18 +214,45 @@ def _group(group: Mapping[str, Any]) -> TableRow:
     )
 
 
-def _demand(check: Check, residual: Mapping[str, float]) -> float:
-    return max((residual[load] + check.error_bound) / limit for load, limit in check.limit.items())
-
-
 def _robustness(spec: Spec, evaluation: MotionEvaluation, comparison: Comparison | None) -> Section | None:
-    own = own_method(spec)
-    if comparison is None:
-        return robustness_section(spec, own, {own: evaluation.motion}, {own: PLAIN})
-    motions = {row.method: row.evaluation.motion for row in comparison.rows}
-    return robustness_section(
-        spec, own, {**motions, own: evaluation.motion}, {own: PLAIN, **compared_styles(comparison)}
-    )
+    """Draw residual sway over the error of every uncertain parameter, and over two of them together.
+
+    None where the spec states none. Where there are many, those are drawn with which the design sways most.
+    """
+    own, names = own_method(spec), list(spec.robustness.uncertain)
+    if not names:
+        return None
+    motions, styles = {own: evaluation.motion}, {own: PLAIN}
+    if comparison is not None:
+        motions = {row.method: row.evaluation.motion for row in comparison.rows} | motions
+        styles |= compared_styles(comparison)
+    curves = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    telling = sorted(names, key=lambda name: float(curves[name].fraction(own).max()), reverse=True)
+    drawn = {name: one for name, one in curves.items() if name in telling[:MOST_CURVES]}
+    figure = curves_figure(drawn, styles)
+    if len(names) > MOST_CURVES:
+        more = f" Of {len(names)} uncertain parameters those {MOST_CURVES} with which it sways most."
+        figure = attrs.evolve(figure, caption=figure.caption + more)
+    figures = [figure]
+    if len(names) > 1:
+        shown = [own, *(method for method in motions if styles[method].shown and method != own)][:MAPPED]
+        both = {method: motions[method] for method in shown}
+        pair = [name for name in names if name in telling[:2]]
+        figures.append(maps_figure(robustness_of(spec, both, error_grid(spec, pair))))
+    words = " ".join(_reach(name, one, own) for name, one in curves.items())
+    return Section(title="Robustness", words=[words], blocks=figures)
+
+
+def _reach(name: str, curve: Robustness, own: str) -> str:
+    """Say between which errors every load keeps its limit."""
+    reach = curve.insensitivity(own)
+    if reach is None:
+        return f"On the machine as specified a load exceeds its limit, whatever {name}."
+    low, high = (f"{100.0 * end:+.3g}\N{NO-BREAK SPACE}%".replace("-", "−") for end in reach)
+    (errors,) = curve.errors.values()
+    if reach == (errors[0], errors[-1]):
+        return f"Every load keeps its limit over all errors of {name} tried, {low} to {high}."
+    return f"Every load keeps its limit while the error of {name} is between {low} and {high}."
 
 
 def _methods(comparison: Comparison) -> Section:

@@ -21,7 +21,7 @@ from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, peak
 from gen_profile.phrase import PLACED, Phrase
 from gen_profile.problem.limits import ROUNDING
-from gen_profile.report.actors import animation
+from gen_profile.report.animation import animation
 from gen_profile.solvers.method_selection import ANSWER
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec

@@ -1,7 +1,10 @@
 """Judging an artefact that lies on disk, whatever wrote it, as planned or smaller, mirrored or elsewhere."""
 
+import csv
 import math
 from collections.abc import Mapping, Sequence
+from io import StringIO
+from itertools import chain
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -13,7 +16,7 @@ from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
-from gen_profile.motion.profile import Array, SampledProfile, columns_of
+from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec, spec_from_dict
@@ -22,6 +25,7 @@ from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
+from gen_profile.verification.setpoint_path import lag_of, path_taken
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import target_of
@@ -45,14 +49,6 @@ class MotionVariant:
     scale: Mapping[str, float] = attrs.field(factory=dict)
     mirror: tuple[str, ...] = ()
     offset: Mapping[str, float] = attrs.field(factory=dict)
-
-    def gain(self, axes: Sequence[str]) -> Array:
-        """Signed factor of every axis's distance."""
-        return np.array([(-1.0 if name in self.mirror else 1.0) * self.scale.get(name, 1.0) for name in axes])
-
-    def shift(self, axes: Sequence[str]) -> Array:
-        """Offset of every axis."""
-        return np.array([self.offset.get(name, 0.0) for name in axes])
 
     def described(self) -> str | None:
         """Describe it in words, or not at all where the motion is as planned."""
@@ -85,8 +81,9 @@ def parse_variant(
 
 def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tuple[Spec, SampledProfile]:
     """Change a motion, and the move that it is judged by."""
-    gain, shift = variant.gain(list(spec.axis)), variant.shift(list(spec.axis))
-    start = np.array(spec.move.start)
+    start, signs = np.array(spec.move.start), dict.fromkeys(variant.mirror, -1.0)
+    gain = np.array([signs.get(name, 1.0) * variant.scale.get(name, 1.0) for name in spec.axis])
+    shift = np.array([variant.offset.get(name, 0.0) for name in spec.axis])
 
     move = attrs.evolve(
         spec.move,
@@ -223,6 +220,35 @@ def check_artefact(
     return Judgement(
         path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant.described()
     )
+
+
+def scenario_table(judgement: Judgement) -> str:
+    """Write a row per scenario as CSV, numbers as exactly as they were calculated.
+
+    Columns are the scenario's number, group and name; the machine's parameters (``plant.L1`` …) and the path
+    of its setpoints (``path.lag`` …), in the spec's units; the residual sway of every load in m, the bound of
+    its error in m, and whether the limits are kept: ``passed`` or ``failed``.
+    """
+    spec, check = judgement.spec, judgement.check
+    rows: list[dict[str, object]] = []
+    for finding in chain(*check.groups.values()):
+        scenario = finding.scenario
+        path = attrs.asdict(path_taken(spec, scenario)) | {"lag": lag_of(spec, scenario)}
+        rows.append(
+            {
+                **{"row": scenario.row, "group": scenario.group, "name": scenario.name},
+                **{f"plant.{name}": scenario.parameters[name] for name in spec.plant.parameters},
+                **{f"path.{name}": value for name, value in path.items()},
+                **{f"{load}_m": finding.residual[load] for load in check.limit},
+                "error_bound_m": check.error_bound,
+                "verdict": "passed" if check.keeps_limit(finding) else "failed",
+            }
+        )
+    text = StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
 
 
 def replayed(path: Path, spec: Spec) -> SampledProfile:

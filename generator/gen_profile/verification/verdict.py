@@ -262,9 +262,12 @@ class Check(Drawable, Tabled, Examination):
             kept += [first, *[finding for finding in rest if self._share(finding) >= least]]
         return tuple(kept)
 
+    def fraction_after(self, finding: Finding) -> float:
+        """Greatest share that any load takes up of its limit of residual sway, the error bound included."""
+        return max(self._share_after(finding, load) for load in self.limit)
+
     def _share(self, finding: Finding) -> float:
-        after = max(self._share_after(finding, load) for load in self.limit)
-        return max(after, self._share_on_the_way(finding))
+        return max(self.fraction_after(finding), self._share_on_the_way(finding))
 
     def _end_load(self, finding: Finding) -> float:
         return max(finding.residual[load] for load in list(self.limit)[-self.directions :])
