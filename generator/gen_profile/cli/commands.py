@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,20 +23,19 @@ from gen_profile.cli.options import (
     folder_option,
     output_options,
     plot_option,
+    repeatable,
     require_formats,
     scheduler_option,
     spec_options,
     version_option,
 )
-from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
+from gen_profile.cli.outcome import fail, leave_unproved, not_written, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.cli.signing import require_signature, sign, signed_by_option, signing_key, signing_option
 from gen_profile.errors import CertificateError, OutputError, SpecError
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.certificate.document import Certificate
     from gen_profile.designs.design import Design
     from gen_profile.plants.plant import Plant
@@ -72,33 +73,25 @@ def design(
     chosen: SpecChoice,
     formats: tuple[str, ...],
     folder: Path,
-    cycle_time: str | None,
-    plc_layout: str | None,
-    csv_dialect: str | None,
-    csv_columns: str | None,
+    *,
     method: str | None,
     no_check: bool,
     keep_failed: bool,
     certify: bool,
     key_path: Path | None,
     as_json: bool,
+    **export: str | None,
 ) -> None:
     """Design, export and verify (the default)."""
     if certify and no_check:
         raise SpecError("--certify: proves what the check has passed; leave --no-check out.")
-    columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
-    stated = {
-        "export.cycle_time": cycle_time,
-        "can.sync_period": cycle_time,
-        "export.plc_layout": plc_layout,
-        "export.csv_dialect": csv_dialect,
-        "export.csv_columns": columns,
-        "solver.method": method,
-    }
+    stated: dict[str, object] = {f"export.{key}": value for key, value in export.items()}
+    if (columns := export["csv_columns"]) is not None:
+        stated["export.csv_columns"] = [name.strip() for name in columns.split(",")]
+    stated |= {"can.sync_period": export["cycle_time"], "solver.method": method}
     spec = chosen.changed(stated).spec()
     require_formats(formats)
     key = signing_key(key_path)
-    from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.designs.design import design as run
 
@@ -108,13 +101,11 @@ def design(
         sign(folder, key)
     certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])
     worst = max(certificates.values(), key=lambda certificate: certificate.demand, default=None)
-    document = outcome.to_dict() | {"certificate": None if worst is None else worst.to_dict()}
+    document = outcome.to_dict() | {"certificate": worst and worst.to_dict()}
     print_outcome(document, words.design(outcome, certificates), as_json)
     warn(outcome.check)
     if not outcome.passed and outcome.check is not None:
-        before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
-        kept = "The files were kept." if outcome.artefacts else f"Nothing was written{before}."
-        fail(outcome.check.reasons(), kept)
+        fail(outcome.check.reasons(), "The files were kept." if outcome.artefacts else not_written(folder))
     if refusals:
         leave_unproved(refusals)
 
@@ -195,15 +186,7 @@ def compare(
 @click.option("--csv", "path", type=OutputFile(), help="Write the numbers as a table.")
 @output_options
 def robustness(
-    chosen: SpecChoice,
-    *,
-    parameters: tuple[str, ...],
-    methods: tuple[str, ...],
-    half_range: float | None,
-    points: int | None,
-    picture: Path | None,
-    path: Path | None,
-    as_json: bool,
+    chosen: SpecChoice, *, picture: Path | None, path: Path | None, as_json: bool, **options: Any
 ) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     spec = chosen.spec()
@@ -212,7 +195,7 @@ def robustness(
     from gen_profile.comparison.robustness import robustness as run
 
     with progress() as tell:
-        curves = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
+        curves = run(spec, **options, progress=tell)
         draw(curves, picture, tell)
         if path is not None:
             deliver(path, curves.table().encode("utf-8"))
@@ -225,24 +208,9 @@ def robustness(
 @click.option("--samples", type=Count(0, 1_000_000), help="Draw N machines, in place of check.samples.")
 @click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
 @click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
-@click.option(
-    "--scale",
-    metavar="AXIS=FACTOR",
-    multiple=True,
-    help="Judge the motion smaller along an axis, as a playback block plays it. Repeatable.",
-)
-@click.option(
-    "--mirror",
-    metavar="AXIS",
-    multiple=True,
-    help="Judge the motion the other way along an axis. Repeatable.",
-)
-@click.option(
-    "--offset",
-    metavar="AXIS=DISTANCE",
-    multiple=True,
-    help="Judge the motion begun elsewhere along an axis, in m or rad. Repeatable.",
-)
+@repeatable("--scale", "AXIS=FACTOR", "Judge the motion smaller along an axis, as a playback block plays it.")
+@repeatable("--mirror", "AXIS", "Judge the motion the other way along an axis.")
+@repeatable("--offset", "AXIS=DISTANCE", "Judge the motion begun elsewhere along an axis, in m or rad.")
 @click.option("--csv", "table_path", type=OutputFile(), help="Write all scenarios as a table, one row each.")
 @certify_option
 @click.option("--certificate", type=InputFile(), help="Check a certificate again, and nothing else.")
@@ -290,8 +258,8 @@ def check(
         judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
         certificate = _certified(judgement.path, spec) if _to_certify(judgement, options) else None
         text, document = words.judgement(judgement, certificate), judgement.to_dict()
-        document["certificate"] = None if certificate is None else certificate.to_dict()
-        unproved = () if certificate is None else certificate.reasons()
+        document["certificate"] = certificate and certificate.to_dict()
+        unproved = certificate.reasons() if certificate else ()
     print_outcome(document, text, as_json)
     warn(judgement.check)
     if not judgement.check.passed:
@@ -337,9 +305,7 @@ def _certified(path: Path, spec: Spec | None) -> Certificate:
     from gen_profile.certificate.from_file import certify_artefact
 
     with progress() as tell:
-        return certify_artefact(
-            path, spec, progress=lambda done, total: tell("proving it for boxes of machines", done, total)
-        )
+        return certify_artefact(path, spec, progress=partial(tell, "proving it for boxes of machines"))
 
 
 def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_json: bool) -> None:
@@ -347,12 +313,8 @@ def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_js
     from gen_profile.cli import words
 
     with progress() as tell:
-        proved = check_certificate(
-            artefact,
-            certificate,
-            spec,
-            progress=lambda done, total: tell("proving it again for boxes of machines", done, total),
-        )
+        stage = "proving it again for boxes of machines"
+        proved = check_certificate(artefact, certificate, spec, progress=partial(tell, stage))
     print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved), as_json)
 
 

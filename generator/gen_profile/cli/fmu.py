@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import click
 
@@ -11,9 +11,6 @@ from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
 KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
@@ -13,9 +14,6 @@ from gen_profile.cli.outcome import print_warnings
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from os import PathLike
-    from pathlib import Path
-
     from gen_profile.spec.model import Spec
 
 DEFAULT_PRESET = "paper"
@@ -32,13 +30,10 @@ class Count(click.IntRange):
 
 
 class PathType(click.Path):
-    """A path as Python's own type, which takes a while to load and is not needed to tell what there is."""
+    """A path as Python's own type."""
 
-    def coerce_path_result(self, value: str | PathLike[str]) -> Path:
-        """Make a path of a word."""
-        from pathlib import Path
-
-        return Path(value)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(path_type=Path, **options)
 
 
 class InputFile(PathType):
@@ -177,13 +172,7 @@ def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
         shell_complete=complete_presets,
         help="Use a built-in spec (see gen-profile presets).",
     )
-    @click.option(
-        "--set",
-        "overrides",
-        metavar="KEY=VALUE",
-        multiple=True,
-        help="Override a key of the spec, such as plant.L1=0.5. Repeatable.",
-    )
+    @repeatable("--set", "KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
     @wraps(command)
     def choosing(
         *, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], **options: Any
@@ -192,6 +181,14 @@ def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(chosen=chosen, **options)
 
     return choosing
+
+
+def repeatable(
+    option: str, metavar: str, text: str, *, into: str | None = None
+) -> Callable[[Command], Command]:
+    """Make an option that may be given more than once; its values go into one parameter."""
+    words = f"{text} Repeatable."
+    return click.option(option, into or option[2:], metavar=metavar, multiple=True, help=words)
 
 
 def with_options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -294,8 +291,6 @@ def output_options(command: Command) -> Command:
 
 def _require_apart(context: click.Context) -> None:
     """Refuse to write a file that is read, or two files of one name."""
-    from pathlib import Path
-
     files: dict[Path, click.Parameter] = {}
     by_role = sorted(context.command.params, key=lambda parameter: isinstance(parameter.type, OutputFile))
     for parameter in by_role:

@@ -14,6 +14,8 @@ import click
 from gen_profile.errors import CertificateError, CheckFailed, GenProfileError, NoMotion, OutputError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.proof.verdict import Proof
     from gen_profile.verification.verdict import Check
 
@@ -48,6 +50,14 @@ def print_warnings(sentences: Iterable[str]) -> None:
         if sentence not in said:
             click.echo(f"Warning: {sentence}", err=True)
         said.add(sentence)
+
+
+def not_written(folder: Path) -> str:
+    """Say that nothing was delivered to a folder now."""
+    from gen_profile.artefacts.manifest import FILENAME
+
+    before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
+    return f"Nothing was written{before}."
 
 
 def fail(reasons: Sequence[str], consequence: str = "") -> NoReturn:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -22,19 +23,18 @@ from gen_profile.cli.options import (
     block_plot_option,
     folder_option,
     output_options,
+    repeatable,
     scheduler_option,
     spec_options,
     with_options,
 )
-from gen_profile.cli.outcome import fail, print_outcome, print_warnings, warn
+from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, signing_key, signing_option
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.progress import Progress
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.streaming.outcome import Source
 
 CLEARED = "\r\x1b[K"  # the line, of a terminal
@@ -84,19 +84,18 @@ def write(
     chosen: SpecChoice,
     formats: tuple[str, ...],
     folder: Path,
+    *,
     histories: int | None,
-    scheduler: str | None,
     no_check: bool,
-    keep_failed: bool,
     picture: Path | None,
     key_path: Path | None,
     as_json: bool,
+    **options: Any,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
     spec = chosen.spec()
     if picture is not None and no_check:
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
-    from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.designs.planner import deploy_planner
     from gen_profile.planner.forms import require_forms
@@ -111,9 +110,8 @@ def write(
             folder,
             histories=histories or HISTORIES,
             check=not no_check,
-            keep_failed=keep_failed,
-            scheduler=scheduler,
             progress=tell,
+            **options,
         )
         if picture is not None and outcome.proof is not None:
             from gen_profile.charts.proof import draw
@@ -125,8 +123,7 @@ def write(
     warn(outcome.proof)
     print_warnings(outcome.warnings)
     if outcome.proof is not None and not outcome.proof.passed:
-        before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
-        kept = "The block was kept." if outcome.files else f"Nothing was written{before}."
+        kept = "The block was kept." if outcome.files else not_written(folder)
         if outcome.suggestions:
             tried = "; or with ".join(
                 f"{one} ({100.0 * one.fraction:.0f} % of the limit)" for one in outcome.suggestions
@@ -244,12 +241,11 @@ planner_options = with_options(
         type=InputFile(),
         help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
     ),
-    click.option(
+    repeatable(
         "--live-parameter",
-        "live_parameters",
-        metavar="NAME=VALUE",
-        multiple=True,
-        help="What a live parameter of --planner is from the start. Repeatable.",
+        "NAME=VALUE",
+        "What a live parameter of --planner is from the start.",
+        into="live_parameters",
     ),
 )
 

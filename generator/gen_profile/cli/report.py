@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -15,6 +16,7 @@ from gen_profile.cli.options import (
     SpecChoice,
     export_option,
     output_options,
+    repeatable,
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome
@@ -22,8 +24,6 @@ from gen_profile.cli.progress import progress
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.spec.model import Spec
 
 
@@ -35,12 +35,11 @@ if TYPE_CHECKING:
     type=OutputFile(),
     help="File to write, .html or .pdf; an .html named after the spec in this folder by default.",
 )
-@click.option(
+@repeatable(
     "--field",
-    "fields",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="What the page shall also say, as Customer=ACME; without a value, a line to sign. Repeatable.",
+    "NAME=VALUE",
+    "What the page shall also say, as Customer=ACME; without a value, a line to sign.",
+    into="fields",
 )
 @export_option("Format whose file is checked and named by its hash")
 @click.option(
@@ -70,30 +69,21 @@ def report(
     path: Path | None,
     fields: tuple[str, ...],
     formats: tuple[str, ...],
-    log: Path | None,
-    log_start: float | None,
-    log_columns: str | None,
     no_compare: bool,
     as_json: bool,
+    **log: Any,
 ) -> None:
     """Write everything about a design, or about a planner block and its proof, into one HTML file."""
     from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.report.print import printed, require_browser
 
-    options = {
-        "log": log,
-        "log_start": log_start,
-        "log_columns": log_columns,
-        "compared": not no_compare,
-    }
+    options = {**log, "compared": not no_compare}
     if chosen.path is not None and _holds_block(chosen.path):
         made_of = _of_block(chosen.path)
     elif chosen.path is not None and _is_artefact(chosen.path):
         made_of = _of_artefact(chosen.path, **options)
     else:
         made_of = _of_design(chosen.spec(), formats, **options)
-    from pathlib import Path
-
     out = path or Path(f"{made_of.name}.html")
     on_paper = out.suffix.lower() == ".pdf"
     if not on_paper and out.suffix.lower() not in {".html", ".htm"}:

@@ -5,6 +5,7 @@ The key is named by the user alone: a spec may be a stranger's.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,7 +15,6 @@ from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from gen_profile.artefacts.signature import Key
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,8 +16,6 @@ from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.cli.options import SpecChoice
     from gen_profile.studio.watching import Watching
 

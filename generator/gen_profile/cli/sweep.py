@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import click
 
@@ -19,9 +19,6 @@ from gen_profile.cli.options import (
 )
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @cli.command(
@@ -154,6 +151,4 @@ def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
             "name one folder or file that was swept to, and a value for every key varied there, "
             "such as --plant.L1 5.2."
         )
-    from pathlib import Path
-
     return Path(folders[0]), asked

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,6 @@ from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, named, number
 from gen_profile.units import RATES
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.certificate.document import Certificate
     from gen_profile.comparison.compare import Comparison
     from gen_profile.comparison.robustness import Robustness

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext, redirect_stdout
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +13,14 @@ from gen_profile.cli.commands import cli, design
 from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
-from gen_profile.cli.options import PathType, SpecChoice, complete_presets, output_options, require_formats
+from gen_profile.cli.options import (
+    PathType,
+    SpecChoice,
+    complete_presets,
+    output_options,
+    repeatable,
+    require_formats,
+)
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.report import report
 from gen_profile.errors import GenProfileError, OutputError
@@ -20,7 +28,6 @@ from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from gen_profile.spec.model import Spec
 
@@ -51,7 +58,7 @@ Words = tuple[str, ...]
     shell_complete=complete_presets,
     help="What a spec that is not there begins as.",
 )
-@click.option("--set", "overrides", metavar="KEY=VALUE", multiple=True, help="A key of it. Repeatable.")
+@repeatable("--set", "KEY=VALUE", "A key of it.", into="overrides")
 @click.option(
     "--swing", metavar="CSV|URL", help="Log of a free swing, or a phone's address, as for log-swing."
 )
@@ -63,7 +70,7 @@ Words = tuple[str, ...]
     default=60.0,
     help="To log the phone for; 60 s.",
 )
-@click.option("--export", "formats", metavar="FORMAT", multiple=True, help="Format to write. Repeatable.")
+@repeatable("--export", "FORMAT", "Format to write.", into="formats")
 @click.option(
     "--to", "url", metavar="URL", help="Controller to deploy to, as for deploy; an empty text for none."
 )
@@ -180,8 +187,6 @@ class _Guide:
 
     def logged(self, path: Path) -> tuple[Path | None, dict[str, str]]:
         """Give the log of a swing, which a phone may write now, and what it is a log of."""
-        from pathlib import Path
-
         swing = self.answer(
             "swing", "Log of a free swing: a file, or a phone's address; nothing for none", ""
         )

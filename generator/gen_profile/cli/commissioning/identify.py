@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,6 +17,7 @@ from gen_profile.cli.options import (
     SpecChoice,
     output_options,
     plot_option,
+    repeatable,
     require_formats,
     spec_options,
 )
@@ -24,8 +26,6 @@ from gen_profile.cli.progress import draw, progress
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.identification.measurements import SwingLog
     from gen_profile.spec.model import Spec
 
@@ -74,19 +74,17 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @cli.command(epilog="Example: gen-profile identify crane.toml --measured L1=6.2±0.1 --period 51.3±0.3/10")
 @spec_options
-@click.option(
+@repeatable(
     "--measured",
-    "readings",
-    metavar="NAME=VALUE±U",
-    multiple=True,
-    help="A parameter read off a tape or scale, with its standard deviation (+- will do for ±). Repeatable.",
+    "NAME=VALUE±U",
+    "A parameter read off a tape or scale, with its standard deviation (+- will do for ±).",
+    into="readings",
 )
-@click.option(
+@repeatable(
     "--period",
-    "periods",
-    metavar="[MODE:]S±U[/N]",
-    multiple=True,
-    help="N small swings by stopwatch, of the slowest mode (1) by default. Repeatable.",
+    "[MODE:]S±U[/N]",
+    "N small swings by stopwatch, of the slowest mode (1) by default.",
+    into="periods",
 )
 @click.option(
     "--swing",
@@ -103,12 +101,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     default=0.0,
     help="Leave out what the log holds before this time; of dates, so long after the first.",
 )
-@click.option(
-    "--free",
-    metavar="NAME",
-    multiple=True,
-    help="Identify a parameter that was not read directly. Repeatable.",
-)
+@repeatable("--free", "NAME", "Identify a parameter that was not read directly.")
 @click.option(
     "--at", metavar="POSITION,…", help="Where the axes stood, in m or rad; at the move's target by default."
 )
@@ -175,11 +168,8 @@ def _positions(text: str) -> list[float]:
     type=InputFile(),
     help="The file whose setpoints the axes followed in these runs.",
 )
-@click.option(
-    "--seen",
-    metavar="LOAD=M±M",
-    multiple=True,
-    help="Greatest sway in m after a run as it was seen, within a bound (+- will do for ±). Repeatable.",
+@repeatable(
+    "--seen", "LOAD=M±M", "Greatest sway in m after a run as it was seen, within a bound (+- will do for ±)."
 )
 @log_options
 @click.option(
@@ -188,12 +178,11 @@ def _positions(text: str) -> list[float]:
     default="learned.toml",
     help="Spec to write; ./learned.toml by default.",
 )
-@click.option(
+@repeatable(
     "--export",
-    "formats",
-    metavar="FORMAT",
-    multiple=True,
-    help="Design for the ranges that are left, check, and write in this format. Repeatable.",
+    "FORMAT",
+    "Design for the ranges that are left, check, and write in this format.",
+    into="formats",
 )
 @click.option(
     "--folder",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import click
@@ -16,8 +17,6 @@ from gen_profile.cli.outcome import print_outcome, print_warnings
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.identification.encoder import Encoder
     from gen_profile.motion.profile import Array
 

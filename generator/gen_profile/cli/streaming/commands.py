@@ -5,12 +5,20 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options, with_options
+from gen_profile.cli.options import (
+    OutputFile,
+    SpecChoice,
+    output_options,
+    repeatable,
+    spec_options,
+    with_options,
+)
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
@@ -19,8 +27,6 @@ from gen_profile.errors import OutputError, StreamAborted
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.streaming.outcome import Source, StreamOutcome
 
 FEW_ROWS, CELL = 10_000, 16  # of a log of unknown length, and bytes of a number in it
@@ -43,12 +49,7 @@ _bus_options = with_options(
 @click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
 @click.option("--to-start", is_flag=True, help="Move slowly to the motion's start from anywhere, and end.")
-@click.option(
-    "--jog",
-    metavar="AXIS=DISTANCE",
-    multiple=True,
-    help="Move slowly by a distance in m (or rad) from anywhere, and end. Repeatable.",
-)
+@repeatable("--jog", "AXIS=DISTANCE", "Move slowly by a distance in m (or rad) from anywhere, and end.")
 @click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
 @click.option(
     "--self-test",
