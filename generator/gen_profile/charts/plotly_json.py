@@ -26,6 +26,7 @@ from gen_profile.motion.profile import Array
 EVEN = 1e-12  # of the last time, by which even steps may differ
 DIGITS = 6  # of a curve's largest value: finer than any screen, and a third of the bytes
 SHADE = "rgba(120,130,140,0.16)"
+DASHED = {"color": LIMIT, "dash": "dash", "width": 1.2}
 
 
 def figure_json(figure: Figure) -> dict[str, Any]:
@@ -71,7 +72,7 @@ def _bars(panel: Bars) -> dict[str, Any]:
     layout["xaxis"] |= {"range": [0, panel.end]}
     layout["yaxis"] |= {"autorange": "reversed"}
     limit = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": panel.limit, "x1": panel.limit}
-    layout["shapes"] = [{**limit, "line": {"color": LIMIT, "dash": "dash", "width": 1.2}}]
+    layout["shapes"] = [{**limit, "line": DASHED}]
     bars = {
         "type": "bar",
         "orientation": "h",
@@ -121,21 +122,19 @@ def rounded(values: Array) -> list[float | None]:
 
 
 def _trace(line: Line) -> dict[str, Any]:
-    points = line.style.dash == "points"
-    look = {"color": line.style.colour, "width": line.style.width}
+    style = line.style
+    look: dict[str, Any] = {"line": {"color": style.colour, "width": style.width, "dash": style.dash}}
+    if style.dash == "points":
+        look = {"marker": {"color": style.colour, "size": 3}}
     return {
         "type": "scatter",
-        "mode": "markers" if points else "lines",
+        "mode": "markers" if "marker" in look else "lines",
         "name": escape(line.name),
         "meta": line.name,
         **_abscissa(line.x),
         "y": rounded(line.y),
-        **(
-            {"marker": {"color": line.style.colour, "size": 3}}
-            if points
-            else {"line": {**look, "dash": line.style.dash}}
-        ),
-        "visible": line.style.shown,
+        **look,
+        "visible": style.shown,
     }
 
 
@@ -183,6 +182,6 @@ def _level(level: Level) -> dict[str, Any]:
         "x1": right,
         "y0": level.value,
         "y1": level.value,
-        "line": {"color": LIMIT, "dash": "dash", "width": 1.2},
+        "line": DASHED,
         "label": {"text": escape(level.name), "textposition": "end", "font": {"size": 11, "color": LIMIT}},
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import click
 
 from gen_profile.cli.commands import cli
@@ -51,19 +52,11 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
     if interface is not None and channel is not None:
         nodes = _nodes(Port(interface=interface, channel=channel), bitrate)
     by_interface = {name: detection.channels(name) for name in names}
-    document = {
-        "interfaces": [
-            {
-                "name": name,
-                "channels": [
-                    {"name": one.name, "bitrate": one.bitrate, "state": one.state} for one in channels
-                ],
-                "needs": detection.needs(name),
-            }
-            for name, channels in by_interface.items()
-        ],
-        "nodes": None if nodes is None else [_told(node) for node in nodes],
-    }
+    interfaces = [
+        {"name": name, "channels": list(map(attrs.asdict, channels)), "needs": detection.needs(name)}
+        for name, channels in by_interface.items()
+    ]
+    document = {"interfaces": interfaces, "nodes": None if nodes is None else list(map(_told, nodes))}
     lines = list(_interface_words(by_interface))
     if nodes is not None:
         lines += _node_words(nodes, f"{interface} {channel}")

@@ -256,7 +256,12 @@ def check(
     else:
         _require_only(options, (*MOTION_OPTIONS, "certify"), "a planner block, and this is none")
         judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
-        certificate = _certified(judgement.path, spec) if _to_certify(judgement, options) else None
+        if options["certify"] and judgement.variant is not None:
+            raise SpecError(
+                "--certify: is for the motion as planned, without --scale, --mirror and --offset."
+            )
+        certify = options["certify"] and judgement.check.passed
+        certificate = _certified(judgement.path, spec) if certify else None
         text, document = words.judgement(judgement, certificate), judgement.to_dict()
         document["certificate"] = certificate and certificate.to_dict()
         unproved = certificate.reasons() if certificate else ()
@@ -292,13 +297,6 @@ def _check_motion(
     if table_path is not None:
         deliver(table_path, scenario_table(judgement).encode("utf-8"))
     return judgement
-
-
-def _to_certify(judgement: Judgement, options: Mapping[str, Any]) -> bool:
-    """Tell whether to prove what a check has found; not where it failed."""
-    if options["certify"] and judgement.variant is not None:
-        raise SpecError("--certify: is for the motion as planned, without --scale, --mirror and --offset.")
-    return options["certify"] and judgement.check.passed
 
 
 def _certified(path: Path, spec: Spec | None) -> Certificate:
@@ -339,9 +337,8 @@ def formats(as_json: bool) -> None:
     from gen_profile_exporters.registry import formats as known
 
     rows = {name: f"{form.summary} ({form.suffix}; {form.proof})" for name, form in known().items()}
-    print_outcome(
-        {"formats": {name: form._asdict() for name, form in known().items()}}, _definitions(rows), as_json
-    )
+    document = {name: form._asdict() for name, form in known().items()}
+    print_outcome({"formats": document}, _definitions(rows), as_json)
 
 
 @cli.command(epilog="Example: gen-profile plants gantry-crane --plot crane.png")
@@ -411,17 +408,13 @@ def presets(name: str | None, path: Path | None, as_json: bool) -> None:
         return
     text = words = preset_text(name)
     if path is not None:
-        _write_new(path, text)
+        from gen_profile.artefacts.writing import deliver
+
+        if path.exists():
+            raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
+        deliver(path, text.encode("utf-8"))
         words = f"{path} is a copy of the preset {name}. Change it, then: gen-profile {path}"
     print_outcome({"preset": name, "toml": text}, words.rstrip("\n"), as_json)
-
-
-def _write_new(path: Path, text: str) -> None:
-    from gen_profile.artefacts.writing import deliver
-
-    if path.exists():
-        raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
-    deliver(path, text.encode("utf-8"))
 
 
 def _definitions(rows: dict[str, str]) -> str:

@@ -125,47 +125,35 @@ def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -
     """Put the page in the order in which an engineer asks."""
     spec, proof = judgement.spec, judgement.check
     worst = proof.worst
-    reported = worst.history.reported(spec.machine().units)
-    commands = len(worst.history.commands)
-    yield Section(
-        title="The worst history",
-        words=(
-            f"History {worst.number}: {commands} commands from {worst.history.start_words} on"
-            + (f"; the block is given {reported}." if reported else "."),
-        ),
-        blocks=[
-            history_figure(spec, proof, followed),
-            Listing(title="Its commands", text=_commands(worst.history)),
-        ],
-    )
+    started = f"{len(worst.history.commands)} commands from {worst.history.start_words} on"
+    words = f"History {worst.number}: {started}{_given(spec, worst.history)}."
+    commands = Listing(title="Its commands", text=_commands(worst.history))
+    figure = history_figure(spec, proof, followed)
+    yield Section(title="The worst history", words=[words], blocks=[figure, commands])
     if gusty is not None and (damped := worst_damped(proof)) is not None:
-        given = damped.history.reported(spec.machine().units)
-        yield Section(
-            title="Damping by the sensor",
-            words=[
-                f"History {damped.number}, of those with a sound sensor and gusts the one after which most "
-                + (f"remains; the block is given {given}." if given else "remains.")
-            ],
-            blocks=damping_figures(spec, proof, gusty),
+        words = (
+            f"History {damped.number}, of those with a sound sensor and gusts the one after which most "
+            f"remains{_given(spec, damped.history)}."
         )
+        figures = damping_figures(spec, proof, gusty)
+        yield Section(title="Damping by the sensor", words=[words], blocks=figures)
     if len(proof.judged) > 1:
         yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(spec, proof)])
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
     yield Section(title="How it was proved", blocks=[_groups(proof), Terms(rows=[*_proved(proof)])])
-    digest = sha256(read_artefact(judgement.path))
-    yield Section(
-        title="Files",
-        blocks=[
-            Terms(
-                rows=[
-                    (f"{judgement.path.name}, SHA-256", digest),
-                    ("Manifest", MANIFEST_WORDS[judgement.manifest]),
-                    ("Spec, SHA-256", spec.sha256()),
-                ]
-            ),
-            Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict())),
-        ],
-    )
+    files = [
+        (f"{judgement.path.name}, SHA-256", sha256(read_artefact(judgement.path))),
+        ("Manifest", MANIFEST_WORDS[judgement.manifest]),
+        ("Spec, SHA-256", spec.sha256()),
+    ]
+    whole = Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict()))
+    yield Section(title="Files", blocks=[Terms(rows=files), whole])
+
+
+def _given(spec: Spec, history: History) -> str:
+    """Continue a sentence by what the block is given in a history."""
+    given = history.reported(spec.machine().units)
+    return f"; the block is given {given}" if given else ""
 
 
 def _worst_load(proof: Proof, judged: JudgedHistory) -> str:

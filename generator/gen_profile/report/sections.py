@@ -100,17 +100,12 @@ def sections(
         words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),
         blocks=[animation(spec, evaluation, shown, check.arrival)],
     )
-    yield Section(
-        title="Limits and margins",
-        blocks=[_limits(spec, evaluation, outcome.figures, check)],
-    )
-    yield Section(
-        title="The motion", blocks=[motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]
-    )
-    yield Section(
-        title="The loads",
-        blocks=[sway_figure(spec, evaluation, shown, check.arrival), *_scenarios(check)],
-    )
+    limits = _limits(spec, evaluation, outcome.figures, check)
+    yield Section(title="Limits and margins", blocks=[limits])
+    figures = [motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]
+    yield Section(title="The motion", blocks=figures)
+    sways = sway_figure(spec, evaluation, shown, check.arrival)
+    yield Section(title="The loads", blocks=[sways, *_scenarios(check)])
     robust = _robustness(spec, evaluation, comparison)
     if robust is not None:
         yield robust
@@ -156,16 +151,9 @@ def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]
             unit, factor = place_unit(spec, column)
             low, high = (factor * end for end in limits.travel)
             least, most = (factor * end for end in extremes(evaluation.command, 0, column))
-            margin = min(least - low, high - most)
-            yield TableRow(
-                cells=(
-                    f"travel of {axis.name}",
-                    f"{number(least)} to {number(most)} {unit}",
-                    f"{number(low)} to {number(high)} {unit}",
-                    f"{number(margin)} {unit}",
-                    "",
-                ),
-            )
+            margin = f"{number(min(least - low, high - most))} {unit}"
+            ranges = (f"{number(a)} to {number(b)} {unit}" for a, b in ((least, most), (low, high)))
+            yield TableRow(cells=(f"travel of {axis.name}", *ranges, margin, ""))
 
 
 def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> TableRow:
@@ -180,38 +168,23 @@ def _scenarios(check: Check) -> Iterator[Table]:
         yield Table(head=("scenarios", "", *GROUPED), rows=[_group(group) for group in groups], words=2)
     loads = list(check.limit)
     worst_first = sorted(check.findings, key=check.fraction_after, reverse=True)
-    listed = worst_first[:MOST_LISTED]
-    what = "scenario" if len(listed) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
-    yield Table(
-        head=(what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
-        rows=[
-            TableRow(
-                cells=(
-                    machine(finding.scenario.name),
-                    *(number(1e3 * finding.residual[load]) for load in loads),
-                    Share(check.fraction_after(finding)),
-                    "passed" if check.keeps_limit(finding) else "failed",
-                ),
-                mark="" if check.keeps_limit(finding) else "failed",
-            )
-            for finding in listed
-        ],
-    )
+    rows = []
+    for finding in worst_first[:MOST_LISTED]:
+        sways = (number(1e3 * finding.residual[load]) for load in loads)
+        mark = "" if check.keeps_limit(finding) else "failed"
+        share = Share(check.fraction_after(finding))
+        cells: list[str | Share] = [machine(finding.scenario.name), *sways, share, mark or "passed"]
+        rows.append(TableRow(cells=cells, mark=mark))
+    what = "scenario" if len(rows) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
+    head = (what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict")
+    yield Table(head=head, rows=rows)
 
 
 def _group(group: Mapping[str, Any]) -> TableRow:
     sways = (group["quantiles_m"]["0.5"], group["quantiles_m"]["0.99"], group["worst"]["residual_peak_m"])
-    verdict = "passed" if group["passed"] else "failed"
-    return TableRow(
-        cells=(
-            group["group"],
-            group["what"],
-            str(group["rows"]),
-            *(number(1e3 * sway) for sway in sways),
-            verdict if group["counts"] else f"{verdict}, not counted",
-        ),
-        mark="" if group["passed"] else "failed",
-    )
+    mark, uncounted = "" if group["passed"] else "failed", "" if group["counts"] else ", not counted"
+    cells = [group["group"], group["what"], str(group["rows"]), *(number(1e3 * sway) for sway in sways)]
+    return TableRow(cells=[*cells, f"{mark or 'passed'}{uncounted}"], mark=mark)
 
 
 def _robustness(spec: Spec, evaluation: MotionEvaluation, comparison: Comparison | None) -> Section | None:
@@ -259,22 +232,14 @@ def _methods(comparison: Comparison) -> Section:
     spec = comparison.spec
     unit = spec.machine().actuated[0].unit
     own = own_method(spec)
-    table = Table(
-        head=("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front"),
-        rows=[
-            TableRow(
-                cells=(
-                    row.method,
-                    *(number(factor * row.figures[key]) for key, factor in COMPARED.values()),
-                    "yes" if row.safe else "no",
-                    "yes" if row.method in comparison.efficient else "",
-                ),
-                mark="own" if row.method == own else "",
-            )
-            for row in comparison.rows
-        ],
-    )
-    blocks: list[Block] = [table]
+    head = ("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front")
+    rows = []
+    for row in comparison.rows:
+        figures = (number(factor * row.figures[key]) for key, factor in COMPARED.values())
+        answers = ("yes" if row.safe else "no", "yes" if row.method in comparison.efficient else "")
+        mark = "own" if row.method == own else ""
+        rows.append(TableRow(cells=(row.method, *figures, *answers), mark=mark))
+    blocks: list[Block] = [Table(head=head, rows=rows)]
     if comparison.rows:
         figure = comparison_figure(comparison)
         more = " Click on a method's name to show or hide its curves."
@@ -293,10 +258,8 @@ def _methods(comparison: Comparison) -> Section:
 def _evidence(outcome: Design) -> Section:
     solution = outcome.plan.solution
     if solution is None:
-        shaper = outcome.spec.solver
-        words = (
-            f"The motion is a {shaper.base} move through the shaper {shaper.method}; nothing was optimised."
-        )
+        base, method = outcome.spec.solver.base, outcome.spec.solver.method
+        words = f"The motion is a {base} move through the shaper {method}; nothing was optimised."
         return Section(title="Solver evidence", words=(words,), blocks=[])
     optimum = solution.raise_for_status()
     blocks: list[Block] = [Terms(rows=[*_solver(solution)])]
@@ -325,29 +288,15 @@ def _solver(solution: Solution) -> Iterator[tuple[str, str]]:
 
 def _files(outcome: Design) -> Section:
     spec = outcome.spec
-    table = Table(
-        head=("format", "file", "bytes", "SHA-256"),
-        rows=[
-            TableRow(cells=(artefact.format, artefact.path, str(artefact.bytes), artefact.sha256))
-            for artefact in outcome.artefacts
-        ],
-        words=2,
-        code=True,
-    )
+    rows = [TableRow(cells=(a.format, a.path, str(a.bytes), a.sha256)) for a in outcome.artefacts]
+    table = Table(head=("format", "file", "bytes", "SHA-256"), rows=rows, words=2, code=True)
     hashes = {"Spec": spec.sha256(), "Motion": outcome.plan.evaluation.command.payload_hash()}
     if spec.plant.file is not None:
         hashes[f"Machine {spec.plant.file.name}"] = spec.plant.file.sha256
     if spec.check.foreign is not None:
         hashes[f"Judge {spec.check.foreign.name}"] = spec.check.foreign.sha256
-    return Section(
-        title="Files",
-        words=(
-            "gen-profile writes these very bytes for this spec in these formats"
-            + ("." if outcome.passed else ", where it may keep what failed its check: this did."),
-        ),
-        blocks=[
-            table,
-            Terms(rows=[(f"{name}, SHA-256", digest) for name, digest in hashes.items()]),
-            Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict())),
-        ],
-    )
+    words = "gen-profile writes these very bytes for this spec in these formats"
+    words += "." if outcome.passed else ", where it may keep what failed its check: this did."
+    digests = Terms(rows=[(f"{name}, SHA-256", digest) for name, digest in hashes.items()])
+    whole = Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict()))
+    return Section(title="Files", words=[words], blocks=[table, digests, whole])

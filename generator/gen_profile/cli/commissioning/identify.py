@@ -132,11 +132,8 @@ def identify(
     from gen_profile.identification.identify import identify as run
     from gen_profile.identification.identify import write_spec
     from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
-    from gen_profile.spec.reading import parse_spec
-    from gen_profile.spec.text import changed_text
 
-    text, source, folder = chosen.text()
-    spec = parse_spec(text, chosen.overrides, source, folder)
+    spec, rewritten = _to_change(chosen)
     if picture is not None and log is None:
         raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
     measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
@@ -146,8 +143,18 @@ def identify(
             measurements.append(read(log, spec, after))
         identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
         draw(identified, picture, tell)
-        write_spec(identified.spec, out, changed_text(text, chosen.overrides, spec, identified.spec, folder))
+        write_spec(identified.spec, out, rewritten(identified.spec))
     print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out), as_json)
+
+
+def _to_change(chosen: SpecChoice) -> tuple[Spec, Callable[[Spec], str]]:
+    """Read a spec, and give what writes another one into its text."""
+    from gen_profile.spec.reading import parse_spec
+    from gen_profile.spec.text import changed_text
+
+    text, source, folder = chosen.text()
+    spec = parse_spec(text, chosen.overrides, source, folder)
+    return spec, lambda other: changed_text(text, chosen.overrides, spec, other, folder)
 
 
 def _positions(text: str) -> list[float]:
@@ -213,19 +220,16 @@ def learn(
     from gen_profile.identification.identify import write_spec
     from gen_profile.identification.learning import learn as run
     from gen_profile.identification.measurements import parse_reading
-    from gen_profile.spec.reading import parse_spec
-    from gen_profile.spec.text import changed_text
     from gen_profile.verification.check import replayed
 
-    text, source, place = chosen.text()
-    spec = parse_spec(text, chosen.overrides, source, place)
+    spec, rewritten = _to_change(chosen)
     require_formats(formats)
     sights = [parse_reading(one, "seen") for one in seen]
     with progress() as tell:
         tell("reading the runs")
         setpoints = replayed(played, spec)
         learned = run(spec, setpoints, [*(read(log, spec) for log in logs), *sights], tell)
-        write_spec(learned.spec, out, changed_text(text, chosen.overrides, spec, learned.spec, place))
+        write_spec(learned.spec, out, rewritten(learned.spec))
         made = design(learned.spec, formats, folder, progress=tell) if formats else None
     document = {**learned.to_dict(), "path": str(out), "design": None if made is None else made.to_dict()}
     text = words.learning(learned, out)
