@@ -187,14 +187,11 @@ class Fit:
         parameters = self.parameters(unknowns)
         linear = self.machine.of(parameters).linear
         damped = linear.frequencies * np.sqrt(np.maximum(1.0 - linear.damping_ratios**2, 1e-12))
-        return np.array(
-            [
-                2.0 * np.pi / damped[reading.mode - 1]
-                if isinstance(reading, Period)
-                else parameters[reading.parameter]
-                for reading in self.readings
-            ]
+        values = (
+            2.0 * np.pi / damped[one.mode - 1] if isinstance(one, Period) else parameters[one.parameter]
+            for one in self.readings
         )
+        return np.array([*values])
 
     def parameters(self, unknowns: Array) -> dict[str, float]:
         """Put the unknowns' parameters among the others, by name."""

@@ -69,13 +69,11 @@ class Identification(Drawable):
 
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong with the measurements, though parameters were found; a sentence each."""
-        logs = (sentence for row in self.to_dict()["logs"] for sentence in _log_warnings(row))
-        if (factor := self.estimate.contradiction) == 1.0:
-            return tuple(logs)
-        return (
-            *logs,
-            Phrase("the readings contradict one another; ranges widened {factor:.2g} times", factor=factor),
-        )
+        logs = [sentence for row in self.to_dict()["logs"] for sentence in _log_warnings(row)]
+        if (factor := self.estimate.contradiction) != 1.0:
+            template = "the readings contradict one another; ranges widened {factor:.2g} times"
+            logs.append(Phrase(template, factor=factor))
+        return tuple(logs)
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -106,30 +104,26 @@ class Identification(Drawable):
                 }
                 for reading, model in zip(self.readings, estimated.model, strict=True)
             ],
-            "logs": [
-                {
-                    "load": log.load,
-                    "quantity": log.quantity,
-                    "samples": log.logged,
-                    "averages": len(log.times) if len(log.times) < log.logged else None,
-                    "lasts_s": float(log.times[-1]),
-                    "unit": log.unit,
-                    "swing": float(np.ptp(log.values)) / 2.0,
-                    "noise": noise,
-                    "unrest": initial_residual_ratio,
-                    "misfit": None
-                    if left is None
-                    else {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": widened},
-                }
-                for log, noise, initial_residual_ratio, left, widened in zip(
-                    self.logs,
-                    estimated.noise,
-                    estimated.initial_residual_ratio,
-                    estimated.misfits,
-                    estimated.widened,
-                    strict=True,
-                )
-            ],
+            "logs": [self._log(index) for index in range(len(self.logs))],
+        }
+
+    def _log(self, index: int) -> dict[str, Any]:
+        """Nest plain values of one log."""
+        log, found = self.logs[index], self.estimate
+        misfit = None
+        if (left := found.misfits[index]) is not None:
+            misfit = {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": found.widened[index]}
+        return {
+            "load": log.load,
+            "quantity": log.quantity,
+            "samples": log.logged,
+            "averages": len(log.times) if len(log.times) < log.logged else None,
+            "lasts_s": float(log.times[-1]),
+            "unit": log.unit,
+            "swing": float(np.ptp(log.values)) / 2.0,
+            "noise": found.noise[index],
+            "unrest": found.initial_residual_ratio[index],
+            "misfit": misfit,
         }
 
 
@@ -349,17 +343,13 @@ def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], ask
 
 def _identified(spec: Spec, estimated: Estimate) -> Spec:
     """Put the parameters and their ranges into a spec."""
-    shares = {
-        name: estimated.half_range[name] / abs(value)
-        for name, value in estimated.values.items()
-        if value != 0.0
-    }
+    known = {name: abs(value) for name, value in estimated.values.items() if value != 0.0}
+    shares = {name: estimated.half_range[name] / size for name, size in known.items()}
     wide = {name: fraction for name, fraction in shares.items() if fraction > WIDEST}
     if wide:
         template = "{name} to ±{percent:.0f} % only"
-        words = joined(
-            AND, [Phrase(template, name=name, percent=100.0 * fraction) for name, fraction in wide.items()]
-        )
+        each = [Phrase(template, name=name, percent=100.0 * share) for name, share in wide.items()]
+        words = joined(AND, each)
         if estimated.contradiction > 1.0:
             template = (
                 "The measurements contradict one another by {contradiction:.2g} times their "
@@ -369,28 +359,21 @@ def _identified(spec: Spec, estimated: Estimate) -> Spec:
         raise InfeasibleProblem(
             "The measurements determine {words}; measure better, or take it as known.", words=words
         )
-    values = {
-        name: _rounded(value, estimated.standard_uncertainty[name])
-        for name, value in estimated.values.items()
-    }
+    sigma = estimated.standard_uncertainty
+    values = {name: _rounded(value, sigma[name]) for name, value in estimated.values.items()}
     robustness = spec.robustness
     robust = robustness.method if robustness.uncertain else "sensitivity"
     stated = robustness.uncertain  # what a rope does in service: that it was measured once narrows nothing
-    found_shares = {
-        name: max(_rounded_up(fraction), stated.get(name, 0.0)) for name, fraction in shares.items()
-    }
-    uncertain = {**stated, **found_shares}
+    widened = {name: max(_rounded_up(share), stated.get(name, 0.0)) for name, share in shares.items()}
+    uncertain = {**stated, **widened}
     order = [name for name in spec.plant.parameters if name in uncertain]
-    return attrs.evolve(
-        spec,
-        plant=attrs.evolve(
-            spec.plant,
-            parameters={**spec.plant.parameters, **values},
-            defaults=tuple(name for name in spec.plant.defaults if name not in estimated.values),
-        ),
-        robustness=attrs.evolve(
-            robustness, method=robust, uncertain={name: uncertain[name] for name in order}
-        ),
+    return spec.changed(
+        {
+            "plant.parameters": {**spec.plant.parameters, **values},
+            "plant.defaults": tuple(name for name in spec.plant.defaults if name not in estimated.values),
+            "robustness.method": robust,
+            "robustness.uncertain": {name: uncertain[name] for name in order},
+        }
     )
 
 

@@ -194,25 +194,19 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
     rough = _rough(fit)
     begun: list[tuple[str, ...]] = [()]
     for _ in range(min(TRIED, len(more))):
-        sets = {
-            frozenset((*freed, name)): (*freed, name) for freed in begun for name in more if name not in freed
-        }
+        longer = [(*freed, name) for freed in begun for name in more if name not in freed]
+        sets = {frozenset(freed): freed for freed in longer}
         tried = {freed: _of_small_swings(rough.freed(freed), freed[-1]) for freed in sets.values()}
-        least = min(one.squares for one in tried.values())
-        equivalent = {
-            freed: one for freed, one in tried.items() if one.squares <= EQUIVALENT * least < math.inf
-        }
-        if not equivalent:
-            return ()
-        candidates = [
-            explained
-            for freed, one in equivalent.items()
-            if one.explains
-            and (explained := nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
-        ]
-        if likely := likeliest(candidates):
+        most = EQUIVALENT * min(one.squares for one in tried.values())
+        begun = [freed for freed, one in tried.items() if one.squares <= most < math.inf]
+        worthwhile = {freed: tried[freed].fit for freed in begun if tried[freed].explains}
+        found = (
+            nothing_left(attrs.evolve(one, models=fit.models), freed) for freed, one in worthwhile.items()
+        )
+        if likely := likeliest([one for one in found if one is not None]):
             return likely
-        begun = list(equivalent)
+        if not begun:
+            return ()
     return ()
 
 

@@ -150,12 +150,9 @@ class SwingModel:
         plant, is_rate = self.machine.plant, self.log.quantity == "rate"
         if self.small:
             order = [q.name for q in plant.parameters]
-            return np.stack(
-                [
-                    self._small_swing(dict(zip(order, map(float, row), strict=True)), start, count)
-                    for row, start in zip(machines, starts, strict=True)
-                ]
-            )
+            rows = (dict(zip(order, row, strict=True)) for row in machines.tolist())
+            pairs = zip(rows, starts, strict=True)
+            return np.stack([self._small_swing(parameters, start, count) for parameters, start in pairs])
         times = self.log.times[:count]
         apart = min(APART * self.period, 0.5 * float(np.diff(self.log.times).min()))
         if is_rate:  # half that time later, by which the start is another one

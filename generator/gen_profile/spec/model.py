@@ -337,14 +337,14 @@ class Spec(Drawable, Checked):
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
-        move, ranges = self.move, self.robustness.uncertain.items()
+        move = self.move
+        ranges = [f"{name} ±{100.0 * share:g} %" for name, share in self.robustness.uncertain.items()]
         return {
             "name": self.name,
             "machine": self.plant.type,
             "move": f"{list(move.start)} to {list(move.target)}",
             "duration": "the shortest" if move.shortest else f"{move.duration:g} s",
-            "uncertain": ", ".join(f"{name} ±{100.0 * fraction:g} %" for name, fraction in ranges)
-            or "nothing",
+            "uncertain": ", ".join(ranges) or "nothing",
         }
 
     def machine(self) -> Plant:

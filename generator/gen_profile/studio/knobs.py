@@ -42,15 +42,8 @@ UNITS = {
 USUAL = {"cost.sway_weight": 50.0, "actuator.tau": 0.1, "cost.sway_scale": 50.0, "check.samples": 100.0}
 USUAL |= {"planner.quick_stop": 1.0, "planner.quick_stop_jerk": 10.0, "can.torque_per_acceleration": 1.0}
 USUAL |= {"can.timeout": 0.02, "can.following_error": 0.01, "can.quick_stop": 1.0}
-LEFT_OUT = {
-    "can.vendor",  # numbers of one drive, which are no knobs
-    "can.product",
-    "check.foreign",
-    "check.default",
-    "check.uncertain",
-    "move.shortest",
-}
-LEFT_OUT |= {"check.path.lag", "export.csv_columns", "plant"}
+LEFT_OUT = {"can.vendor", "can.product"}  # numbers of one drive, which are no knobs
+LEFT_OUT |= {"check.foreign", "check.default", "check.uncertain", "check.path.lag", "export.csv_columns"}
 
 
 @attrs.frozen(kw_only=True)
@@ -280,16 +273,13 @@ def _planner(spec: Spec) -> Iterator[Knob]:
             )
     for axis in spec.machine().actuated:
         if axis.name in live:  # a hoist
-            yield Knob(
-                path=f"planner.live.{axis.name}",
-                kind="pair",
-                words="planner.live",
-                name=axis.name,
-                value=live[axis.name],
-                unit=axis.unit,
-                optional=True,
-            )
+            yield _pair("planner.live", f"planner.live.{axis.name}", axis.name, live[axis.name], axis.unit)
     yield from _of_axes(spec, _fields(spec.planner, "planner"))
+
+
+def _pair(words: str, path: str, name: str, value: Any, unit: str) -> Knob:
+    """Tell the least and greatest place of an axis."""
+    return Knob(path=path, kind="pair", words=words, name=name, value=value, unit=unit, optional=True)
 
 
 def _of_axes(spec: Spec, listed: Iterator[Knob]) -> Iterator[Knob]:
@@ -317,15 +307,7 @@ def _limits(spec: Spec) -> Iterator[Knob]:
         for knob in _fields(table, place, words="limits", name=name):
             rate = RATES.get(knob.words.rpartition(".")[2])
             yield attrs.evolve(knob, unit=f"{unit}{rate}") if rate else knob
-        yield Knob(
-            path=f"{place}.travel",
-            kind="pair",
-            words="limits.travel",
-            name=name,
-            value=table.travel,
-            unit=unit,
-            optional=True,
-        )
+        yield _pair("limits.travel", f"{place}.travel", name, table.travel, unit)
 
 
 def _residual_sway(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:

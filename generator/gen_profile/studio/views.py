@@ -102,28 +102,23 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
     by_axis = groupby(demands(spec, evaluation.command), key=lambda one: one.column)
     for (column, of_axis), axis in zip(by_axis, spec.machine().actuated, strict=True):
         limits, name = spec.limits.of(column), axis.name if len(spec.axis) > 1 else ""
-        for one in of_axis:
-            yield {
-                "place": spec.limits.place(column, one.quantity),
-                "quantity": one.quantity,
-                "axis": name,
-                "unit": one.unit,
-                "takes": one.asked,
-                "allowed": one.allowed,
-            }
+        taken: list[tuple[str, str, float, float | None]]
+        taken = [(one.quantity, one.unit, one.asked, one.allowed) for one in of_axis]
         if limits.travel is not None:
             least, most = extremes(evaluation.command, 0, column)
             low, high = limits.travel
             beyond = max(low - least, most - high)
             way = high - low + beyond if beyond > ROUNDING * (high - low) else most - least
             unit, factor = place_unit(spec, column)
+            taken.append(("travel", unit, factor * way, factor * (high - low)))
+        for quantity, unit, takes, allowed in taken:
             yield {
-                "place": spec.limits.place(column, "travel"),
-                "quantity": "travel",
+                "place": spec.limits.place(column, quantity),
+                "quantity": quantity,
                 "axis": name,
                 "unit": unit,
-                "takes": factor * way,
-                "allowed": factor * (high - low),
+                "takes": takes,
+                "allowed": allowed,
             }
 
 

@@ -131,18 +131,13 @@ class Check(Drawable, Tabled, Examination):
     @property
     def groups(self) -> dict[str, tuple[Finding, ...]]:
         """Findings by group, in the order of `GROUPS`."""
-        by_name = {
-            name: tuple(finding for finding in self.findings if finding.scenario.group == name)
-            for name in GROUPS
-        }
+        by_name = {name: tuple(one for one in self.findings if one.scenario.group == name) for name in GROUPS}
         return {name: findings for name, findings in by_name.items() if findings}
 
     @property
     def judged(self) -> tuple[Finding, ...]:
         """Findings that the verdict rests on."""
-        counted = tuple(
-            finding for finding in self.findings if self.strict or finding.scenario.group != TIMING
-        )
+        counted = tuple(one for one in self.findings if self.strict or one.scenario.group != TIMING)
         return counted or self.findings
 
     def keeps_limit(self, finding: Finding) -> bool:
@@ -275,14 +270,13 @@ class Check(Drawable, Tabled, Examination):
     def _group(self, name: str, findings: Sequence[Finding]) -> dict[str, Any]:
         load, worst = self.worst_of(findings)
         quantiles = np.quantile([self._end_load(finding) for finding in findings], QUANTILES)
+        levels = (f"{quantile:g}" for quantile in QUANTILES)
         return {
             "group": name,
             "what": GROUPS[name],
             "rows": len(findings),
             "passed": all(map(self.keeps_limit, findings)),
             "counts": self.strict or name != TIMING,
-            "quantiles_m": {
-                f"{quantile:g}": float(q) for quantile, q in zip(QUANTILES, quantiles, strict=True)
-            },
+            "quantiles_m": dict(zip(levels, quantiles.tolist(), strict=True)),
             "worst": {"load": load, "row": worst.scenario.row, "residual_peak_m": worst.residual[load]},
         }
