@@ -103,10 +103,9 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
         meaning = "What the motion holds there takes the initial swing away."
     else:
         meaning = "The less the motion holds there, the less the loads swing on."
-    return Figure(
-        caption=f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}",
-        panels=[spectrum_panel(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})],
-    )
+    caption = f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}"
+    panel = spectrum_panel(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})
+    return Figure(caption=caption, panels=[panel])
 
 
 def sway_figure(

@@ -87,11 +87,8 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
             bands=bands,
         )
     )
-    return Figure(
-        caption="Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains.",
-        panels=panels,
-        columns=1,
-    )
+    caption = "Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains."
+    return Figure(caption=caption, panels=panels, columns=1)
 
 
 def _signs(spec: Spec) -> tuple[float, ...]:

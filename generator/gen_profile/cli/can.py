@@ -110,7 +110,6 @@ def _node_words(nodes: tuple[IdentifiedNode, ...], where: str) -> Iterator[str]:
     for node in nodes:
         numbers = {"vendor": node.vendor, "product": node.product, "serial": node.serial}
         stated = [f"{what} 0x{number:08X}" for what, number in numbers.items() if number is not None]
-        kind = (
-            f"drive ({', '.join(node.mode_names) or 'no mode to stream in'})" if node.is_drive else "no drive"
-        )
+        modes = ", ".join(node.mode_names) or "no mode to stream in"
+        kind = f"drive ({modes})" if node.is_drive else "no drive"
         yield f"  {node.number}: " + ", ".join([*filter(None, [node.name]), kind, *stated])

@@ -79,8 +79,7 @@ def fmu(
             progress=tell,
         )
     document = made.to_dict()
-    names = [
-        name["name"] + ("" if name["runs_here"] else " (not run)") for name in document["platforms"]
-    ] or ["sources only"]
-    text = f"{made.path}: FMI {version}, {', '.join(names)}, {len(made.content)} bytes"
+    names = [one["name"] + " (not run)" * (not one["runs_here"]) for one in document["platforms"]]
+    holds = ", ".join(names) or "sources only"
+    text = f"{made.path}: FMI {version}, {holds}, {len(made.content)} bytes"
     print_outcome(document, text, as_json)

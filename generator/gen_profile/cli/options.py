@@ -143,23 +143,22 @@ class SpecChoice(NamedTuple):  # attrs would take as long to load as half of cli
             raise
 
 
+def completed(known: Mapping[str, str | None], incomplete: str) -> list[CompletionItem]:
+    """Offer what goes on as a word begins, with what help says of each."""
+    return [CompletionItem(name, help=text) for name, text in known.items() if name.startswith(incomplete)]
+
+
 def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import formats
 
-    return [
-        CompletionItem(name, help=known.summary)
-        for name, known in formats().items()
-        if name.startswith(incomplete)
-    ]
+    return completed({name: known.summary for name, known in formats().items()}, incomplete)
 
 
 def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Offer presets with their summaries."""
     from gen_profile.spec.reading import presets
 
-    return [
-        CompletionItem(name, help=text) for name, text in presets().items() if name.startswith(incomplete)
-    ]
+    return completed(presets(), incomplete)
 
 
 def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:

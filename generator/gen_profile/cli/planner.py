@@ -21,6 +21,7 @@ from gen_profile.cli.options import (
     PathType,
     SpecChoice,
     block_plot_option,
+    completed,
     folder_option,
     output_options,
     repeatable,
@@ -43,8 +44,7 @@ CLEARED = "\r\x1b[K"  # the line, of a terminal
 def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import containers
 
-    known = (*containers(), "c", "linux", "openplc")
-    return [CompletionItem(name) for name in known if name.startswith(incomplete)]
+    return completed(dict.fromkeys((*containers(), "c", "linux", "openplc")), incomplete)
 
 
 @cli.group(
@@ -125,10 +125,8 @@ def write(
     if outcome.proof is not None and not outcome.proof.passed:
         kept = "The block was kept." if outcome.files else not_written(folder)
         if outcome.suggestions:
-            tried = "; or with ".join(
-                f"{one} ({100.0 * one.fraction:.0f} % of the limit)" for one in outcome.suggestions
-            )
-            kept = f"It would pass with {tried}.\n{kept}"
+            tried = [f"{one} ({100.0 * one.fraction:.0f} % of the limit)" for one in outcome.suggestions]
+            kept = f"It would pass with {'; or with '.join(tried)}.\n{kept}"
         fail(outcome.proof.reasons(), kept)
 
 

@@ -91,11 +91,10 @@ def report(
     if on_paper:
         require_browser()
     require_place(out)
-    parted = [one.partition("=") for one in fields]
+    parted = (one.partition("=") for one in fields)
+    pairs = [(name.strip(), value.strip()) for name, _, value in parted]
     with progress() as tell:
-        made = made_of.make(
-            fields=[(name.strip(), value.strip()) for name, _, value in parted], progress=tell
-        )
+        made = made_of.make(fields=pairs, progress=tell)
         if on_paper:
             from attrs import evolve
 
@@ -147,9 +146,8 @@ def _of_artefact(path: Path, **options: Any) -> _Subject:
     for name, option in {"preset": "--preset", "overrides": "--set", "formats": "--export"}.items():
         if _given(name):
             raise SpecError(f"{option}: is for a spec; {path} is of the one in its manifest.")
-    return _Subject(
-        name=path.name.partition(".")[0], make=partial(artefact_report, path, **options), words=words.report
-    )
+    name, make = path.name.partition(".")[0], partial(artefact_report, path, **options)
+    return _Subject(name=name, make=make, words=words.report)
 
 
 def _given(name: str | None) -> bool:

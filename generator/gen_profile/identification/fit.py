@@ -89,11 +89,9 @@ class Fit:
             left = self.left(unknowns)
         except (InfeasibleProblem, CosimulationError, np.linalg.LinAlgError):
             return None
-        linear = [
-            float(np.std(one)) < HALF * float(np.std(model.log.values))
-            for model, one in zip(self.models, left, strict=True)
-        ]
-        return unknowns if all(linear) else None
+        pairs = zip(self.models, left, strict=True)
+        linear = all(np.std(one) < HALF * np.std(model.log.values) for model, one in pairs)
+        return unknowns if linear else None
 
     def near(self, unknowns: Array) -> tuple[Array, Array]:
         """Find the unknowns that agree best with all that was logged, near a guess, and the noise."""
@@ -211,14 +209,12 @@ class Fit:
         for model, residuals in zip(self.models, self.left(unknowns, until), strict=True):
             count = len(residuals)
             square = residuals @ residuals
-            correlation = (
-                min(max(float(residuals[1:] @ residuals[:-1] / square), 0.0), 0.99) if square > 0.0 else 0.0
-            )
+            alike = float(residuals[1:] @ residuals[:-1] / square) if square > 0.0 else 0.0
+            correlation = min(max(alike, 0.0), 0.99)
             freedom = max(count - model.unknowns - parameters, 1)
             resolution = np.ptp(model.log.values) * 1e-9 or 1e-12  # an exact log has no noise at all
-            noise.append(
-                max(np.sqrt(square / freedom * (1.0 + correlation) / (1.0 - correlation)), resolution)
-            )
+            wide = np.sqrt(square / freedom * (1.0 + correlation) / (1.0 - correlation))
+            noise.append(max(wide, resolution))
         return np.array(noise)
 
 

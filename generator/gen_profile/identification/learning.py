@@ -145,10 +145,8 @@ def narrowed_by_log(
         "left": left,
         "unexplained_rad_per_s": None if lines is None else lines.frequency,
     }
-    return Lesson(
-        machines=machines.within(dict(zip(fit.names, map(tuple, ends.tolist()), strict=True))),
-        evidence=evidence,
-    )
+    ranges = dict(zip(fit.names, map(tuple, ends.tolist()), strict=True))
+    return Lesson(machines=machines.within(ranges), evidence=evidence)
 
 
 def narrowed_by_sight(
@@ -176,14 +174,12 @@ def narrowed_by_sight(
     plant, drawn = machines.plant, machines.drawn(SLABS * PER_SLAB ** min(len(machines.ranges), MOST))
     frequencies = linearize(plant, drawn[0], played.position[-1]).frequencies
     apart = 2.0 * np.pi / COARSE / float(frequencies[-1])
-    times = played.times[-1] + np.arange(0.0, watch, apart)
+    times = np.concatenate([[0.0], played.times[-1] + np.arange(0.0, watch, apart)])
     motion = motion_of(through(played, apart))
     peaks = []
     for part in np.array_split(parameter_rows(plant, drawn), SLABS):
         at_rest = np.zeros((len(part), 2 * len(plant.unactuated)))
-        sway, _ = driven_swing(
-            plant, part, motion=motion, starts=at_rest, times=np.concatenate([[0.0], times])
-        )
+        sway, _ = driven_swing(plant, part, motion=motion, starts=at_rest, times=times)
         peaks.append(peak(sway[:, 1:])[:, plant.loads.index(seen.parameter)])
     left = np.concatenate(peaks)
     possible = np.abs(left - seen.value) <= seen.uncertainty

@@ -160,9 +160,8 @@ def animation(spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], 
         response, parameters = responses[one.index], evaluation.machines[one.index].parameters
         pose = pose_of(plant, parameters, response.position, response.q_u, size)
         sway = end_load_sway(spec, response)
-        actors.append(
-            Actor(name=one.name, colour=one.style.colour, sway=sway, drawings=drawings(plant, pose))
-        )
+        drawn = drawings(plant, pose)
+        actors.append(Actor(name=one.name, colour=one.style.colour, sway=sway, drawings=drawn))
     return Animation(
         times=times,
         arrival=arrival,

@@ -51,16 +51,12 @@ def measured_verdict(measured: Measured) -> Verdict:
 def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Section:
     """Draw what was measured over what was planned, with the deviations."""
     template = "The move begins at {start} s in {source}."
-    words = [
-        Phrase(template, start=number(measured.start), source=measured.log.source),
-        *_likeness(evaluation, measured),
-    ]
+    words: list[str] = [Phrase(template, start=number(measured.start), source=measured.log.source)]
+    words += _likeness(evaluation, measured)
     if ignored := ", ".join(measured.log.ignored):
         words.append(Phrase("Columns that were left alone: {ignored}.", ignored=ignored))
-    figure = Figure(
-        caption="Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on.",
-        panels=[*_panels(spec, evaluation, measured)],
-    )
+    caption = "Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on."
+    figure = Figure(caption=caption, panels=[*_panels(spec, evaluation, measured)])
     return Section(title="What the machine did", words=[" ".join(words)], blocks=[_table(measured), figure])
 
 
@@ -88,10 +84,8 @@ def _row(name: str, signal: Signal, sway: MeasuredSway | None = None) -> TableRo
     cells = [name, *(f"{number(1e3 * value)} m{signal.unit}" for value in (signal.rms, signal.peak))]
     if sway is None or sway.residual is None:
         return TableRow(cells=[*cells, "", "", ""])
-    fraction = Share(_share(sway))
-    return TableRow(
-        cells=[*cells, mm(sway.residual), mm(sway.limit), fraction], mark="" if sway.passed else "failed"
-    )
+    judged = (mm(sway.residual), mm(sway.limit), Share(_share(sway)))
+    return TableRow(cells=[*cells, *judged], mark="" if sway.passed else "failed")
 
 
 def _share(sway: MeasuredSway) -> float:

@@ -73,9 +73,8 @@ def planner_report(
 def _page(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Page:
     spec, proof = judgement.spec, judgement.check
     units = spec.machine().units
-    live = ", ".join(
-        f"{name} {low:g} to {high:g} {units[name]}" for name, (low, high) in spec.planner.live.items()
-    )
+    ranges = spec.planner.live.items()
+    live = ", ".join(f"{name} {low:g} to {high:g} {units[name]}" for name, (low, high) in ranges)
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
@@ -87,9 +86,8 @@ def _page(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Pa
 
 def _verdict(proof: Proof, path: Path) -> Verdict:
     """Say first whether the block may be deployed, and how to see the worst history again."""
-    again = (
-        f"gen-profile check {quote(path.name)} --history {proof.worst.number} runs the worst history again."
-    )
+    command = f"gen-profile check {quote(path.name)} --history {proof.worst.number}"
+    again = f"{command} runs the worst history again."
     if not proof.passed:
         return Verdict(word="Failed.", passed=False, sentences=[*proof.reasons(), again])
     load = _worst_load(proof, proof.worst)

@@ -95,11 +95,9 @@ def sections(
     spec, evaluation, shown = outcome.spec, outcome.plan.evaluation, select_machines(outcome.plan.evaluation)
     if measured is not None:
         yield measured_section(spec, evaluation, measured)
-    yield Section(
-        title="The machine plays the move",
-        words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),
-        blocks=[animation(spec, evaluation, shown, check.arrival)],
-    )
+    words = "All machines follow the same setpoints. Dashed: where the loads would be if nothing swung."
+    played = animation(spec, evaluation, shown, check.arrival)
+    yield Section(title="The machine plays the move", words=[words], blocks=[played])
     limits = _limits(spec, evaluation, outcome.figures, check)
     yield Section(title="Limits and margins", blocks=[limits])
     figures = [motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]

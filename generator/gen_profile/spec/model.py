@@ -198,10 +198,8 @@ class LimitsSpec(Checked, table="limits"):
 
     def stated(self) -> dict[str, Any]:
         """Every limit that is stated, by its place in the spec, such as ``limits.axis.x.jerk``."""
-        tables: dict[str, LimitsSpec | AxisLimitsSpec] = {
-            "limits": self,
-            **{f"limits.axis.{axis}": own for axis, own in self.axis.items()},
-        }
+        tables: dict[str, LimitsSpec | AxisLimitsSpec] = {"limits": self}
+        tables |= {f"limits.axis.{axis}": own for axis, own in self.axis.items()}
         return {
             f"{table}.{name}": value
             for table, own in tables.items()

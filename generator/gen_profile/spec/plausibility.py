@@ -166,9 +166,8 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
             yield _odd(place, template, far=far, cure=cure)
     for name, rate in spec.planner.live_rate.items():
         statement = Phrase("hoists at {rate:g} m/s", rate=rate)
-        yield from _fast(
-            rate, "m", f"planner.live_rate.{name}", statement, _thousandth(rate, "rates are in m/s")
-        )
+        cure = _thousandth(rate, "rates are in m/s")
+        yield from _fast(rate, "m", f"planner.live_rate.{name}", statement, cure)
     sway, depth = spec.limits.sway, scale.depth[-1]
     if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
         template = "the ropes' {depth:.4g} m" if depth else "{times:g} times the move"

@@ -1,6 +1,6 @@
 """Rules across the fields of a spec, and between a spec and its machine."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 from gen_profile.phrase import Phrase
@@ -166,10 +166,7 @@ def _at_end(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Refuse relative ranges of nothing, and those that reach beyond what the machine takes."""
-    tables: dict[str, Mapping[str, float]] = {
-        "robustness": spec.robustness.uncertain,
-        "check": spec.check.uncertain or {},
-    }
+    tables = {"robustness": spec.robustness.uncertain, "check": spec.check.uncertain or {}}
     cure_by_table = {"robustness": "", "check": "; state check.spans"}
     for table, shares in tables.items():
         for parameter in plant.parameters:

@@ -90,9 +90,8 @@ class Drive:
         """Follow a hand for a moment, and tell what is then to be seen."""
         started = self._axes[None], self._state[:, None]
         outputs, axes, states = self._go_on(asked)
-        position, velocity, low, high = (
-            self._of(outputs, name) for name in ("fPosition", "fVelocity", "fStopLow", "fStopHigh")
-        )
+        names = ("fPosition", "fVelocity", "fStopLow", "fStopHigh")
+        position, velocity, low, high = (self._of(outputs, name) for name in names)
         shown = np.linspace(0, len(axes), FRAMES + 1).round().astype(int)
         places, swung = np.concatenate([started[0], axes]), np.concatenate([started[1], states], axis=1)
         frames = self._animation(places[shown, 0], swung[0, shown])
@@ -140,9 +139,8 @@ class Drive:
                 orders["sensor"] = self._sensor.shows(cycles)
             outputs = self._planner.hold(cycles * cycle, **orders).outputs
             self._tell_live(asked.live)
-            axes = self._at(
-                *(self._of(outputs, name) for name in ("fPosition", "fVelocity", "fAcceleration"))
-            )
+            names = ("fPosition", "fVelocity", "fAcceleration")
+            axes = self._at(*(self._of(outputs, name) for name in names))
             states = self._swing(axes, asked.wind)[:, 1:]
             self._axes, self._state = axes[-1], states[:, -1]
             if self._sensor is not None:
@@ -156,9 +154,8 @@ class Drive:
     def _swinging(self) -> Array:
         """Let the nominal machine swing by as much as is stated, shape (2, n_u)."""
         along = len(sensed_directions(self._spec))
-        swing = stated_swing(
-            self._spec, [(along**-0.5, 0.0)] * along, self._parameters()[0], self._places.tolist()
-        )
+        begun, nominal = [(along**-0.5, 0.0)] * along, self._parameters()[0]
+        swing = stated_swing(self._spec, begun, nominal, self._places.tolist())
         names = [coordinate.name for coordinate in self._plant.unactuated]
         return np.array([[swing[f"{name}{order}"] for name in names] for order in ("", ".rate")])
 

@@ -28,9 +28,8 @@ class RequestQueue:
         self._job = Job(number=-1, kind=kind, question=None)
         self._begun = self._ended = -1
         self._deaths = 0  # of workers, in a row, that had begun nothing
-        self._answers = (
-            False  # whether the worker has begun anything: one that starts is at no older question
-        )
+        # whether the worker has begun anything: one that starts is at no older question
+        self._answers = False
 
     def ask(self, number: int, question: Any) -> None:
         """Ask."""
@@ -81,10 +80,9 @@ class RequestQueue:
             return
         if message.name == LOST:
             self.stop()
-            failed = {**failure("unanswered", [GONE]), "of": self._job.kind, "serial": self._job.number}
-            message = Message(
-                number=self._job.number, kind=self._job.kind, name="failure", text=json.dumps(failed)
-            )
+            kind, number = self._job.kind, self._job.number
+            text = json.dumps({**failure("unanswered", [GONE]), "of": kind, "serial": number})
+            message = Message(number=number, kind=kind, name="failure", text=text)
         elif message.name == BEGUN:
             self._begun, self._answers, self._deaths = message.number, True, 0
         elif message.name == ENDED:

@@ -284,6 +284,5 @@ def run_sweep(
     spec = as_spec(spec)
     grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
-    return sweep(
-        prepare(text, (), grid, as_names(formats), Path(folder)), scheduler=scheduler, workers=workers
-    )
+    store = prepare(text, (), grid, as_names(formats), Path(folder))
+    return sweep(store, scheduler=scheduler, workers=workers)

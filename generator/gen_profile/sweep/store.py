@@ -80,10 +80,8 @@ class Store:
         """Whether a case's record is there, and all files are as it tells: a power cut may leave a part."""
         record = self._record(case)
         try:
-            return record is not None and _is_whole(
-                record.get("artefacts", []),
-                {file.name: read_bounded(file) for file in self.case_folder(case).iterdir()},
-            )
+            files = {file.name: read_bounded(file) for file in self.case_folder(case).iterdir()}
+            return record is not None and _is_whole(record.get("artefacts", []), files)
         except OSError:
             return False
 

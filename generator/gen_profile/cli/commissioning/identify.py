@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,14 +60,15 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
         if not comma:
             raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
 
-        def read(path: Path, spec: Spec, after: float = 0.0) -> SwingLog:
-            from gen_profile.identification.identify import read_swing
+        from gen_profile.identification.identify import read_swing
 
-            return read_swing(
-                path, spec, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit, after=after
-            )
-
-        return command(read=read, **options)
+        how: dict[str, Any] = {
+            "columns": (time, value),
+            "signal": signal,
+            "unit": unit,
+            "time_unit": time_unit,
+        }
+        return command(read=partial(read_swing, **how), **options)
 
     return reading
 
@@ -140,7 +141,7 @@ def identify(
     with progress() as tell:
         if log is not None:
             tell("reading the log")
-            measurements.append(read(log, spec, after))
+            measurements.append(read(log, spec, after=after))
         identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
         draw(identified, picture, tell)
         write_spec(identified.spec, out, rewritten(identified.spec))
