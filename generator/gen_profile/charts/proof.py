@@ -108,7 +108,8 @@ def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
     own, few = spec.limits.of(number), slice(None, None, -(-len(trace.times) // SAMPLES))
     assert own.velocity and own.acceleration and own.travel
     of = f" of {axis.name}" if axis.name else ""
-    bands = [*_unpromised(trace), *(Band(low=time, high=time) for time in _stops(trace))]
+    stops = [one.time for one in trace.history.commands if one.command not in {"position", "velocity"}]
+    bands = [*_unpromised(trace), *(Band(low=time, high=time) for time in stops)]
     for title, unit, output, levels, command in (
         ("Position", axis.unit, "fPosition", own.travel, "position"),
         ("Velocity", f"{axis.unit}/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
@@ -232,10 +233,6 @@ def _unpromised(trace: Trace) -> Iterator[Band]:
     last = len(trace.times) - 1
     for begin, end in edges.reshape(-1, 2):
         yield Band(low=float(trace.times[begin]), high=float(trace.times[min(end, last)]))
-
-
-def _stops(trace: Trace) -> list[float]:
-    return [one.time for one in trace.history.commands if one.command not in {"position", "velocity"}]
 
 
 def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:

@@ -153,7 +153,7 @@ class Fit:
         """
         p = len(self.names)
         spread = np.array([reading.uncertainty for reading in self.readings])
-        measured = np.array([_measured(reading) for reading in self.readings])
+        measured = np.array([one.seconds if isinstance(one, Period) else one.value for one in self.readings])
         slopes = np.zeros((len(measured), len(unknowns)))
         predicted = self.predicted(unknowns)
         for column, step in enumerate(STEP * np.eye(p, len(unknowns))):
@@ -235,7 +235,3 @@ def fit_of(
         readings=tuple(readings),
         models=tuple(models),
     )
-
-
-def _measured(reading: DirectReading | Period) -> float:
-    return reading.seconds if isinstance(reading, Period) else reading.value

@@ -80,12 +80,7 @@ class Machines:
         return attrs.evolve(self, ranges=kept)
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Lesson:
-    """What is left of the ranges after a run, and by what evidence, in plain values."""
-
-    machines: Machines
-    evidence: Mapping[str, Any]
+Lesson = tuple[Machines, dict[str, Any]]  # what is left after a run, and by what evidence, in plain values
 
 
 def narrowed_by_log(
@@ -146,7 +141,7 @@ def narrowed_by_log(
         "unexplained_rad_per_s": None if lines is None else lines.frequency,
     }
     ranges = dict(zip(fit.names, map(tuple, ends.tolist()), strict=True))
-    return Lesson(machines=machines.within(ranges), evidence=evidence)
+    return machines.within(ranges), evidence
 
 
 def narrowed_by_sight(
@@ -196,7 +191,7 @@ def narrowed_by_sight(
         slab = (high - low) / SLABS
         first, last = (np.floor((end - low) / slab) for end in (values.min(), values.max()))
         kept[name] = (float(low + (first - 1.0) * slab), float(low + (last + 2.0) * slab))
-    return Lesson(machines=machines.within(kept), evidence=evidence)
+    return machines.within(kept), evidence
 
 
 def _free_fit(machines: Machines, model: DrivenModel) -> Fit:
@@ -278,21 +273,21 @@ class Learning:
     spec : Spec
         With the ranges that are left, and their middles as values.
     before : Machines
-    lessons : tuple of Lesson
-        One of each run.
+    runs : tuple of dict
+        What each run showed, in plain values.
     """
 
     spec: Spec
     before: Machines
-    lessons: tuple[Lesson, ...]
+    runs: tuple[dict[str, Any], ...]
 
     def warnings(self) -> tuple[str, ...]:
         """Say what no machine of the ranges explains, though it excludes some; a sentence each."""
         return tuple(
-            f"a swing at {at:.3g} rad/s in the log of {lesson.evidence['load']} is none of the machine's, "
+            f"a swing at {at:.3g} rad/s in the log of {run['load']} is none of the machine's, "
             "and no other value of one parameter explains it: this run excludes little"
-            for lesson in self.lessons
-            if (at := lesson.evidence.get("unexplained_rad_per_s")) is not None
+            for run in self.runs
+            if (at := run.get("unexplained_rad_per_s")) is not None
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -306,7 +301,7 @@ class Learning:
                 name: {"unit": units[name], "before": list(ends), "range": list(ranges[name])}
                 for name, ends in self.before.ranges.items()
             },
-            "runs": [dict(lesson.evidence) for lesson in self.lessons],
+            "runs": list(self.runs),
         }
 
 
@@ -355,15 +350,15 @@ def learn(
         if spec.move.initial:
             raise SpecError("seen: tells of machines only where the load hung at rest before; log a run.")
     machines = before = Machines(plant=plant, parameters=spec.plant.parameters, ranges=ranges)
-    lessons = []
+    showed = []
     with one_thread():
         for run in runs:
             if isinstance(run, SwingLog):
-                lessons.append(narrowed_by_log(machines, played, run, progress))
+                machines, evidence = narrowed_by_log(machines, played, run, progress)
             else:
-                lessons.append(narrowed_by_sight(machines, played, run, observation_time(spec)))
-            machines = lessons[-1].machines
-    return Learning(spec=_learned(spec, machines), before=before, lessons=tuple(lessons))
+                machines, evidence = narrowed_by_sight(machines, played, run, observation_time(spec))
+            showed.append(evidence)
+    return Learning(spec=_learned(spec, machines), before=before, runs=tuple(showed))
 
 
 def _learned(spec: Spec, machines: Machines) -> Spec:

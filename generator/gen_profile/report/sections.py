@@ -73,13 +73,13 @@ def facts(
 ) -> list[tuple[str, str]]:
     """Name the few numbers that say what the motion is."""
     load, finding = check.worst
-    margin = check.limit[load] - finding.residual[load] - check.error_bound
+    margin, several = check.limit[load] - finding.residual[load] - check.error_bound, len(spec.axis) > 1
     return [
         ("Duration", f"{number(evaluation.motion.duration)} s"),
         *(
-            (f"Peak {one.quantity}{_of(spec, one.axis.name)}", f"{number(one.asked)} {one.unit}")
+            (f"Peak {one.quantity}" + f", {one.axis.name}" * several, f"{number(one.asked)} {one.unit}")
             for one in demands(spec, evaluation.command)
-            if one.quantity != "jerk" or len(spec.axis) == 1
+            if one.quantity != "jerk" or not several
         ),
         ("Sway on the way, nominal", mm(figures["sway_transient_peak_m"])),
         (f"Residual sway of the {load}, worst", mm(finding.residual[load])),
@@ -111,10 +111,6 @@ def sections(
         yield _methods(comparison)
     yield _evidence(outcome)
     yield _files(outcome)
-
-
-def _of(spec: Spec, axis: str) -> str:
-    return f", {axis}" if len(spec.axis) > 1 else ""
 
 
 def _wind(check: Check) -> list[tuple[str, str]]:
