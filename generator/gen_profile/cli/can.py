@@ -36,7 +36,7 @@ def can() -> None:
     help="Of the channel in bit/s, where no system sets it; 500000 by default.",
 )
 @output_options
-def list_(interface: str | None, channel: str | None, bitrate: int, as_json: bool) -> None:
+def list_(interface: str | None, channel: str | None, bitrate: int) -> None:
     """List CAN interfaces, their channels, and the nodes that answer.
 
     No bus is touched unless a channel is named. There, every node id is asked what it is, if no controller is
@@ -60,7 +60,7 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
     lines = list(_interface_words(by_interface))
     if nodes is not None:
         lines += _node_words(nodes, f"{interface} {channel}")
-    print_outcome(document, "\n".join(lines), as_json)
+    print_outcome(document, "\n".join(lines))
 
 
 def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:

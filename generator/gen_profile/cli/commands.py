@@ -79,7 +79,6 @@ def design(
     keep_failed: bool,
     certify: bool,
     key_path: Path | None,
-    as_json: bool,
     **export: str | None,
 ) -> None:
     """Design, export and verify (the default)."""
@@ -102,7 +101,7 @@ def design(
     certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])
     worst = max(certificates.values(), key=lambda certificate: certificate.demand, default=None)
     document = outcome.to_dict() | {"certificate": worst and worst.to_dict()}
-    print_outcome(document, words.design(outcome, certificates), as_json)
+    print_outcome(document, words.design(outcome, certificates))
     warn(outcome.check)
     if not outcome.passed and outcome.check is not None:
         fail(outcome.check.reasons(), "The files were kept." if outcome.artefacts else not_written(folder))
@@ -136,13 +135,7 @@ def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
     help="What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
 )
 @output_options
-def compare(
-    chosen: SpecChoice,
-    picture: Path | None,
-    every: bool,
-    base: str | None,
-    as_json: bool,
-) -> None:
+def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | None) -> None:
     """Compare optimal profiles with shapers."""
     spec = chosen.changed({"solver.base": base}).spec()
     from gen_profile.cli import words
@@ -151,7 +144,7 @@ def compare(
     with progress() as tell:
         comparison = run(spec, tell)
         draw(comparison, picture, tell, every=every)
-    print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
+    print_outcome(comparison.to_dict(), words.comparison(comparison))
 
 
 @cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")
@@ -185,9 +178,7 @@ def compare(
 @plot_option
 @click.option("--csv", "path", type=OutputFile(), help="Write the numbers as a table.")
 @output_options
-def robustness(
-    chosen: SpecChoice, *, picture: Path | None, path: Path | None, as_json: bool, **options: Any
-) -> None:
+def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, **options: Any) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     spec = chosen.spec()
     from gen_profile.artefacts.writing import deliver
@@ -199,7 +190,7 @@ def robustness(
         draw(curves, picture, tell)
         if path is not None:
             deliver(path, curves.table().encode("utf-8"))
-    print_outcome(curves.to_dict(), words.robustness(curves), as_json)
+    print_outcome(curves.to_dict(), words.robustness(curves))
 
 
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
@@ -224,14 +215,7 @@ def robustness(
 @block_plot_option
 @signed_by_option
 @output_options
-def check(
-    artefact: Path,
-    chosen: SpecChoice,
-    *,
-    public_path: Path | None,
-    as_json: bool,
-    **options: Any,
-) -> None:
+def check(artefact: Path, chosen: SpecChoice, *, public_path: Path | None, **options: Any) -> None:
     """Replay, co-simulate and judge an artefact.
 
     The spec comes from the manifest beside the artefact unless one is named.
@@ -247,7 +231,7 @@ def check(
     unproved: Sequence[str] = ()
     if options["certificate"] is not None:
         _require_only(options, ("certificate",), "a check by co-simulation, without --certificate")
-        _repeat_proof(artefact, spec, options["certificate"], as_json=as_json)
+        _repeat_proof(artefact, spec, options["certificate"])
         return
     if is_planner_block(artefact):
         _require_only(options, BLOCK_OPTIONS, "a motion, and this is a planner block")
@@ -265,7 +249,7 @@ def check(
         text, document = words.judgement(judgement, certificate), judgement.to_dict()
         document["certificate"] = certificate and certificate.to_dict()
         unproved = certificate.reasons() if certificate else ()
-    print_outcome(document, text, as_json)
+    print_outcome(document, text)
     warn(judgement.check)
     if not judgement.check.passed:
         fail(judgement.check.reasons(), "Do not deploy it.")
@@ -306,14 +290,14 @@ def _certified(path: Path, spec: Spec | None) -> Certificate:
         return certify_artefact(path, spec, progress=partial(tell, "proving it for boxes of machines"))
 
 
-def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_json: bool) -> None:
+def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path) -> None:
     from gen_profile.certificate.from_file import check_certificate
     from gen_profile.cli import words
 
     with progress() as tell:
         stage = "proving it again for boxes of machines"
         proved = check_certificate(artefact, certificate, spec, progress=partial(tell, stage))
-    print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved), as_json)
+    print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved))
 
 
 def _check_block(
@@ -332,20 +316,20 @@ def _check_block(
 
 @cli.command(epilog="Example: gen-profile formats")
 @output_options
-def formats(as_json: bool) -> None:
+def formats() -> None:
     """List the export formats."""
     from gen_profile_exporters.registry import formats as known
 
     rows = {name: f"{form.summary} ({form.suffix}; {form.proof})" for name, form in known().items()}
     document = {name: form._asdict() for name, form in known().items()}
-    print_outcome({"formats": document}, _definitions(rows), as_json)
+    print_outcome({"formats": document}, _definitions(rows))
 
 
 @cli.command(epilog="Example: gen-profile plants gantry-crane --plot crane.png")
 @click.argument("name", metavar="[NAME]", required=False)
 @plot_option
 @output_options
-def plants(name: str | None, picture: Path | None, as_json: bool) -> None:
+def plants(name: str | None, picture: Path | None) -> None:
     """List the machines with their axes, loads and parameters, or a single one."""
     from gen_profile.plants.registry import find_plant, plant_types
 
@@ -362,7 +346,7 @@ def plants(name: str | None, picture: Path | None, as_json: bool) -> None:
         (plant,) = known
         draw_machine(plant, plant.nominal(), picture, f"{plant.type}: {plant.summary}")
     document = {plant.type: _plant_document(plant) for plant in known}
-    print_outcome({"plants": document}, "\n\n".join(map(_plant_words, known)), as_json)
+    print_outcome({"plants": document}, "\n\n".join(map(_plant_words, known)))
 
 
 def _plant_document(plant: Plant) -> dict[str, Any]:
@@ -396,7 +380,7 @@ def _plant_words(plant: Plant) -> str:
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_presets)
 @click.option("--out", "path", type=OutputFile(), help="Write it to a new file, in place of stdout.")
 @output_options
-def presets(name: str | None, path: Path | None, as_json: bool) -> None:
+def presets(name: str | None, path: Path | None) -> None:
     """List the built-in specs, or print one to begin your own with."""
     from gen_profile.spec.reading import preset_text
     from gen_profile.spec.reading import presets as known
@@ -404,7 +388,7 @@ def presets(name: str | None, path: Path | None, as_json: bool) -> None:
     if name is None:
         if path is not None:
             raise SpecError("--out: name the preset to write, as gen-profile presets paper does.")
-        print_outcome({"presets": known()}, _definitions(known()), as_json)
+        print_outcome({"presets": known()}, _definitions(known()))
         return
     text = words = preset_text(name)
     if path is not None:
@@ -414,7 +398,7 @@ def presets(name: str | None, path: Path | None, as_json: bool) -> None:
             raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
         deliver(path, text.encode("utf-8"))
         words = f"{path} is a copy of the preset {name}. Change it, then: gen-profile {path}"
-    print_outcome({"preset": name, "toml": text}, words.rstrip("\n"), as_json)
+    print_outcome({"preset": name, "toml": text}, words.rstrip("\n"))
 
 
 def _definitions(rows: dict[str, str]) -> str:

@@ -53,7 +53,6 @@ def fmu(
     source_only: bool,
     path: Path | None,
     author: str | None,
-    as_json: bool,
 ) -> None:
     """Write an FMU of a plant, profile, planner, or a plant with either; or two of them as an SSP."""
     if input_name is not None and kind not in {"plant", "ssp"}:
@@ -82,4 +81,4 @@ def fmu(
     names = [one["name"] + " (not run)" * (not one["runs_here"]) for one in document["platforms"]]
     holds = ", ".join(names) or "sources only"
     text = f"{made.path}: FMI {version}, {holds}, {len(made.content)} bytes"
-    print_outcome(document, text, as_json)
+    print_outcome(document, text)

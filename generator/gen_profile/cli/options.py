@@ -281,7 +281,8 @@ def output_options(command: Command) -> Command:
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
     @click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks.")
     @wraps(command)
-    def careful(**values: Any) -> Any:
+    def careful(*, as_json: bool, **values: Any) -> Any:
+        del as_json  # which is for `print_outcome`
         _require_apart(click.get_current_context())
         return command(**values)
 

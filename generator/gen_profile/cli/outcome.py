@@ -22,8 +22,13 @@ if TYPE_CHECKING:
 INTERRUPTED = 128 + signal.SIGINT  # as shells count it
 
 
-def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
-    """Print an outcome for people, or for programs.
+def as_json() -> bool:
+    """Whether the command is to print one JSON document."""
+    return bool(click.get_current_context().params["as_json"])
+
+
+def print_outcome(document: dict[str, Any], text: str) -> None:
+    """Print an outcome for people, or for programs, as the command was asked to.
 
     Raises
     ------
@@ -31,7 +36,7 @@ def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
         stdout does not take it, as on a full disk.
     """
     try:
-        click.echo(_json(document) if as_json else text)
+        click.echo(_json(document) if as_json() else text)
     except BrokenPipeError:  # a reader that left early, which click knows
         raise
     except OSError as error:

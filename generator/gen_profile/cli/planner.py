@@ -89,7 +89,6 @@ def write(
     no_check: bool,
     picture: Path | None,
     key_path: Path | None,
-    as_json: bool,
     **options: Any,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
@@ -119,7 +118,7 @@ def write(
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
     if outcome.proof is None or outcome.proof.passed:
         sign(folder, key)
-    print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
+    print_outcome(outcome.to_dict(), words.deployment(outcome))
     warn(outcome.proof)
     print_warnings(outcome.warnings)
     if outcome.proof is not None and not outcome.proof.passed:
@@ -163,12 +162,7 @@ def write(
 )
 @output_options
 def play(
-    block: Path,
-    commands_path: Path,
-    path: Path,
-    events_path: Path | None,
-    sensor_path: Path | None,
-    as_json: bool,
+    block: Path, commands_path: Path, path: Path, events_path: Path | None, sensor_path: Path | None
 ) -> None:
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
@@ -196,13 +190,13 @@ def play(
         "error_ids": list(setpoints.errors),
         "promise": not setpoints.unpromised,
     }
-    print_outcome(document, text, as_json)
+    print_outcome(document, text)
 
 
 @planner.command(epilog="Example: gen-profile planner explain events.csv")
 @click.argument("events", type=InputFile())
 @output_options
-def explain(events: Path, as_json: bool) -> None:
+def explain(events: Path) -> None:
     """Say in words what a planner block's events mean: a CSV with time_s, code, value."""
     from gen_profile.planner.events import read_events
 
@@ -213,7 +207,7 @@ def explain(events: Path, as_json: bool) -> None:
             for one in events_read
         ]
     }
-    print_outcome(document, "\n".join(one.words for one in events_read) or "No events.", as_json)
+    print_outcome(document, "\n".join(one.words for one in events_read) or "No events.")
 
 
 def _read(path: Path, what: str = "commands") -> str:

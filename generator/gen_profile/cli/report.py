@@ -70,7 +70,6 @@ def report(
     fields: tuple[str, ...],
     formats: tuple[str, ...],
     no_compare: bool,
-    as_json: bool,
     **log: Any,
 ) -> None:
     """Write everything about a design, or about a planner block and its proof, into one HTML file."""
@@ -101,7 +100,7 @@ def report(
             tell("printing")
             made = evolve(made, content=printed(made.content))
         deliver(out, made.content)
-    print_outcome(made.to_dict(out), words(made, out), as_json)
+    print_outcome(made.to_dict(out), words(made, out))
     if faults := made.faults():
         fail(faults)
 

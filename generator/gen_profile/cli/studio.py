@@ -11,6 +11,7 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, controller_options
 from gen_profile.cli.options import Count, PathType, output_options, spec_options
+from gen_profile.cli.outcome import as_json
 from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
@@ -39,13 +40,7 @@ if TYPE_CHECKING:
 @controller_options(required=False)
 @output_options
 def studio(
-    chosen: SpecChoice,
-    port: int,
-    *,
-    no_browser: bool,
-    artefact: Path | None,
-    as_json: bool,
-    **controller: Any,
+    chosen: SpecChoice, port: int, *, no_browser: bool, artefact: Path | None, **controller: Any
 ) -> None:
     """Turn every knob of a spec in the browser, and see the swing at once."""
     require_installed("gen-profile studio needs Tornado", "studio", "tornado")
@@ -64,7 +59,7 @@ def studio(
     from gen_profile.studio.server import serve
 
     def ready(address: str, code: str) -> None:
-        if as_json:
+        if as_json():
             import json
 
             click.echo(json.dumps({"address": address, "code": code}, indent=2))

@@ -60,7 +60,6 @@ def sweep(
     folder: Path,
     scheduler: str | None,
     workers: int | None,
-    as_json: bool,
 ) -> None:
     """Design, check and export every combination of some values.
 
@@ -78,7 +77,7 @@ def sweep(
     store = prepare(text, chosen.overrides, parse_grid(axes), formats, folder)
     with progress() as tell:
         done = run(store, scheduler=scheduler, workers=workers, progress=tell)
-    print_outcome(done.to_dict(), words.sweep(done), as_json)
+    print_outcome(done.to_dict(), words.sweep(done))
 
 
 @cli.command(
@@ -93,7 +92,7 @@ def sweep(
     help="Folder to write the profile to, with its manifest; it stays where it is by default.",
 )
 @output_options
-def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+def lookup(words: tuple[str, ...], out: Path | None) -> None:
     """Find the nearest safe profile of a sweep.
 
     Every key that was varied is an option here. Nearness counts in steps of the grid: what is more than one
@@ -105,7 +104,7 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     folder, asked = _folder_and_values(words)
     with progress() as tell:
         nearest = run(folder, asked, tell, out=out)
-    print_outcome(nearest.to_dict(), tables.found_profile(nearest), as_json)
+    print_outcome(nearest.to_dict(), tables.found_profile(nearest))
 
 
 @cli.command(epilog="Example: gen-profile library swept --out crane.st")
@@ -118,7 +117,7 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )
 @output_options
-def library(folder: Path, path: Path, as_json: bool) -> None:
+def library(folder: Path, path: Path) -> None:
     """Put a sweep's PLC blocks into one.
 
     An input of the block selects the profile.
@@ -128,7 +127,7 @@ def library(folder: Path, path: Path, as_json: bool) -> None:
 
     with progress() as tell:
         written = write_library(folder, path, tell)
-    print_outcome(written.to_dict(), tables.library(written), as_json)
+    print_outcome(written.to_dict(), tables.library(written))
 
 
 def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:

@@ -21,7 +21,7 @@ from gen_profile.cli.options import (
     repeatable,
     require_formats,
 )
-from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.outcome import as_json, print_outcome
 from gen_profile.cli.report import report
 from gen_profile.errors import GenProfileError, OutputError
 from gen_profile.plugins import require_installed
@@ -76,7 +76,7 @@ Words = tuple[str, ...]
 )
 @click.option("--yes", is_flag=True, help="Ask nothing: what no option answers stays as it is.")
 @output_options
-def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
+def commission(path: Path, *, yes: bool, **options: Any) -> None:
     """Go from a tape measure to a controller, step by step.
 
     Measure, log a swing, identify, design, prove, report, deploy, and record it. What no option answers is
@@ -85,7 +85,7 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
     require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
     run = _Guide(click.get_current_context(), options, yes)
     require_formats(options["formats"])
-    with redirect_stdout(sys.stderr) if as_json else nullcontext():
+    with redirect_stdout(sys.stderr) if as_json() else nullcontext():
         _announce("1. The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
         _announce("2. A swing, which tells where the rope's pendulum really ends")
@@ -116,7 +116,7 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
         "record": record and str(record),
     }
     written = ", ".join(str(one) for one in (path, *files, page, record) if one)
-    print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.", as_json)
+    print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.")
 
 
 commission.params += [one for other, names in TAKEN.items() for one in other.params if one.name in names]

@@ -126,7 +126,6 @@ def identify(
     at: str | None,
     out: Path,
     picture: Path | None,
-    as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
     from gen_profile.cli import words
@@ -145,7 +144,7 @@ def identify(
         identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
         draw(identified, picture, tell)
         write_spec(identified.spec, out, rewritten(identified.spec))
-    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out), as_json)
+    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out))
 
 
 def _to_change(chosen: SpecChoice) -> tuple[Spec, Callable[[Spec], str]]:
@@ -210,7 +209,6 @@ def learn(
     out: Path,
     formats: tuple[str, ...],
     folder: Path,
-    as_json: bool,
 ) -> None:
     """Narrow a spec's ranges by what runs of a motion showed.
 
@@ -234,7 +232,7 @@ def learn(
         made = design(learned.spec, formats, folder, progress=tell) if formats else None
     document = {**learned.to_dict(), "path": str(out), "design": None if made is None else made.to_dict()}
     text = words.learning(learned, out)
-    print_outcome(document, text if made is None else f"{text}\n{words.design(made)}", as_json)
+    print_outcome(document, text if made is None else f"{text}\n{words.design(made)}")
     if made is not None:
         warn(made.check)
         if not made.passed and made.check is not None:

@@ -60,7 +60,6 @@ def log_swing(
     counts: int | None,
     bitrate: int,
     unit: str,
-    as_json: bool,
     **security: Any,
 ) -> None:
     """Log how a load swings, for identify and learn, until Ctrl-C.
@@ -98,7 +97,7 @@ def log_swing(
     deliver(out, "\n".join([",".join(("Time (s)", *columns)), *lines, ""]).encode("utf-8"))
     lasts = float(table[-1, 0])
     document = {"path": str(out), "samples": len(table), "lasts_s": lasts, "columns": list(columns)}
-    print_outcome(document, f"{len(table)} samples in {lasts:.1f} s: {out}", as_json)
+    print_outcome(document, f"{len(table)} samples in {lasts:.1f} s: {out}")
 
 
 def _encoder(source: str, node: str | None, counts: int | None, bitrate: int) -> Encoder:

@@ -62,7 +62,6 @@ def deploy(
     by: str,
     key_path: Path | None,
     public_path: Path | None,
-    as_json: bool,
     **options: Any,
 ) -> None:
     """Put a playback block's table, a library's, or a planner's numbers into a controller.
@@ -81,12 +80,12 @@ def deploy(
     key = signing_key(key_path)
     require_signature(artefact, public_path)
     if watch:
-        _watch(artefact, access, seconds, log, as_json)
+        _watch(artefact, access, seconds, log)
     elif verify:
-        _verify(artefact, access, as_json)
+        _verify(artefact, access)
     else:
         document = _deploy(artefact, access, by or _user(), rollback=rollback)
-        print_outcome(document, _words(artefact, document), as_json)
+        print_outcome(document, _words(artefact, document))
         if key is not None:
             _sign(artefact, document, key)
 
@@ -110,7 +109,7 @@ def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[
             return append_record(artefact.parent, done.to_dict(), link.server, by)
 
 
-def _verify(artefact: Path, access: Access, as_json: bool) -> None:
+def _verify(artefact: Path, access: Access) -> None:
     """Tell whether the controller uses the table."""
     from gen_profile.deployment.record import recorded
 
@@ -118,7 +117,7 @@ def _verify(artefact: Path, access: Access, as_json: bool) -> None:
         table, link = verified(artefact, access, stack, tell)
         entry = recorded(artefact.parent, table.hashes["table_sha256"], link.server)
         document = {"action": "verified", "controller": link.server, **table.hashes, "record": entry}
-    print_outcome(document, _words(artefact, document), as_json)
+    print_outcome(document, _words(artefact, document))
 
 
 def verified(
@@ -138,7 +137,7 @@ def verified(
     return table, link
 
 
-def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None, as_json: bool) -> None:
+def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None) -> None:
     """Hold what the block issues to what was proved, and end with what differs."""
     from gen_profile.cli.deployment.watching import reporting, words
     from gen_profile.deployment.watching.watch import watch
@@ -151,7 +150,7 @@ def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | No
         with reporting(table, log) as report:
             watched = watch(table, link, report, seconds=seconds)
     document = {"action": "watched", "controller": link.server, **table.hashes, **watched.to_dict()}
-    print_outcome(document, words(watched, table), as_json)
+    print_outcome(document, words(watched, table))
     if watched.fault is not None:
         click.echo(f"Error: {watched.fault}", err=True)
         raise SystemExit(watched.fault.exit_code)
@@ -204,7 +203,7 @@ def _user() -> str:
 )
 @click.option("--ads", is_flag=True, help="Speak ADS in place of OPC UA, with the block as MAIN.fbMotion.")
 @output_options
-def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool, **options: Any) -> None:
+def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, **options: Any) -> None:
     """Simulate a controller that runs a playback block, behind an OPC UA, ADS or S7 server."""
     given = options["user"] or options["certificate"] is not None
     if options["no_security"] and given:
@@ -226,7 +225,7 @@ def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool,
         def show(address: str, fingerprint: str = "") -> None:
             document = {"address": address, "instance": name, "fingerprint": fingerprint}
             shown = f"\nSHA-256 of its certificate: {fingerprint}" if fingerprint else ""
-            print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.", as_json)
+            print_outcome(document, f"{name} runs behind {address}{shown}\nCtrl-C ends it.")
 
         serve(show)
     except KeyboardInterrupt:

@@ -71,7 +71,7 @@ _bus_options = with_options(
     help="Write planned and actual positions side by side.",
 )
 @output_options
-def stream(table: Path | None, as_json: bool, **options: Any) -> None:
+def stream(table: Path | None, **options: Any) -> None:
     """Stream setpoints to CiA 402 drives, and stop them safely.
 
     Takes the log that --export can wrote, with its manifest beside it, a spec, which is designed and checked
@@ -89,12 +89,12 @@ def stream(table: Path | None, as_json: bool, **options: Any) -> None:
         if request.moves_slowly:
             slow = request.slow_motion(source, tell)
             if slow is None:
-                print_outcome(*at_start(source), as_json)
+                print_outcome(*at_start(source))
                 return
             source = slow
         if request.dry_run:
             plan = run.summary(source)
-            print_outcome(plan, plan_words(plan, units(source)), as_json)
+            print_outcome(plan, plan_words(plan, units(source)))
             return
         port = request.port(source.spec.can)
         if table is not None:
@@ -110,7 +110,7 @@ def stream(table: Path | None, as_json: bool, **options: Any) -> None:
             tell=tell_phase,
             book=book,
         )
-    _conclude(outcome, table, as_json)
+    _conclude(outcome, table)
 
 
 @cli.command(
@@ -131,7 +131,6 @@ def drive_sim(
     miss: str,
     own_mapping: bool,
     eds: Path | None,
-    as_json: bool,
 ) -> None:
     """Simulate CiA 402 drives that move the machine's FMU.
 
@@ -172,7 +171,7 @@ def drive_sim(
     }
     axes = spec.machine().actuated
     at = [f"{axis.name} at {number(place)} {axis.unit}" for axis, place in zip(axes, places, strict=True)]
-    print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}", as_json)
+    print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}")
 
 
 for parameter in stream.params:
@@ -198,7 +197,7 @@ def _require_room(table: Path, source: Source) -> None:
         raise OutputError(f"--log {table}: its disk has no room for it ({free} bytes); choose another place.")
 
 
-def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None:
+def _conclude(outcome: StreamOutcome, table: Path | None) -> None:
     """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
     import attrs
 
@@ -216,7 +215,7 @@ def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None
             code, complaints = code or OutputError.exit_code, [*complaints, f"Error: {sentences}"]
             unwritten = {"type": type(error).__name__, "message": sentences, "exit_code": code}
     document = {**outcome.to_dict(), "error": unwritten}
-    said = [_refusal(print_outcome, document, outcome_words(outcome), as_json)]
+    said = [_refusal(print_outcome, document, outcome_words(outcome))]
     said += [_refusal(click.echo, complaint, err=True) for complaint in complaints]
     refusals = [refusal for refusal in said if refusal is not None]
     if refusals and not code:
