@@ -9,7 +9,7 @@ import attrs
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import Count, output_options
+from gen_profile.cli.options import bitrate_option, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -29,12 +29,7 @@ def can() -> None:
     "--interface", metavar="NAME", help="Only this interface, such as socketcan; all of them by default."
 )
 @click.option("--channel", metavar="NAME", help="Ask on this channel of it which nodes are there.")
-@click.option(
-    "--bitrate",
-    type=Count(10_000, 1_000_000),
-    default=500_000,
-    help="Of the channel in bit/s, where no system sets it; 500000 by default.",
-)
+@bitrate_option("channel")
 @output_options
 def list_(interface: str | None, channel: str | None, bitrate: int) -> None:
     """List CAN interfaces, their channels, and the nodes that answer.

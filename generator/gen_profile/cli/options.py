@@ -161,16 +161,28 @@ def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> 
     return completed(presets(), incomplete)
 
 
+def preset_option(text: str) -> Callable[[Command], Command]:
+    """Take a preset by its name."""
+    return click.option("--preset", metavar="NAME", shell_complete=complete_presets, help=text)
+
+
+def bitrate_option(channel: str) -> Callable[[Command], Command]:
+    """Take the bit rate of a CAN channel."""
+    words = f"Of the {channel} in bit/s, where no system sets it; 500000 by default."
+    return click.option("--bitrate", type=Count(10_000, 1_000_000), default=500_000, help=words)
+
+
+def spec_output_option(name: str) -> Callable[[Command], Command]:
+    """Take the file of a spec that is written, which may be the one that was read."""
+    words = f"Spec to write; ./{name} by default."
+    return click.option("--out", type=OutputFile(replaces="spec_path"), default=name, help=words)
+
+
 def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add what every command that takes a spec takes; the command gets it as `chosen`."""
 
     @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=PathType())
-    @click.option(
-        "--preset",
-        metavar="NAME",
-        shell_complete=complete_presets,
-        help="Use a built-in spec (see gen-profile presets).",
-    )
+    @preset_option("Use a built-in spec (see gen-profile presets).")
     @repeatable("--set", "KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
     @wraps(command)
     def choosing(

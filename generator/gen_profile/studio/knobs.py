@@ -134,7 +134,7 @@ def knobs(spec: Spec, document: Mapping[str, Any], start: Spec) -> list[Knob]:
 def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
     parameters = spec.machine().parameters
     yield from _move(spec, document.get("move", {}))
-    yield from (_of_parameter(one, "number", spec.plant.parameters[one.name]) for one in parameters)
+    yield from (_of_parameter(one, "number", "plant", spec.plant.parameters[one.name]) for one in parameters)
     yield from _fields(spec.robustness, "robustness")
     yield from _intervals(spec)
     yield from _fields(spec.cost, "cost")
@@ -145,7 +145,8 @@ def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
     yield from _fields(spec.check, "check")
     yield from _fields(spec.check.path, "check.path")
     yield from _fields(spec.check.wind, "check.wind")
-    yield from (_range(one, "check.spans", spec.check.spans.get(one.name)) for one in parameters)
+    spans = spec.check.spans
+    yield from (_of_parameter(one, "pair", "check.spans", spans.get(one.name)) for one in parameters)
     yield from _planner(spec)
     yield from _axes(spec, document.get("axis", {}))
     yield from _fields(spec.export, "export")
@@ -223,8 +224,8 @@ def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
             )
 
 
-def _of_parameter(one: Parameter, kind: str, value: Any) -> Knob:
-    place = "plant" if kind == "number" else "robustness.uncertain"
+def _of_parameter(one: Parameter, kind: str, place: str, value: Any) -> Knob:
+    """Tell a machine's parameter, or its range, which stand by its name in some table of the spec."""
     return Knob(
         path=f"{place}.{one.name}",
         kind=kind,
@@ -246,31 +247,19 @@ def _intervals(spec: Spec) -> Iterator[Knob]:
         nominal, fraction = spec.plant.parameters[one.name], spec.robustness.uncertain.get(one.name)
         if nominal > 0.0:
             ends = None if fraction is None else [nominal * (1.0 - fraction), nominal * (1.0 + fraction)]
-            yield _of_parameter(one, "interval", ends)
-
-
-def _range(one: Parameter, place: str, value: Any) -> Knob:
-    """Tell a parameter's least and greatest value, for something else than the design."""
-    return attrs.evolve(_of_parameter(one, "pair", value), path=f"{place}.{one.name}", words=place)
+            yield _of_parameter(one, "interval", "robustness.uncertain", ends)
 
 
 def _planner(spec: Spec) -> Iterator[Knob]:
     """Give the block's inputs at run time, and how fast they may change."""
     live, rates = spec.planner.live, spec.planner.live_rate
     for one in spec.machine().parameters:
-        yield _range(one, "planner.live", live.get(one.name))
+        yield _of_parameter(one, "pair", "planner.live", live.get(one.name))
         if one.name in live:
-            rate = _of_parameter(one, "number", rates.get(one.name))
-            yield attrs.evolve(
-                rate,
-                path=f"planner.live_rate.{one.name}",
-                words="planner.live_rate",
-                unit=f"{rate.unit}/s",
-                least=0.0,
-                most=None,
-                optional=True,
-                usual=0.1 * (live[one.name][1] - live[one.name][0]),
-            )
+            low, high = live[one.name]
+            rate = _of_parameter(one, "number", "planner.live_rate", rates.get(one.name))
+            rate = attrs.evolve(rate, unit=f"{rate.unit}/s", least=0.0, most=None, optional=True)
+            yield attrs.evolve(rate, usual=0.1 * (high - low))
     for axis in spec.machine().actuated:
         if axis.name in live:  # a hoist
             yield _pair("planner.live", f"planner.live.{axis.name}", axis.name, live[axis.name], axis.unit)

@@ -16,8 +16,8 @@ from gen_profile.cli.deployment.commands import deploy
 from gen_profile.cli.options import (
     PathType,
     SpecChoice,
-    complete_presets,
     output_options,
+    preset_option,
     repeatable,
     require_formats,
 )
@@ -52,12 +52,7 @@ Words = tuple[str, ...]
 
 @cli.command(epilog="Example: gen-profile commission crane.toml --export plc --to opc.tcp://10.0.0.5:4840")
 @click.argument("path", metavar="SPEC.toml", type=PathType())
-@click.option(
-    "--preset",
-    metavar="NAME",
-    shell_complete=complete_presets,
-    help="What a spec that is not there begins as.",
-)
+@preset_option("What a spec that is not there begins as.")
 @repeatable("--set", "KEY=VALUE", "A key of it.", into="overrides")
 @click.option(
     "--swing", metavar="CSV|URL", help="Log of a free swing, or a phone's address, as for log-swing."

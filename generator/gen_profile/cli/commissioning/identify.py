@@ -12,7 +12,6 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import (
     InputFile,
-    OutputFile,
     PathType,
     SpecChoice,
     output_options,
@@ -20,6 +19,7 @@ from gen_profile.cli.options import (
     repeatable,
     require_formats,
     spec_options,
+    spec_output_option,
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
@@ -106,12 +106,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option(
     "--at", metavar="POSITION,…", help="Where the axes stood, in m or rad; at the move's target by default."
 )
-@click.option(
-    "--out",
-    type=OutputFile(replaces="spec_path"),
-    default="identified.toml",
-    help="Spec to write; ./identified.toml by default.",
-)
+@spec_output_option("identified.toml")
 @plot_option
 @output_options
 def identify(
@@ -179,12 +174,7 @@ def _positions(text: str) -> list[float]:
     "--seen", "LOAD=M±M", "Greatest sway in m after a run as it was seen, within a bound (+- will do for ±)."
 )
 @log_options
-@click.option(
-    "--out",
-    type=OutputFile(replaces="spec_path"),
-    default="learned.toml",
-    help="Spec to write; ./learned.toml by default.",
-)
+@spec_output_option("learned.toml")
 @repeatable(
     "--export",
     "FORMAT",

@@ -12,7 +12,7 @@ import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, client_options
-from gen_profile.cli.options import Count, OutputFile, output_options
+from gen_profile.cli.options import Count, OutputFile, bitrate_option, output_options
 from gen_profile.cli.outcome import print_outcome, print_warnings
 from gen_profile.errors import OutputError, SpecError
 
@@ -40,12 +40,7 @@ DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and colu
 @click.option(
     "--counts", type=Count(1, 2**32), help="Of a turn of the encoder; it is asked for them by default."
 )
-@click.option(
-    "--bitrate",
-    type=Count(10_000, 1_000_000),
-    default=500_000,
-    help="Of the CAN channel in bit/s, where no system sets it; 500000 by default.",
-)
+@bitrate_option("CAN channel")
 @click.option(
     "--unit", default="rad", metavar="UNIT", help="Of its values, for the column's name; rad by default."
 )
