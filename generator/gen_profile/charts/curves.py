@@ -24,7 +24,6 @@ TWINS = 7  # machines beside the nominal one whose sway is drawn
 NEAR = 2.5  # times what is shown, up to which a limit is drawn; beyond, it would flatten the curves
 ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
-TIME = "time (s)"
 FOLLOWED = Style(colour=PALETTE[1], dash="dash")
 WINDY = Style(colour=PALETTE[-1], dash="dot")
 

@@ -241,10 +241,8 @@ def _left_of(along: Array) -> Array:
 def _name(axis: Any, place: Array, text: str, colour: str, towards: Array) -> None:
     """Write a name beside a place, in some direction, clear of it."""
     x, y = towards / np.linalg.norm(towards)
-    sides = {
-        "ha": ("right", "center", "left")[round(1.2 * x) + 1],
-        "va": ("top", "center", "bottom")[round(y) + 1],
-    }
+    sides = {"ha": ("right", "center", "left")[round(1.2 * x) + 1]}
+    sides["va"] = ("top", "center", "bottom")[round(y) + 1]
     offset = {"xytext": (APART * x, APART * y), "textcoords": "offset points"}
     weight = "normal" if colour == INK else "bold"
     axis.annotate(text, place, **offset, **sides, color=colour, fontweight=weight, zorder=5)

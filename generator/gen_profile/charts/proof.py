@@ -6,7 +6,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from gen_profile.charts.curves import TIME
 from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Level, Line, Map, Panel, Style
 from gen_profile.charts.picture import save
 from gen_profile.motion.metrics import length
@@ -62,31 +61,19 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     arrival = _arrival(trace)
     bands = [*_unpromised(trace)]
     panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
-    panels += [
-        Panel(
-            title=f"{name} as given to the block",
-            x_label=TIME,
-            y_label=_labelled(spec, name),
-            lines=[Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)],
-            levels=[Level(value=value) for value in spec.planner.live[name]],
-            bands=bands,
-        )
-        for name, corners in trace.history.hoisting.items()
-    ]
+    for name, corners in trace.history.hoisting.items():
+        line = Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)
+        ends, label = [Level(value=value) for value in spec.planner.live[name]], _labelled(spec, name)
+        title = f"{name} as given to the block"
+        panels.append(Panel(title=title, y_label=label, lines=[line], levels=ends, bands=bands))
     styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
-    panels.append(
-        Panel(
-            title=f"Sway of the {spec.machine().end_load_name}",
-            x_label=TIME,
-            y_label="sway (mm)",
-            lines=[
-                Line(name=name, x=times, y=1e3 * sway[few], style=style)
-                for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
-            ],
-            levels=[Level(value=sign * limit, between=(arrival, times[-1])) for sign in _signs(spec)],
-            bands=bands,
-        )
-    )
+    sways = [
+        Line(name=name, x=times, y=1e3 * sway[few], style=style)
+        for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
+    ]
+    levels = [Level(value=sign * limit, between=(arrival, times[-1])) for sign in _signs(spec)]
+    title = f"Sway of the {spec.machine().end_load_name}"
+    panels.append(Panel(title=title, y_label="sway (mm)", lines=sways, levels=levels, bands=bands))
     caption = "Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains."
     return Figure(caption=caption, panels=panels, columns=1)
 
@@ -116,17 +103,10 @@ def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
         ("Acceleration", f"{axis.unit}/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
     ):
         setpoints = trace.issued[axis.of(output)][few]
-        yield Panel(
-            title=title + of,
-            x_label=TIME,
-            y_label=f"{title.lower()} ({unit})",
-            lines=[
-                Line(name="setpoint", x=trace.times[few], y=setpoints, style=SETPOINT),
-                *_commanded(trace, command, place),
-            ],
-            levels=[Level(value=level) for level in levels],
-            bands=bands,
-        )
+        issued = Line(name="setpoint", x=trace.times[few], y=setpoints, style=SETPOINT)
+        lines, limits = [issued, *_commanded(trace, command, place)], [Level(value=level) for level in levels]
+        label = f"{title.lower()} ({unit})"
+        yield Panel(title=title + of, y_label=label, lines=lines, levels=limits, bands=bands)
 
 
 def worst_damped(proof: Proof) -> JudgedHistory | None:
@@ -152,37 +132,27 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
     outputs = [axis.of("fSwayEstimated") for axis in axes]
     estimates = [trace.issued[output] for output in outputs if output in trace.issued]
 
-    def lines(names: Sequence[str], columns: Array) -> list[Line]:
-        return [
-            Line(name=name, x=times, y=column, style=style)
-            for name, column, style in zip(names, columns.T, (SETPOINT, COMMAND), strict=False)
-        ]
-
-    def panel(title: str, y_label: str, lines: list[Line]) -> Panel:
-        return Panel(title=title, x_label=TIME, y_label=y_label, lines=lines, bands=bands)
+    def panel(title: str, y_label: str, names: Sequence[str], columns: Array) -> Panel:
+        drawn = zip(names, columns.T, (SETPOINT, COMMAND), strict=False)
+        lines = [Line(name=name, x=times, y=column, style=style) for name, column, style in drawn]
+        return Panel(title=title, y_label=y_label, lines=lines, bands=bands)
 
     along = [axis.name or "gusts" for axis in axes]
     shown = f"{sensor.quantity} ({unit}/s)" if sensor.quantity == "rate" else f"{sensor.quantity} ({unit})"
     true = trace.sway["this history"][few]
     sways = np.stack([true, length(np.stack(estimates, axis=1))[few, 0]], axis=1)
-    sway = panel(f"Sway of the {end_load}", "sway (mm)", lines(["true", "estimated"], 1e3 * sways))
+    sway = panel(f"Sway of the {end_load}", "sway (mm)", ["true", "estimated"], 1e3 * sways)
+    pushes = np.diff(sensed.pushed(edges), 2, axis=0)[few] / cycle**2
+    title = f"What the sensor shows: {sensor.quantity} of {' and '.join(sensor.names)}"
     panels = [
-        panel("Gusts", "push (m/s²)", lines(along, np.diff(sensed.pushed(edges), 2, axis=0)[few] / cycle**2)),
-        panel(
-            f"What the sensor shows: {sensor.quantity} of {' and '.join(sensor.names)}",
-            shown,
-            lines(sensor.names if len(axes) > 1 else ["shown"], trace.measured[few]),
-        ),
+        panel("Gusts", "push (m/s²)", along, pushes),
+        panel(title, shown, sensor.names if len(axes) > 1 else ["shown"], trace.measured[few]),
         attrs.evolve(sway, levels=[Level(value=sign * limit) for sign in _signs(spec)]),
-        *(
-            panel(
-                f"Position of {axis.name}" if axis.name else "Position",
-                f"position ({axis.unit})",
-                lines(["setpoint"], trace.issued[axis.of("fPosition")][few, None]),
-            )
-            for axis in axes
-        ),
     ]
+    for axis in axes:
+        title = f"Position of {axis.name}" if axis.name else "Position"
+        places = trace.issued[axis.of("fPosition")][few, None]
+        panels.append(panel(title, f"position ({axis.unit})", ["setpoint"], places))
     caption = "Shaded: not promised. Dashed in red: what may remain."
     return [Figure(caption=caption, panels=panels, columns=1), _remains_figure(spec, proof)]
 
