@@ -50,8 +50,8 @@ def studio(
         raise SpecError("--watch, --to: go together: name the file, and the controller that uses its table.")
     access = None if artefact is None else Access(**controller)
     text, source, folder = chosen.text()
-    words = ("--preset", source) if chosen.path is None else (source,)
-    start = changed_start(words, text, chosen.overrides, folder)
+    called = ("--preset", source) if chosen.path is None else (source,)
+    start = changed_start(called, text, chosen.overrides, folder)
     if not start.programs:  # else the page asks first
         chosen.spec()
     import asyncio
@@ -64,9 +64,8 @@ def studio(
 
             click.echo(json.dumps({"address": address, "code": code}, indent=2))
         else:
-            click.echo(
-                f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it.", err=True
-            )
+            words = f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it."
+            click.echo(words, err=True)
 
     def renew(code: str) -> None:
         click.echo(f"The code was used. Another browser that asks for one: {code}", err=True)
@@ -74,9 +73,8 @@ def studio(
     with ExitStack() as stack:
         watching = None if artefact is None or access is None else _watching(artefact, access, stack)
         try:
-            asyncio.run(
-                serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
-            )
+            pages = serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
+            asyncio.run(pages)
         except KeyboardInterrupt:
             click.echo("The studio is closed.", err=True)
 

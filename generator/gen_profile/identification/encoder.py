@@ -93,9 +93,8 @@ class Encoder:
         """Ask how many counts a turn has."""
         why = ""
         try:
-            if counts := int.from_bytes(
-                Link(bus, SystemClock()).sdo(self.node).upload(RESOLUTION, 0), "little"
-            ):
+            answer = Link(bus, SystemClock()).sdo(self.node).upload(RESOLUTION, 0)
+            if counts := int.from_bytes(answer, "little"):
                 return counts
         except SdoError as error:
             why = f" ({error})"

@@ -324,15 +324,10 @@ def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Arr
     measured = np.stack(list(move.angles.values()))
     q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
     unknown = null_space(gain).sum(axis=1)[:, None]
-    sways, other = (
-        [
-            np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
-            for sway in plant.outputs(list(q), list(q_a.T), p).sway
-        ]
-        for q in (q_u, q_u + ANYTHING * unknown)
-    )
-    return {
-        name: sway
-        for name, sway, same in zip(plant.loads, sways, other, strict=True)
-        if np.allclose(sway, same, rtol=1e-9, atol=1e-12)
-    }
+
+    def swayed(q: Any) -> list[Array]:
+        sways = plant.outputs(list(q), list(q_a.T), p).sway
+        return [np.broadcast_to(np.asarray(one, dtype=np.float64), len(q_a)).copy() for one in sways]
+
+    both = zip(plant.loads, swayed(q_u), swayed(q_u + ANYTHING * unknown), strict=True)
+    return {name: sway for name, sway, same in both if np.allclose(sway, same, rtol=1e-9, atol=1e-12)}

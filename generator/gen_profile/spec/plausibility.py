@@ -117,9 +117,8 @@ def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Itera
 def _move(spec: Spec) -> Iterator[Implausibility]:
     """Question distances, the duration, and speeds that follow from them."""
     move, axes = spec.move, spec.machine().actuated
-    for axis, distance, speed in zip(
-        axes, map(abs, move.distance), map(abs, move.final_velocity), strict=True
-    ):
+    ways, speeds = map(abs, move.distance), map(abs, move.final_velocity)
+    for axis, distance, speed in zip(axes, ways, speeds, strict=True):
         unit = axis.unit
         meant = distance / 1e3 if unit == "m" else math.radians(distance)
         template = "distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"

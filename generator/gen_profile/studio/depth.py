@@ -43,7 +43,7 @@ def depth(question: Question) -> Iterator[Part]:
 
 
 def _comparison(compared: Comparison, own: str) -> Part:
-    spec = compared.spec
+    spec, advised = compared.spec, compared.recommended.values()
     return {
         "part": "comparison",
         "own": own,
@@ -59,9 +59,7 @@ def _comparison(compared: Comparison, own: str) -> Part:
             for row in compared.rows
         ],
         "missing": compared.missing(),
-        "recommended": {
-            advice.aim: advice.method for advice in compared.recommended.values() if advice.method
-        },
+        "recommended": {advice.aim: advice.method for advice in advised if advice.method},
     }
 
 

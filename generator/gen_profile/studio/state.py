@@ -272,13 +272,8 @@ def _drop(table: Any, path: list[str]) -> None:
 
 def _written(value: Any) -> str:
     """Write a value as a person would behind ``KEY=``: a word without quotes where it stays one."""
-    if (
-        isinstance(value, str)
-        and re.fullmatch(r"[a-z][a-z-]*", value)
-        and value not in ("true", "false", "inf", "nan")
-    ):
-        return value
-    return _inline(value)
+    is_word = isinstance(value, str) and re.fullmatch(r"[a-z][a-z-]*", value)
+    return value if is_word and value not in ("true", "false", "inf", "nan") else _inline(value)
 
 
 def _inline(value: Any) -> str:

@@ -98,9 +98,8 @@ def commission(path: Path, *, yes: bool, **options: Any) -> None:
         page = path.with_suffix(".html")
         run.call(report, spec_path=files[0], path=page, no_compare=True)
         record = None
-        if url and (
-            yes or click.confirm(f"Does the axis stand still, and may {files[0]} be put to use?", err=True)
-        ):
+        question = f"Does the axis stand still, and may {files[0]} be put to use?"
+        if url and (yes or click.confirm(question, err=True)):
             _announce("5. Into the controller")
             run.call(deploy, artefact=files[0], url=url)
             record = files[0].parent / "deployments.json"
@@ -146,14 +145,11 @@ class _Guide:
             return given, readings
         self._preset = self.answer("preset", "Most like which of gen-profile presets", "bay-crane")
         spec = SpecChoice(None, self._preset, given).spec()
-        asked: dict[str, tuple[str, object]] = {
-            f"plant.{q.name}": (
-                f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)",
-                spec.plant.parameters[q.name],
-            )
-            for q in spec.machine().parameters
-            if q.name != "g" and not any(one.startswith(f"{q.name}=") for one in readings)
-        }
+        asked: dict[str, tuple[str, object]] = {}
+        for q in spec.machine().parameters:
+            if q.name != "g" and not any(one.startswith(f"{q.name}=") for one in readings):
+                question = f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)"
+                asked[f"plant.{q.name}"] = (question, spec.plant.parameters[q.name])
         if len(spec.machine().actuated) == 1:
             asked |= {key: (question, value(spec)) for key, (question, value) in ASKED.items()}
         for key, (question, value) in asked.items():
@@ -182,9 +178,8 @@ class _Guide:
 
     def logged(self, path: Path) -> tuple[Path | None, dict[str, str]]:
         """Give the log of a swing, which a phone may write now, and what it is a log of."""
-        swing = self.answer(
-            "swing", "Log of a free swing: a file, or a phone's address; nothing for none", ""
-        )
+        question = "Log of a free swing: a file, or a phone's address; nothing for none"
+        swing = self.answer("swing", question, "")
         if not swing.startswith("http:"):
             if swing and not Path(swing).is_file():
                 raise OutputError(f"There is no log {swing}; nothing was written.")
