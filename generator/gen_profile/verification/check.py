@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from io import StringIO
 from itertools import chain
 from pathlib import Path
@@ -32,36 +32,21 @@ from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
 
-@attrs.frozen(kw_only=True)
-class MotionVariant:
-    """What is asked for, by axis.
+def varied(
+    spec: Spec, setpoints: SampledProfile, scale: Sequence[str], mirror: Sequence[str], offset: Sequence[str]
+) -> tuple[Spec, SampledProfile, str | None]:
+    """Change a motion, and the move that it is judged by, and say how in words; None where nothing is asked.
 
-    Attributes
+    Parameters
     ----------
-    scale : mapping of str to float
-        Factors of the distance, 0 to 1.
-    mirror : tuple of str
+    spec : Spec
+    setpoints : SampledProfile
+    scale : sequence of str
+        Factors of the distance, 0 to 1, as ``AXIS=FACTOR``; a machine of one axis needs no name.
+    mirror : sequence of str
         Axes that go the other way.
-    offset : mapping of str to float
-        Where they begin, in m (or rad) from the start as planned.
-    """
-
-    scale: Mapping[str, float] = attrs.field(factory=dict)
-    mirror: tuple[str, ...] = ()
-    offset: Mapping[str, float] = attrs.field(factory=dict)
-
-    def described(self) -> str | None:
-        """Describe it in words, or not at all where the motion is as planned."""
-        words = [f"{name} {value:g} times as far" for name, value in self.scale.items()]
-        words += [f"{name} the other way" for name in self.mirror]
-        words += [f"{name} begins {value:+g} from its start" for name, value in self.offset.items()]
-        return ", ".join(words) or None
-
-
-def parse_variant(
-    spec: Spec, scale: Sequence[str], mirror: Sequence[str], offset: Sequence[str]
-) -> MotionVariant:
-    """Read ``AXIS=VALUE``; a machine of one axis needs no name.
+    offset : sequence of str
+        Where they begin, in m (or rad) from the start as planned, as ``AXIS=DISTANCE``.
 
     Raises
     ------
@@ -72,19 +57,16 @@ def parse_variant(
     for name, value in factors.items():
         if not 0.0 <= value <= 1.0:
             raise SpecError(f"scale {name}={value:g}: a playback block takes 0 to 1.")
-    return MotionVariant(
-        scale=factors,
-        mirror=tuple(_axis("mirror", name, axes) for name in mirror),
-        offset=dict(_entry("offset", text, axes) for text in offset),
-    )
-
-
-def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tuple[Spec, SampledProfile]:
-    """Change a motion, and the move that it is judged by."""
-    start, signs = np.array(spec.move.start), dict.fromkeys(variant.mirror, -1.0)
-    gain = np.array([signs.get(name, 1.0) * variant.scale.get(name, 1.0) for name in spec.axis])
-    shift = np.array([variant.offset.get(name, 0.0) for name in spec.axis])
-
+    mirrored = [_axis("mirror", name, axes) for name in mirror]
+    offsets = dict(_entry("offset", text, axes) for text in offset)
+    words = [f"{name} {value:g} times as far" for name, value in factors.items()]
+    words += [f"{name} the other way" for name in mirrored]
+    words += [f"{name} begins {value:+g} from its start" for name, value in offsets.items()]
+    if not words:
+        return spec, setpoints, None
+    start, signs = np.array(spec.move.start), dict.fromkeys(mirrored, -1.0)
+    gain = np.array([signs.get(name, 1.0) * factors.get(name, 1.0) for name in axes])
+    shift = np.array([offsets.get(name, 0.0) for name in axes])
     move = attrs.evolve(
         spec.move,
         start=tuple((start + shift).tolist()),
@@ -93,7 +75,7 @@ def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tup
     )
     columns: dict[str, Any] = {name: values * gain for name, values in columns_of(setpoints).items()}
     columns["position"] = start + shift + gain * (setpoints.position - start)
-    return attrs.evolve(spec, move=move), attrs.evolve(setpoints, **columns)
+    return attrs.evolve(spec, move=move), attrs.evolve(setpoints, **columns), ", ".join(words)
 
 
 def _entry(option: str, text: str, axes: Sequence[str]) -> tuple[str, float]:
@@ -185,7 +167,7 @@ def check_artefact(
     strict : bool
         Whether faults in the timing of setpoints count as well.
     scale, mirror, offset : sequences of str, or str
-        A variant to judge, see `gen_profile.verification.check.parse_variant`.
+        A variant to judge, see `gen_profile.verification.check.varied`.
     progress : callable
         Told of a compilation, and how many scenarios beyond the machines are done, and of how many.
 
@@ -208,18 +190,15 @@ def check_artefact(
     content, format_ = read_artefact(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
-    variant = parse_variant(spec, *map(as_names, (scale, mirror, offset)))
     agreement = provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
-    judged = varied(spec, setpoints, variant) if variant.described() else (spec, setpoints)
-    rows, searched = _rows(*judged, row, progress)
-    check = _verdict(*judged, rows, progress)
+    asked, played, variant = varied(spec, setpoints, *map(as_names, (scale, mirror, offset)))
+    rows, searched = _rows(asked, played, row, progress)
+    check = _verdict(asked, played, rows, progress)
     faults = (*check.faults, *alterations(path, agreement))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
-    return Judgement(
-        path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant.described()
-    )
+    return Judgement(path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant)
 
 
 def scenario_table(judgement: Judgement) -> str:
