@@ -315,28 +315,23 @@ def _log_warnings(row: Mapping[str, Any]) -> Iterator[str]:
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
     known = {q.name: q for q in plant.parameters}
-    read = {reading.parameter for reading in readings if isinstance(reading, DirectReading)}
+    direct = [one for one in readings if isinstance(one, DirectReading)]
+    read = {one.parameter for one in direct}
     faults = [
         f"{'measured' if name in read else 'free'} {name}: unknown parameter{suggestion(name, known)}"
         for name in sorted(asked - known.keys())
     ]
-    for reading in (reading for reading in readings if isinstance(reading, DirectReading)):
-        parameter = known.get(reading.parameter)
-        if parameter and not parameter.lower <= reading.value <= parameter.upper:
-            faults.append(
-                f"measured {parameter.name}: must be from {parameter.lower:g} to {parameter.upper:g} "
-                f"{parameter.unit}, found {reading.value:g}."
-            )
+    for reading in direct:
+        q = known.get(reading.parameter)
+        if q and not q.lower <= reading.value <= q.upper:
+            bounds = f"{q.lower:g} to {q.upper:g} {q.unit}"
+            faults.append(f"measured {q.name}: must be from {bounds}, found {reading.value:g}.")
     modes = len(plant.unactuated)
-    faults += [
-        f"period: the machine has {modes} modes, found mode {reading.mode}."
-        for reading in readings
-        if isinstance(reading, Period) and reading.mode > modes
-    ]
+    beyond = [one.mode for one in readings if isinstance(one, Period) and one.mode > modes]
+    faults += [f"period: the machine has {modes} modes, found mode {mode}." for mode in beyond]
     if not asked:
-        faults.append(
-            "Name what to identify: parameters to free, or a direct reading, NAME=VALUE±UNCERTAINTY."
-        )
+        what = "parameters to free, or a direct reading, NAME=VALUE±UNCERTAINTY"
+        faults.append(f"Name what to identify: {what}.")
     if faults:
         raise SpecError(*faults)
 

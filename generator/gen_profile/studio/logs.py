@@ -38,7 +38,8 @@ def log(asked: LogQuestion) -> Iterator[Part]:
         spec = asked.question.spec()
         text = decoded(asked.content, asked.name)
         columns = column_meanings(text, asked.name, spec)[:MOST_COLUMNS]
-        asked = attrs.evolve(asked, free=asked.free or _usual(spec))
+        usual = tuple(spec.robustness.uncertain) or (spec.machine().parameters[0].name,)
+        asked = attrs.evolve(asked, free=asked.free or usual)  # what the spec does not know well
         try:
             read = parse_log(text, asked.name, spec, asked.columns)
         except OutputError as error:
@@ -63,11 +64,6 @@ def _is_move(spec: Spec, read: MeasuredLog) -> bool:
         float(np.ptp(values)) > MOVED * ways[names.index(name)] > 0.0
         for name, values in read.positions.items()
     )
-
-
-def _usual(spec: Spec) -> tuple[str, ...]:
-    """Choose what to identify: what the spec does not know well, or else the first parameter."""
-    return tuple(spec.robustness.uncertain) or (spec.machine().parameters[0].name,)
 
 
 def _reading(asked: LogQuestion, spec: Spec, columns: list[tuple[str, str]], use: str) -> Part:

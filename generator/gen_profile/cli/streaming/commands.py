@@ -22,7 +22,7 @@ from gen_profile.cli.options import (
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
-from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words, units
+from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words
 from gen_profile.errors import OutputError, StreamAborted
 from gen_profile.plugins import require_installed
 
@@ -94,7 +94,7 @@ def stream(table: Path | None, **options: Any) -> None:
             source = slow
         if request.dry_run:
             plan = run.summary(source)
-            print_outcome(plan, plan_words(plan, units(source)))
+            print_outcome(plan, plan_words(plan, [axis.unit for axis in source.axes]))
             return
         port = request.port(source.spec.can)
         if table is not None:
