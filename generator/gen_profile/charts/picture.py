@@ -49,7 +49,7 @@ def require_drawable(path: Path) -> None:
 
 
 def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
-    """Draw figures side by side in one file; Matplotlib's pyplot stays as the caller has it.
+    """Draw figures side by side in one file.
 
     Parameters
     ----------
@@ -65,6 +65,21 @@ def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
     OutputError
         The file cannot be written.
     """
+    write(drawn(figures, title), path, salt)
+
+
+def write(canvas: Any, path: Path, salt: str) -> None:
+    """Write a figure of Matplotlib's to a file, the same bytes each time; as `save`."""
+    import matplotlib  # noqa: PLC0415  # an extra
+
+    suffix, content = path.suffix.lower(), BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": salt}):
+        canvas.savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
+    deliver(path, content.getvalue())
+
+
+def drawn(figures: Sequence[Figure], title: str) -> Any:
+    """Draw figures side by side, as a figure of Matplotlib's; its pyplot stays as the caller has it."""
     from matplotlib.figure import Figure as Canvas  # noqa: PLC0415  # an extra
 
     columns = _columns(figures[0])
@@ -76,17 +91,7 @@ def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
     for part, figure, width in zip(parts, figures, widths, strict=True):
         _draw(part, figure, width)
     picture.suptitle(title)
-    write(picture, path, salt)
-
-
-def write(canvas: Any, path: Path, salt: str) -> None:
-    """Write a figure of Matplotlib's to a file, the same bytes each time; as `save`."""
-    import matplotlib  # noqa: PLC0415  # an extra
-
-    suffix, content = path.suffix.lower(), BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": salt}):
-        canvas.savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
-    deliver(path, content.getvalue())
+    return picture
 
 
 def _draw(part: Any, figure: Figure, width: float) -> None:
