@@ -183,5 +183,4 @@ def _level(level: Level) -> dict[str, Any]:
         "y0": level.value,
         "y1": level.value,
         "line": DASHED,
-        "label": {"text": escape(level.name), "textposition": "end", "font": {"size": 11, "color": LIMIT}},
     }

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -199,9 +198,12 @@ class Fit:
     def left(self, unknowns: Array, until: float = np.inf) -> list[Array]:
         """Say what is left of every log up to a time in s, in rad or m."""
         residuals, _ = self.residuals(unknowns, np.ones(len(self.models)), until)
-        counts = [len(self.readings), *(model.samples(until) for model in self.models)]
-        ends = np.cumsum(counts)
-        return [residuals[low:high] for low, high in pairwise(ends.tolist())]
+        return self.of_logs(residuals, until)
+
+    def of_logs(self, values: Array, until: float = np.inf) -> list[Array]:
+        """Pick every log's part of residuals, or of what has their places last, up to a time in s."""
+        ends = np.cumsum([len(self.readings), *(model.samples(until) for model in self.models)])
+        return np.split(values, ends, axis=-1)[1:-1]
 
     def _noise(self, unknowns: Array, until: float, parameters: int) -> Array:
         """Estimate every log's standard deviation, widened where neighbouring residuals are alike."""

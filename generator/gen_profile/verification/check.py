@@ -261,13 +261,13 @@ def _rows(
     rows = (*machines, *further_scenarios(spec, machines))
     if row is not None and 0 <= row < len(rows):
         return (rows[row],), 0
-    worst = worst_machines(spec, setpoints, rows, progress)
-    rows = (*rows, *worst.machines)
+    worst, tried = worst_machines(spec, setpoints, rows, progress)
+    rows = (*rows, *worst)
     if row is None:
-        return rows, worst.tried
+        return rows, tried
     if not 0 <= row < len(rows):
         raise SpecError(f"scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}.")
-    return (rows[row],), worst.tried
+    return (rows[row],), tried
 
 
 def _verdict(
