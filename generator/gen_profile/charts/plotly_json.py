@@ -71,8 +71,7 @@ def _bars(panel: Bars) -> dict[str, Any]:
     layout = _labels(panel.x_label, "")
     layout["xaxis"] |= {"range": [0, panel.end]}
     layout["yaxis"] |= {"autorange": "reversed"}
-    limit = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": panel.limit, "x1": panel.limit}
-    layout["shapes"] = [{**limit, "line": DASHED}]
+    layout["shapes"] = [_shape("line", (panel.limit, panel.limit), (0, 1), yref="paper", line=DASHED)]
     bars = {
         "type": "bar",
         "orientation": "h",
@@ -146,41 +145,22 @@ def _abscissa(x: Array) -> dict[str, Any]:
     return {"x": rounded(x)}
 
 
+def _shape(kind: str, x: tuple[float, float], y: tuple[float, float], **look: Any) -> dict[str, Any]:
+    return {"type": kind, "x0": x[0], "x1": x[1], "y0": y[0], "y1": y[1], **look}
+
+
 def _band(band: Band) -> dict[str, Any]:
     edge = {"width": 1, "color": FRAME, "dash": "dot"} if band.low == band.high else {"width": 0}
-    return {
-        "type": "rect",
-        "layer": "below",
-        "x0": band.low,
-        "x1": band.high,
-        "yref": "paper",
-        "y0": 0,
-        "y1": 1,
-        "fillcolor": SHADE,
-        "line": edge,
-    }
+    look = {"yref": "paper", "layer": "below", "fillcolor": SHADE, "line": edge}
+    return _shape("rect", (band.low, band.high), (0, 1), **look)
 
 
 def _frame(frame: tuple[float, float], colour: str, dash: Dash) -> dict[str, Any]:
     width, height = frame
-    return {
-        "type": "rect",
-        "x0": -width,
-        "x1": width,
-        "y0": -height,
-        "y1": height,
-        "line": {"width": 1.2, "color": colour, "dash": dash},
-    }
+    line = {"width": 1.2, "color": colour, "dash": dash}
+    return _shape("rect", (-width, width), (-height, height), line=line)
 
 
 def _level(level: Level) -> dict[str, Any]:
-    left, right = level.between or (0, 1)
-    return {
-        "type": "line",
-        "xref": "paper" if level.between is None else "x",
-        "x0": left,
-        "x1": right,
-        "y0": level.value,
-        "y1": level.value,
-        "line": DASHED,
-    }
+    across = "paper" if level.between is None else "x"
+    return _shape("line", level.between or (0, 1), (level.value, level.value), xref=across, line=DASHED)

@@ -217,11 +217,6 @@ def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:
     return [Line(name="command", x=x, y=y, style=COMMAND)]
 
 
-def _centres(ends: tuple[float, float]) -> Array:
-    low, high = ends
-    return low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
-
-
 def _shares_panel(
     title: str,
     labels: Sequence[str],
@@ -243,20 +238,18 @@ def _shares_panel(
             lines=[Line(name="history", x=places[0][order], y=shares[order], style=Style(dash="points"))],
             levels=[Level(value=100.0)],
         )
+    low, high = np.transpose(ranges)
+    cells = np.minimum(CELLS * (places.T - low) / (high - low), CELLS - 1).astype(int)
     worst = np.full((CELLS, CELLS), np.nan)
-    for place, share in zip(places.T.tolist(), shares, strict=True):
-        cell = tuple(
-            min(CELLS - 1, int(CELLS * (value - low) / (high - low)))
-            for value, (low, high) in zip(place, ranges, strict=True)
-        )
-        worst[cell] = np.fmax(worst[cell], share)
+    np.fmax.at(worst, tuple(cells.T), shares)
+    centres = [start + (end - start) * (np.arange(CELLS) + 0.5) / CELLS for start, end in ranges]
     return Map(
         title=title,
         x_label=labels[0],
         y_label=labels[1],
         unit="% of limit",
-        x=_centres(ranges[0]),
-        y=_centres(ranges[1]),
+        x=centres[0],
+        y=centres[1],
         values=worst.T,
         limit=100.0,
         cells=True,

@@ -81,6 +81,5 @@ def _curves(name: str, curve: Robustness, styles: Mapping[str, Style]) -> Panel:
 
 
 def _off(curve: Robustness, name: str) -> str:
-    nominal = curve.spec.plant.parameters[name]
-    (unit,) = (known.unit for known in curve.spec.machine().parameters if known.name == name)
+    nominal, unit = curve.spec.plant.parameters[name], curve.spec.machine().units[name]
     return Phrase("{name} off {nominal:g} {unit} by (%)", name=name, nominal=nominal, unit=unit)
