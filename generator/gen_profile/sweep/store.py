@@ -228,7 +228,7 @@ def _locked(folder: Path) -> Iterator[None]:
     lock = FileLock(folder / LOCK)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock.acquire(blocking=False)
+        held = lock.acquire(blocking=False)
     except Timeout as error:
         raise OutputError(f"Another sweep is at work in {folder}; wait for its end.") from error
     except (OSError, NotImplementedError) as error:  # the latter of file systems without locks
@@ -236,10 +236,8 @@ def _locked(folder: Path) -> Iterator[None]:
             f"Cannot write to the folder {folder}: {getattr(error, 'strerror', '') or error}; "
             "choose another one."
         ) from error
-    try:
+    with held:
         yield
-    finally:
-        lock.release()
 
 
 def grid_of(path: Path) -> Grid:

@@ -153,9 +153,6 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
     return worst_places(shares, begun, KEPT)
 
 
-
-
-
 def _coarse(way: _Way, setpoints: SampledProfile, step: float) -> Feed:
     """Leave out setpoints that straight lines do not need; what the path makes of them needs all."""
     row = Scenario(name="", parameters={}, group=way.group, lag=way.lag)
