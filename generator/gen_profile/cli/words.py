@@ -93,7 +93,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
     """Tell how an artefact was judged, and what is proved of it."""
     check = judged.check
     findings = [
-        (finding.scenario.name, ", ".join(f"{load} {mm(sway)}" for load, sway in finding.residual.items()))
+        (finding.scenario.name, _by_load(finding.residual))
         for finding in check.findings
         if finding.scenario.group == "machines" or len(check.findings) == 1
     ]
@@ -126,7 +126,7 @@ def _proved(certificate: Certificate) -> Iterator[tuple[str, str]]:
     )
     fraction = "" if certificate.fraction == 1.0 else f"{100.0 * certificate.fraction:.3g} % of "
     yield "machines", f"{fraction}all with {machines}" if machines else "the nominal one"
-    bounds = ", ".join(f"{load} {mm(bound)}" for load, bound in certificate.bounds.items())
+    bounds = _by_load(certificate.bounds)
     said = [f"{bounds}, from {certificate.arrival:.4g} s on"] if bounds else []
     if (way := certificate.on_the_way) is not None and way.bound is not None:
         said.append(f"{way.limit.load} {mm(way.bound)} at any time")
@@ -163,8 +163,8 @@ def block_judgement(judged: BlockJudgement) -> str:
         ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
         ("given", worst.history.reported(judged.spec.machine().units)),
         ("commands", "; ".join(commands)),
-        ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
-        ("sway on the way", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.on_the_way.items())),
+        ("residual sway", _by_load(worst.residual)),
+        ("sway on the way", _by_load(worst.on_the_way)),
         ("history kept", "passed" if judged.check.passed else "FAILED"),
     ]
     return _block(str(judged.path), rows)
@@ -172,7 +172,7 @@ def block_judgement(judged: BlockJudgement) -> str:
 
 def _proof(proof: Proof) -> list[tuple[str, str]]:
     document, verdict = proof.to_dict(), "passed" if proof.passed else "FAILED"
-    worst = ", ".join(f"{load} {mm(sway)}" for load, sway in proof.worst.residual.items())
+
     groups = []
     for group in document["groups"]:
         most = (f"{100.0 * float(q):g} % ≤ {100.0 * s:.3g} %" for q, s in group["quantiles"].items())
@@ -186,7 +186,7 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
     return [
         *groups,
         ("limits", limits),
-        ("worst history", f"{proof.worst.number}: residual sway {worst}"),
+        ("worst history", f"{proof.worst.number}: residual sway {_by_load(proof.worst.residual)}"),
         ("proof", f"{verdict}: {100.0 * document['share']:.3g} % of the limit"),
     ]
 
@@ -210,8 +210,8 @@ def _wind(check: Check) -> list[tuple[str, str]]:
     """Tell how far the wind holds the loads aside, where the spec states one."""
     if check.wind is None:
         return []
-    aside = ", ".join(f"{load} {mm(by)}" for load, by in check.wind.loads.items())
-    return [(f"wind, {check.wind.force:g} N", f"holds aside {aside} ({check.wind.machine}); not judged")]
+    held = f"holds aside {_by_load(check.wind.loads)} ({check.wind.machine}); not judged"
+    return [(f"wind, {check.wind.force:g} N", held)]
 
 
 def comparison(compared: Comparison) -> str:
@@ -400,6 +400,10 @@ def _peaks(outcome: Design) -> list[tuple[str, str]]:
         peaks.setdefault(one.axis.name, []).append(f"{one.asked:.4g} {one.unit}")
     title = kind if len(peaks) == 1 else f"{kind}, {{}}"
     return [(title.format(axis), ", ".join(of_axis)) for axis, of_axis in peaks.items()]
+
+
+def _by_load(sways: Mapping[str, float]) -> str:
+    return ", ".join(f"{load} {mm(sway)}" for load, sway in sways.items())
 
 
 def _verdict(check: Check | None) -> str:

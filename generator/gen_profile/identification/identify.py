@@ -77,7 +77,7 @@ class Identification(Drawable):
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        estimated, units = self.estimate, {q.name: q.unit for q in self.spec.machine().parameters}
+        estimated, units = self.estimate, self.spec.machine().units
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
