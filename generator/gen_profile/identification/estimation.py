@@ -164,12 +164,8 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
     if not explained:
         return
     model, left = next((m, one) for m, one in zip(fit.models, misfit_of_logs, strict=True) if one is not None)
-    units = {q.name: q.unit for q in fit.machine.plant.parameters}
     template = "another {freed} than the spec's ({values})"
-    others = []
-    for one in explained:
-        values = ", ".join(f"{name} {value:.4g} {units[name]}" for name, value in one.values.items())
-        others.append(Phrase(template, freed=joined(AND, one.freed), values=values))
+    others = [Phrase(template, freed=joined(AND, one.freed), values=one.words) for one in explained]
     freed = joined(AND, explained[0].freed)
     template = "free {freed}, too, or measure {which} directly"
     cure: str = Phrase(template, freed=freed, which="it" if len(explained[0].freed) == 1 else "them")

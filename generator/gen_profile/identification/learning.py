@@ -237,11 +237,7 @@ def _require_unchanged(fit: Fit, model: DrivenModel, unknowns: Array, *, certain
         )
     if not (explained or certain):
         return
-    units = {q.name: q.unit for q in fit.machine.plant.parameters}
-    others = " or with ".join(
-        ", ".join(f"{name} {value:.4g} {units[name]}" for name, value in one.values.items())
-        for one in explained
-    )
+    others = " or with ".join(one.words for one in explained)
     cure = f"nothing but noise is left with {others}: the machine has changed, or the spec was wrong there"
     if not others:
         cure = "nor does any that differs in one more parameter: look at how and of what this was logged"
@@ -292,7 +288,7 @@ class Learning:
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        units, ranges = {q.name: q.unit for q in self.spec.machine().parameters}, self.spec.checked_ranges()
+        units, ranges = self.spec.machine().units, self.spec.checked_ranges()
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),

@@ -151,10 +151,10 @@ class Explanation:
     noise: Array
 
     @property
-    def values(self) -> dict[str, float]:
-        """All parameters that are then identified."""
-        parameters = self.fit.parameters(self.unknowns)
-        return {name: parameters[name] for name in self.fit.names}
+    def words(self) -> str:
+        """All parameters that are then identified, with their values."""
+        parameters, units = self.fit.parameters(self.unknowns), self.fit.machine.plant.units
+        return ", ".join(f"{name} {parameters[name]:.4g} {units[name]}" for name in self.fit.names)
 
     def squares(self, noise: Array) -> float:
         """Sum up the squares of what is left, in variances of some noise."""
