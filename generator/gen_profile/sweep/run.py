@@ -161,13 +161,8 @@ def sweep(
         statuses[row["status"]] += 1
         if row["status"] != PASSED:
             reasons.setdefault(row["status"], f"case {row['case']}: {row['reason']}")
-    return Sweep(
-        store=store,
-        statuses=dict(statuses),
-        reasons=reasons,
-        kept=len(grid) - len(unfinished),
-        table=table,
-    )
+    before = len(grid) - len(unfinished)
+    return Sweep(store=store, statuses=dict(statuses), reasons=reasons, kept=before, table=table)
 
 
 def _work(

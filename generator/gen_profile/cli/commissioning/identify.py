@@ -62,13 +62,8 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
         from gen_profile.identification.identify import read_swing
 
-        how: dict[str, Any] = {
-            "columns": (time, value),
-            "signal": signal,
-            "unit": unit,
-            "time_unit": time_unit,
-        }
-        return command(read=partial(read_swing, **how), **options)
+        read = partial(read_swing, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit)
+        return command(read=read, **options)
 
     return reading
 
