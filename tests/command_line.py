@@ -20,7 +20,6 @@ from json_page import require_documented
 
 from gen_profile.cli import main
 from gen_profile.cli.commands import cli
-from gen_profile.cli.group import DefaultGroup
 
 
 def commands_of(group: click.Group, before: str = "") -> dict[str, click.Command]:
@@ -78,9 +77,7 @@ def run_here(*arguments: str | Path) -> Outcome:
     outcome = Outcome(code or 0, _text(out), _text(err))
     if "--json" in arguments and outcome.out:
         words = [" ".join(map(str, arguments[:count])) for count in (1, 2)]
-        require_documented(
-            next((name for name in words if name in COMMANDS), DefaultGroup.default), outcome.document
-        )
+        require_documented(next((name for name in words if name in COMMANDS), cli.default), outcome.document)
     return outcome
 
 

@@ -44,8 +44,8 @@ def store(tmp_path):
     store = prepared(tmp_path / "swept.sqlite")
     with opened(store) as kept:
         for case in (2, 0, 3):
-            kept.keep(case, passed(store, case))
-        kept.keep(1, failed(1, store.grid[1], "infeasible", "Too fast."))
+            kept.keep(passed(store, case))
+        kept.keep(failed(1, store.grid[1], "infeasible", "Too fast."))
     return store
 
 
@@ -88,7 +88,7 @@ def test_a_writer_that_is_killed_has_kept_every_case_whole(tmp_path):
     killed.mkdir()
     with opened(store) as kept:
         for case in range(3):
-            kept.keep(case, passed(store, case))
+            kept.keep(passed(store, case))
         for path in tmp_path.glob("swept.sqlite*"):  # what the disk has at this instant
             shutil.copy(path, killed)
     log = killed / "swept.sqlite-wal"
@@ -99,7 +99,7 @@ def test_a_writer_that_is_killed_has_kept_every_case_whole(tmp_path):
     with opened(again) as kept:
         assert [kept.is_finished(case) for case in range(4)] == [True, True, False, False]
         for case in (2, 3):
-            kept.keep(case, passed(store, case))
+            kept.keep(passed(store, case))
     assert swept_table(again.folder, store.grid)["status"].to_pylist() == 4 * ["passed"]
 
 
@@ -138,7 +138,7 @@ def test_a_file_altered_in_it_is_refused_and_worked_out_again(store, tmp_path):
     assert not (tmp_path / "out").exists()
     with opened(store) as kept:
         assert [kept.is_finished(case) for case in range(4)] == [True, True, False, True]
-        kept.keep(2, passed(store, 2))
+        kept.keep(passed(store, 2))
     take_out(store.folder, row, tmp_path / "out")
     assert (tmp_path / "out" / "paper.csv").read_bytes() == TABLE
 

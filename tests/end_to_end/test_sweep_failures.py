@@ -298,7 +298,7 @@ def test_a_table_that_is_missing_or_damaged_is_named(tmp_path):
 def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
     store = prepared(tmp_path, "move.duration=3,4")
     for case in range(2):
-        store.keep(case, failed(case, store.grid[case], "infeasible", "no"))
+        store.keep(failed(case, store.grid[case], "infeasible", "no"))
     assert store.is_finished(0) and store.is_finished(1)
     (store.case_folder(0) / "case.json").write_bytes(content)
     assert not store.is_finished(0) and store.is_finished(1)

@@ -9,8 +9,8 @@ from generator.lagrangian_machines import MACHINES
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.estimation import estimate
-from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
+from gen_profile.identification.swing_model import SwingingMachine
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.linearization import linearize
 

@@ -9,7 +9,7 @@ from command_line import PROGRAM
 
 from gen_profile.identification.identify import identify
 from gen_profile.identification.measurements import SwingLog
-from gen_profile.identification.swing_model import MOST_SAMPLES, shortened
+from gen_profile.identification.swing_model import MOST_SAMPLES, SwingingMachine, shortened
 from gen_profile.spec.reading import preset_spec
 
 LENGTH, DAMPING = 3.4, 0.004  # m, of the rope; 1/s
@@ -35,7 +35,8 @@ def test_averages_are_of_their_times_and_keep_the_sensors_step():
 def test_a_short_log_is_taken_as_it_is():
     spec, times = preset_spec(PRESET), np.arange(MOST_SAMPLES) / 10.0
     log = SwingLog(times=times, values=np.sin(times), quantity="angle", load="payload")
-    assert shortened(log, spec.machine(), spec.plant.parameters, spec.move.target) is log
+    machine = SwingingMachine(plant=spec.machine(), parameters=spec.plant.parameters, q_a=spec.move.target)
+    assert shortened(log, machine) is log
 
 
 @pytest.mark.slow

@@ -7,11 +7,11 @@ from generator.free_swings import inside, swing
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification import misfit
 from gen_profile.identification.estimation import estimate
-from gen_profile.identification.fit import SwingingMachine, fit_of
+from gen_profile.identification.fit import fit_of
 from gen_profile.identification.identify import identify
 from gen_profile.identification.measurements import Period, SwingLog, parse_reading
 from gen_profile.identification.misfit import Explanation, likeliest, spectrum
-from gen_profile.identification.swing_model import swing_model
+from gen_profile.identification.swing_model import SwingingMachine, swing_model
 from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.reading import preset_spec
@@ -75,7 +75,7 @@ def test_of_parameters_that_explain_a_log_alike_none_is_advised():
 def test_what_explains_a_log_worse_beyond_chance_is_not_named():
     """The same rope, once by a search that was stopped many standard deviations beside its end."""
     log = log_of(swing(HOIST.nominal(), TIMES, [0.15, 0.0]) + NOISE)
-    fit = fit_of(hoist(), ["L0"], [], [swing_model(HOIST, HOIST.nominal(), (0.0, 4.0), log)])
+    fit = fit_of(hoist(), ["L0"], [], [swing_model(hoist(), log)])
     unknowns, noise = fit.solve()
     wide = uncertainty(fit, unknowns, noise).standard[0]
     off = [unknowns + beside * wide * np.eye(len(unknowns))[0] for beside in (0.0, 1.0, 40.0)]

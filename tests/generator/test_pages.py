@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from command_line import COMMANDS, cli
 
-from gen_profile.cli.group import DefaultGroup
 from gen_profile.plants.registry import find_plant, plant_types
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +43,7 @@ def test_options_are_those_of_the_command(page):
     wrong = []
     for words in commands_on(page):
         own = getattr(cli.commands.get(words[0]), "default", "")
-        names = (words[0], " ".join(words[:2]), f"{words[0]} {own}", DefaultGroup.default)
+        names = (words[0], " ".join(words[:2]), f"{words[0]} {own}", cli.default)
         command = next(COMMANDS[name] for name in names if name in COMMANDS)
         known = {option for parameter in command.params for option in parameter.opts} | OF_THE_GROUP
         asked = {word.partition("=")[0] for word in words if re.match(r"--[a-z-]+(=|$)", word)}

@@ -16,11 +16,10 @@ from gen_profile.charts.curves import (
 from gen_profile.charts.figure import Band, Bars, Figure, Level, Line, Panel, Style
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.candidates import own_method
-from gen_profile.comparison.compare import ComparedMethod, Comparison
+from gen_profile.comparison.compare import Comparison
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import machine, number
 from gen_profile.evaluation.scenarios import extremes
-from gen_profile.motion.profile import Array
 from gen_profile.shapers.impulses import SHAPERS
 
 SAMPLES = 500  # of each curve
@@ -44,18 +43,13 @@ def comparison_figure(comparison: Comparison, every: bool = False) -> Figure:
         raise OutputError("plot: no method has a motion for this move; compare without a picture to see why.")
     styles = compared_styles(comparison, every)
     motions = {row.method: row.evaluation.motion for row in comparison.rows}
-    return Figure(
-        caption=(
-            "Optimal motions solid, shapers dashed, extra-insensitive ones dotted; recommended ones thick. "
-            "Dashed in red: limits. Behind the spectrum: natural frequencies, with their ranges."
-        ),
-        panels=[
-            *_motion(comparison, styles),
-            spectrum_panel(comparison.spec, comparison.rows[0].evaluation, motions, styles),
-            *_sways(comparison, styles),
-            _residuals(comparison, styles),
-        ],
+    caption = (
+        "Optimal motions solid, shapers dashed, extra-insensitive ones dotted; recommended ones thick. "
+        "Dashed in red: limits. Behind the spectrum: natural frequencies, with their ranges."
     )
+    spectra = spectrum_panel(comparison.spec, comparison.rows[0].evaluation, motions, styles)
+    sways, residuals = _sways(comparison, styles), _residuals(comparison, styles)
+    return Figure(caption=caption, panels=[*_motion(comparison, styles), spectra, *sways, residuals])
 
 
 def compared_styles(comparison: Comparison, every: bool = False) -> dict[str, Style]:
@@ -92,19 +86,23 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
     """Draw the end load on the nominal machine, and on both that are off most (figures 4 and 5)."""
     spec, rows = comparison.spec, comparison.rows
     plant, last = spec.machine(), max(row.evaluation.motion.duration for row in rows)
-    responses = {row.method: row.evaluation.swing.at(_until(row)) for row in rows}
+    evaluations = {row.method: row.evaluation for row in rows}
+    ends = {method: one.motion.duration + one.watch for method, one in evaluations.items()}
+    responses = {
+        method: one.swing.at(np.linspace(0.0, ends[method], SAMPLES)) for method, one in evaluations.items()
+    }
     signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
     for index in extremes(spec):
-        swings = {method: response[index] for method, response in responses.items()}
         lines = [
-            Line(name=method, x=response.times, y=1e3 * end_load_sway(spec, response), style=styles[method])
-            for method, response in swings.items()
+            Line(
+                name=method, x=one[index].times, y=1e3 * end_load_sway(spec, one[index]), style=styles[method]
+            )
+            for method, one in responses.items()
         ]
         visible = [line for line in lines if line.style.shown]
         span = _without_outliers(visible)
         low, high = span or extent(visible)
-        end = max(float(line.x[-1]) for line in lines)
-        levels = [(1e3 * spec.check.residual_sway[plant.loads[-1]], (last, end))]
+        levels = [(1e3 * spec.check.residual_sway[plant.loads[-1]], (last, max(ends.values())))]
         if spec.limits.sway is not None:
             levels.append((1e3 * spec.limits.sway, (0.0, last)))
         yield Panel(
@@ -142,8 +140,3 @@ def _without_outliers(lines: Sequence[Line]) -> tuple[float, float] | None:
     end = OUTLYING * float(np.median(peaks))
     low, high = extent(lines)
     return (ROOM * max(low, -end), ROOM * min(high, end)) if max(peaks) > end > 0.0 else None
-
-
-def _until(row: ComparedMethod) -> Array:
-    duration = row.evaluation.motion.duration
-    return np.linspace(0.0, duration + row.evaluation.watch, SAMPLES)

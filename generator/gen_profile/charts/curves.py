@@ -24,7 +24,6 @@ TWINS = 7  # machines beside the nominal one whose sway is drawn
 NEAR = 2.5  # times what is shown, up to which a limit is drawn; beyond, it would flatten the curves
 ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
-TIME = "time (s)"
 FOLLOWED = Style(colour=PALETTE[1], dash="dash")
 WINDY = Style(colour=PALETTE[-1], dash="dot")
 
@@ -72,39 +71,25 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
             if order == 0:
                 lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
                 levels = tuple(attrs.evolve(level, value=factor * level.value) for level in levels)
-            template = "{quantity} ({unit})"
-            panels.append(
-                Panel(
-                    title=Phrase("{quantity} of {name}", quantity=quantity, name=axis.name),
-                    y_label=Phrase(
-                        template, quantity=quantity.lower(), unit=unit.format(axis.unit if order else place)
-                    ),
-                    lines=lines,
-                    levels=levels,
-                )
-            )
+            title = Phrase("{quantity} of {name}", quantity=quantity, name=axis.name)
+            own = unit.format(axis.unit if order else place)
+            label = Phrase("{quantity} ({unit})", quantity=quantity.lower(), unit=own)
+            panels.append(Panel(title=title, y_label=label, lines=lines, levels=levels))
     drawn = "The command of each drive leads its lag" if lagging else "The drives follow it as it is"
-    return Figure(
-        caption=f"The reference and its derivatives. {drawn}. Dashed in red: limits of the spec.",
-        panels=panels,
-    )
+    caption = f"The reference and its derivatives. {drawn}. Dashed in red: limits of the spec."
+    return Figure(caption=caption, panels=panels)
 
 
 def profile_figure(profile: Profile) -> Figure:
     """Draw a motion and its derivatives by themselves, in SI units, each axis a line."""
-    panels = [
-        Panel(
-            title=quantity,
-            y_label=f"{quantity.lower()} ({unit.format('m')} or {unit.format('rad')})",
-            lines=[
-                derivative_line(
-                    f"axis {axis + 1}", profile, order, axis, Style(colour=PALETTE[axis % len(PALETTE)])
-                )
-                for axis, colour in zip(range(profile.axes), cycle(PALETTE), strict=False)
-            ],
-        )
-        for order, (quantity, unit) in enumerate(ORDERS)
-    ]
+    panels = []
+    for order, (quantity, unit) in enumerate(ORDERS):
+        lines = [
+            derivative_line(f"axis {axis + 1}", profile, order, axis, Style(colour=colour))
+            for axis, colour in zip(range(profile.axes), cycle(PALETTE), strict=False)
+        ]
+        label = f"{quantity.lower()} ({unit.format('m')} or {unit.format('rad')})"
+        panels.append(Panel(title=quantity, y_label=label, lines=lines))
     return Figure(caption="The motion and its derivatives.", panels=panels)
 
 
@@ -117,10 +102,9 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
         meaning = "What the motion holds there takes the initial swing away."
     else:
         meaning = "The less the motion holds there, the less the loads swing on."
-    return Figure(
-        caption=f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}",
-        panels=[spectrum_panel(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})],
-    )
+    caption = f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}"
+    panel = spectrum_panel(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})
+    return Figure(caption=caption, panels=[panel])
 
 
 def sway_figure(
@@ -137,26 +121,23 @@ def sway_figure(
     more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""
     wind = in_wind(spec, evaluation.machines)
     more += "" if wind is None else " Dotted lines: how far the wind holds the loads aside, on top of that."
-    end = float(times[-1])
-    return Figure(
-        caption=f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}",
-        panels=[
-            Panel(
-                title=Phrase("Sway of the {load}", load=load),
-                y_label="sway (mm)",
-                lines=[
-                    Line(
-                        name=one.name, x=times, y=1e3 * responses[one.index].sway[:, number], style=one.style
-                    )
-                    for one in shown
-                ]
-                + wind_lines(wind, load, arrival, end),
-                levels=sway_levels(spec, load, arrival, end),
-                bands=[Band(low=arrival, high=arrival)],
-            )
-            for number, load in enumerate(spec.machine().loads)
-        ],
-    )
+    end, panels = float(times[-1]), []
+    for number, load in enumerate(spec.machine().loads):
+        sways = [1e3 * responses[one.index].sway[:, number] for one in shown]
+        lines = [
+            Line(name=one.name, x=times, y=sway, style=one.style)
+            for one, sway in zip(shown, sways, strict=True)
+        ]
+        panel = Panel(
+            title=Phrase("Sway of the {load}", load=load),
+            y_label="sway (mm)",
+            lines=lines + wind_lines(wind, load, arrival, end),
+            levels=sway_levels(spec, load, arrival, end),
+            bands=[Band(low=arrival, high=arrival)],
+        )
+        panels.append(panel)
+    caption = f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}"
+    return Figure(caption=caption, panels=panels)
 
 
 def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
@@ -165,16 +146,10 @@ def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
     It does not depend on time explicitly, so along the exact optimum it is constant.
     """
     change = (hamiltonian - hamiltonian.mean()) / np.abs(hamiltonian).max()
-    return Figure(
-        caption="Change of the Hamiltonian at the mesh's nodes, relative: the exact optimum has none.",
-        panels=[
-            Panel(
-                title="Hamiltonian",
-                y_label="relative change",
-                lines=[Line(name="change", x=times, y=change)],
-            )
-        ],
-    )
+    lines = [Line(name="change", x=times, y=change)]
+    caption = "Change of the Hamiltonian at the mesh's nodes, relative: the exact optimum has none."
+    panel = Panel(title="Hamiltonian", y_label="relative change", lines=lines)
+    return Figure(caption=caption, panels=[panel])
 
 
 def sway_levels(spec: Spec, load: str, arrival: float, end: float) -> list[Level]:
@@ -235,6 +210,7 @@ def spectrum_panel(
     first, natural = spec.machine().actuated[0], natural_frequencies(spec, evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
+    bands = [Band(low=low, high=high) for low, high in ranges if high > low]
     return Panel(
         title=Phrase("Spectrum of the acceleration of {name}", name=first.name),
         x_label="frequency (rad/s)",
@@ -243,9 +219,6 @@ def spectrum_panel(
             Line(name=name, x=frequencies, y=spectrum(motion, frequencies), style=styles[name])
             for name, motion in motions.items()
         ],
-        bands=[
-            *(Band(low=low, high=high) for low, high in ranges if high > low),
-            *(Band(low=frequency, high=frequency) for frequency in natural.nominal.tolist()),
-        ],
+        bands=bands + [Band(low=frequency, high=frequency) for frequency in natural.nominal.tolist()],
         decades=DECADES,
     )

@@ -69,10 +69,9 @@ class Line:
 
 @attrs.frozen(kw_only=True)
 class Level:
-    """A horizontal line with its name, such as a limit, over a range of x or the whole width."""
+    """A horizontal line, such as a limit, over a range of x or the whole width."""
 
     value: float
-    name: str = ""
     between: tuple[float, float] | None = None
 
 

@@ -19,41 +19,32 @@ def identification_figure(identified: Identification) -> Figure:
     """Draw the first log beside the identified machine."""
     log, swing = identified.logs[0], identified.estimate.swings[0]
     left = log.values - swing
-    natural = linearize(
-        identified.spec.machine(), identified.spec.plant.parameters, identified.q_a
-    ).frequencies
+    spec = identified.spec
+    natural = linearize(spec.machine(), spec.plant.parameters, identified.q_a).frequencies
     shown = spectrum(log.times, left, float(natural[-1]))
     amplitude, chance = (2.0 * np.sqrt(power / len(left)) for power in (shown.power, shown.threshold))
     greatest = max(float(amplitude.max()), float(np.max(chance)))
-    return Figure(
-        caption="Dotted in the spectrum: natural frequencies of the machine found.",
-        columns=1,
-        panels=[
-            Panel(
-                title=Phrase("Swing of the {load}", load=log.load),
-                y_label=Phrase(
-                    "{quantity} of {load} ({unit})", quantity=log.quantity, load=log.load, unit=log.unit
-                ),
-                lines=[
-                    Line(name="logged", x=log.times, y=log.values, style=LOGGED),
-                    Line(name="machine found", x=log.times, y=swing, style=FOUND),
-                ],
-            ),
-            Panel(
-                title="What is left of the log",
-                y_label=Phrase("left of it ({unit})", unit=log.unit),
-                lines=[Line(name="left", x=log.times, y=left, style=LEFT)],
-            ),
-            Panel(
-                title="Spectrum of what is left",
-                x_label="frequency (rad/s)",
-                y_label=Phrase("amplitude ({unit})", unit=log.unit),
-                lines=[
-                    Line(name="left", x=shown.frequencies, y=amplitude, style=LEFT),
-                    Line(name="noise stays below", x=shown.frequencies, y=chance, style=CHANCE),
-                ],
-                bands=[Band(low=frequency, high=frequency) for frequency in natural.tolist()],
-                decades=BELOW + math.log10(greatest / float(np.min(chance))),
-            ),
-        ],
-    )
+    logged = Line(name="logged", x=log.times, y=log.values, style=LOGGED)
+    found = Line(name="machine found", x=log.times, y=swing, style=FOUND)
+    template = "{quantity} of {load} ({unit})"
+    label = Phrase(template, quantity=log.quantity, load=log.load, unit=log.unit)
+    rest = Line(name="left", x=log.times, y=left, style=LEFT)
+    of_rest = Phrase("left of it ({unit})", unit=log.unit)
+    spectral = [
+        Line(name="left", x=shown.frequencies, y=amplitude, style=LEFT),
+        Line(name="noise stays below", x=shown.frequencies, y=chance, style=CHANCE),
+    ]
+    panels = [
+        Panel(title=Phrase("Swing of the {load}", load=log.load), y_label=label, lines=[logged, found]),
+        Panel(title="What is left of the log", y_label=of_rest, lines=[rest]),
+        Panel(
+            title="Spectrum of what is left",
+            x_label="frequency (rad/s)",
+            y_label=Phrase("amplitude ({unit})", unit=log.unit),
+            lines=spectral,
+            bands=[Band(low=frequency, high=frequency) for frequency in natural.tolist()],
+            decades=BELOW + math.log10(greatest / float(np.min(chance))),
+        ),
+    ]
+    caption = "Dotted in the spectrum: natural frequencies of the machine found."
+    return Figure(caption=caption, columns=1, panels=panels)

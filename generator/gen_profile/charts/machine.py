@@ -82,10 +82,9 @@ class MachineView:
 
     def pieces(self) -> Iterator[tuple[int, int]]:
         """List the pieces of the lines that hold something: the points at their ends."""
-        kinds = {"rope", "spring", "frame"}
-        return (
-            pair for shape in self.drawing.shapes if shape.kind in kinds for pair in pairwise(shape.points)
-        )
+        for shape in self.drawing.shapes:
+            if shape.kind in {"rope", "spring", "frame"}:
+                yield from pairwise(shape.points)
 
     def lengths(self) -> Iterator[tuple[str, tuple[int, int]]]:
         """Name the lines that grow with parameters, and with axes, as much as these do."""
@@ -159,12 +158,11 @@ def views(plant: Plant, parameters: Mapping[str, float]) -> list[MachineView]:
 
     lengths = [one.name for one in plant.parameters if one.unit == "m"]
     grown = {name: drawn({**parameters, name: parameters[name] + STEP}) for name in lengths}
-    return [
-        MachineView(
-            drawing=one, plant=plant, grown={name: more[number].rest[0] for name, more in grown.items()}
-        )
-        for number, one in enumerate(drawn(parameters))
-    ]
+    sides = []
+    for number, one in enumerate(drawn(parameters)):
+        longer = {name: more[number].rest[0] for name, more in grown.items()}
+        sides.append(MachineView(drawing=one, plant=plant, grown=longer))
+    return sides
 
 
 def _draw(axis: Any, view: MachineView) -> None:
@@ -243,10 +241,8 @@ def _left_of(along: Array) -> Array:
 def _name(axis: Any, place: Array, text: str, colour: str, towards: Array) -> None:
     """Write a name beside a place, in some direction, clear of it."""
     x, y = towards / np.linalg.norm(towards)
-    sides = {
-        "ha": ("right", "center", "left")[round(1.2 * x) + 1],
-        "va": ("top", "center", "bottom")[round(y) + 1],
-    }
+    sides = {"ha": ("right", "center", "left")[round(1.2 * x) + 1]}
+    sides["va"] = ("top", "center", "bottom")[round(y) + 1]
     offset = {"xytext": (APART * x, APART * y), "textcoords": "offset points"}
     weight = "normal" if colour == INK else "bold"
     axis.annotate(text, place, **offset, **sides, color=colour, fontweight=weight, zorder=5)
@@ -254,15 +250,12 @@ def _name(axis: Any, place: Array, text: str, colour: str, towards: Array) -> No
 
 def _explained(plant: Plant, parameters: Mapping[str, float]) -> str:
     """List what the spec calls things: axes, what swings, and parameters with their values."""
-    return "\n".join(
-        [
-            "axes      " + ", ".join(f"{one.name} ({one.unit})" for one in plant.actuated),
-            "swinging  " + ", ".join(f"{one.name} ({one.unit})" for one in plant.unactuated),
-            "loads     " + ", ".join(plant.loads),
-            "",
-            *(
-                f"{one.name:<4}{parameters[one.name]:g} {one.unit}\n    {one.description}"
-                for one in plant.parameters
-            ),
-        ]
-    )
+    lines = [
+        "axes      " + ", ".join(f"{one.name} ({one.unit})" for one in plant.actuated),
+        "swinging  " + ", ".join(f"{one.name} ({one.unit})" for one in plant.unactuated),
+        "loads     " + ", ".join(plant.loads),
+        "",
+    ]
+    for one in plant.parameters:
+        lines += [f"{one.name:<4}{parameters[one.name]:g} {one.unit}", f"    {one.description}"]
+    return "\n".join(lines)

@@ -4,11 +4,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import attrs
+import numpy as np
 
-from gen_profile.charts.check import check_figure
 from gen_profile.charts.comparison import comparison_figure
 from gen_profile.charts.curves import motion_figure, profile_figure, select_machines, sway_figure
-from gen_profile.charts.figure import Figure
+from gen_profile.charts.figure import PALETTE, Bars, Figure
 from gen_profile.charts.identification import identification_figure
 from gen_profile.charts.machine import draw_machine
 from gen_profile.charts.picture import require_drawable, save
@@ -20,11 +20,14 @@ from gen_profile.designs.design import Design
 from gen_profile.designs.plan import Plan
 from gen_profile.designs.planner import Deployment
 from gen_profile.errors import OutputError
+from gen_profile.evaluation.phrases import number
 from gen_profile.identification.identify import Identification
 from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
 from gen_profile.verification.check import Judgement
 from gen_profile.verification.verdict import Check
+
+MOST_BARS = 12  # machines of a check
 
 
 @attrs.frozen
@@ -94,7 +97,7 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
         case Profile(method=method):
             return [profile_figure(result)], method, method
         case Check():
-            return [check_figure(result)], "check", "The check"
+            return [_check_figure(result)], "check", "The check"
         case Comparison(spec=spec):
             return [comparison_figure(result, every)], spec.name, f"{spec.name}: {spec.plant.type}"
         case Robustness(spec=spec):
@@ -106,3 +109,24 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
             return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"
         case _:
             raise TypeError(f"There is no picture of a {type(result).__name__}.")
+
+
+def _check_figure(check: Check) -> Figure:
+    """Draw how much of its limit the worst load of each machine takes up, of the worst machines."""
+    ranked = sorted(check.judged, key=check.fraction_after, reverse=True)
+    shown = {}
+    for finding in ranked[:MOST_BARS]:
+        load, _ = check.worst_of([finding])
+        shown[f"{finding.scenario.name}, {load}"] = finding, finding.residual[load]
+    left_out = len(ranked) - len(shown)
+    more = f" {left_out} that sway less are not drawn." if left_out else ""
+    bars = Bars(
+        title="Residual sway",
+        x_label="share of the allowed residual sway (%)",
+        values=np.array([100.0 * check.fraction_after(finding) for finding, _ in shown.values()]),
+        names=list(shown),
+        colours=[PALETTE[0]] * len(shown),
+        texts=[f"{number(1e3 * sway)} mm" for _, sway in shown.values()],
+        limit=100.0,
+    )
+    return Figure(caption=f"Dashed in red: what is allowed.{more}", panels=[bars])

@@ -26,6 +26,7 @@ from gen_profile.motion.profile import Array
 EVEN = 1e-12  # of the last time, by which even steps may differ
 DIGITS = 6  # of a curve's largest value: finer than any screen, and a third of the bytes
 SHADE = "rgba(120,130,140,0.16)"
+DASHED = {"color": LIMIT, "dash": "dash", "width": 1.2}
 
 
 def figure_json(figure: Figure) -> dict[str, Any]:
@@ -70,8 +71,7 @@ def _bars(panel: Bars) -> dict[str, Any]:
     layout = _labels(panel.x_label, "")
     layout["xaxis"] |= {"range": [0, panel.end]}
     layout["yaxis"] |= {"autorange": "reversed"}
-    limit = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": panel.limit, "x1": panel.limit}
-    layout["shapes"] = [{**limit, "line": {"color": LIMIT, "dash": "dash", "width": 1.2}}]
+    layout["shapes"] = [_shape("line", (panel.limit, panel.limit), (0, 1), yref="paper", line=DASHED)]
     bars = {
         "type": "bar",
         "orientation": "h",
@@ -121,21 +121,19 @@ def rounded(values: Array) -> list[float | None]:
 
 
 def _trace(line: Line) -> dict[str, Any]:
-    points = line.style.dash == "points"
-    look = {"color": line.style.colour, "width": line.style.width}
+    style = line.style
+    look: dict[str, Any] = {"line": {"color": style.colour, "width": style.width, "dash": style.dash}}
+    if style.dash == "points":
+        look = {"marker": {"color": style.colour, "size": 3}}
     return {
         "type": "scatter",
-        "mode": "markers" if points else "lines",
+        "mode": "markers" if "marker" in look else "lines",
         "name": escape(line.name),
         "meta": line.name,
         **_abscissa(line.x),
         "y": rounded(line.y),
-        **(
-            {"marker": {"color": line.style.colour, "size": 3}}
-            if points
-            else {"line": {**look, "dash": line.style.dash}}
-        ),
-        "visible": line.style.shown,
+        **look,
+        "visible": style.shown,
     }
 
 
@@ -147,42 +145,22 @@ def _abscissa(x: Array) -> dict[str, Any]:
     return {"x": rounded(x)}
 
 
+def _shape(kind: str, x: tuple[float, float], y: tuple[float, float], **look: Any) -> dict[str, Any]:
+    return {"type": kind, "x0": x[0], "x1": x[1], "y0": y[0], "y1": y[1], **look}
+
+
 def _band(band: Band) -> dict[str, Any]:
     edge = {"width": 1, "color": FRAME, "dash": "dot"} if band.low == band.high else {"width": 0}
-    return {
-        "type": "rect",
-        "layer": "below",
-        "x0": band.low,
-        "x1": band.high,
-        "yref": "paper",
-        "y0": 0,
-        "y1": 1,
-        "fillcolor": SHADE,
-        "line": edge,
-    }
+    look = {"yref": "paper", "layer": "below", "fillcolor": SHADE, "line": edge}
+    return _shape("rect", (band.low, band.high), (0, 1), **look)
 
 
 def _frame(frame: tuple[float, float], colour: str, dash: Dash) -> dict[str, Any]:
     width, height = frame
-    return {
-        "type": "rect",
-        "x0": -width,
-        "x1": width,
-        "y0": -height,
-        "y1": height,
-        "line": {"width": 1.2, "color": colour, "dash": dash},
-    }
+    line = {"width": 1.2, "color": colour, "dash": dash}
+    return _shape("rect", (-width, width), (-height, height), line=line)
 
 
 def _level(level: Level) -> dict[str, Any]:
-    left, right = level.between or (0, 1)
-    return {
-        "type": "line",
-        "xref": "paper" if level.between is None else "x",
-        "x0": left,
-        "x1": right,
-        "y0": level.value,
-        "y1": level.value,
-        "line": {"color": LIMIT, "dash": "dash", "width": 1.2},
-        "label": {"text": escape(level.name), "textposition": "end", "font": {"size": 11, "color": LIMIT}},
-    }
+    across = "paper" if level.between is None else "x"
+    return _shape("line", level.between or (0, 1), (level.value, level.value), xref=across, line=DASHED)

@@ -6,7 +6,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from gen_profile.charts.curves import TIME
 from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Level, Line, Map, Panel, Style
 from gen_profile.charts.picture import save
 from gen_profile.motion.metrics import length
@@ -62,36 +61,21 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     arrival = _arrival(trace)
     bands = [*_unpromised(trace)]
     panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
-    panels += [
-        Panel(
-            title=f"{name} as given to the block",
-            x_label=TIME,
-            y_label=_labelled(spec, name),
-            lines=[Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)],
-            levels=[Level(value=value) for value in spec.planner.live[name]],
-            bands=bands,
-        )
-        for name, corners in trace.history.hoisting.items()
-    ]
+    for name, corners in trace.history.hoisting.items():
+        line = Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)
+        ends, label = [Level(value=value) for value in spec.planner.live[name]], _labelled(spec, name)
+        title = f"{name} as given to the block"
+        panels.append(Panel(title=title, y_label=label, lines=[line], levels=ends, bands=bands))
     styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
-    panels.append(
-        Panel(
-            title=f"Sway of the {spec.machine().end_load_name}",
-            x_label=TIME,
-            y_label="sway (mm)",
-            lines=[
-                Line(name=name, x=times, y=1e3 * sway[few], style=style)
-                for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
-            ],
-            levels=[Level(value=sign * limit, between=(arrival, times[-1])) for sign in _signs(spec)],
-            bands=bands,
-        )
-    )
-    return Figure(
-        caption="Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains.",
-        panels=panels,
-        columns=1,
-    )
+    sways = [
+        Line(name=name, x=times, y=1e3 * sway[few], style=style)
+        for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
+    ]
+    levels = [Level(value=sign * limit, between=(arrival, times[-1])) for sign in _signs(spec)]
+    title = f"Sway of the {spec.machine().end_load_name}"
+    panels.append(Panel(title=title, y_label="sway (mm)", lines=sways, levels=levels, bands=bands))
+    caption = "Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains."
+    return Figure(caption=caption, panels=panels, columns=1)
 
 
 def _signs(spec: Spec) -> tuple[float, ...]:
@@ -111,24 +95,18 @@ def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
     own, few = spec.limits.of(number), slice(None, None, -(-len(trace.times) // SAMPLES))
     assert own.velocity and own.acceleration and own.travel
     of = f" of {axis.name}" if axis.name else ""
-    bands = [*_unpromised(trace), *(Band(low=time, high=time) for time in _stops(trace))]
+    stops = [one.time for one in trace.history.commands if one.command not in {"position", "velocity"}]
+    bands = [*_unpromised(trace), *(Band(low=time, high=time) for time in stops)]
     for title, unit, output, levels, command in (
         ("Position", axis.unit, "fPosition", own.travel, "position"),
         ("Velocity", f"{axis.unit}/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
         ("Acceleration", f"{axis.unit}/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
     ):
         setpoints = trace.issued[axis.of(output)][few]
-        yield Panel(
-            title=title + of,
-            x_label=TIME,
-            y_label=f"{title.lower()} ({unit})",
-            lines=[
-                Line(name="setpoint", x=trace.times[few], y=setpoints, style=SETPOINT),
-                *_commanded(trace, command, place),
-            ],
-            levels=[Level(value=level) for level in levels],
-            bands=bands,
-        )
+        issued = Line(name="setpoint", x=trace.times[few], y=setpoints, style=SETPOINT)
+        lines, limits = [issued, *_commanded(trace, command, place)], [Level(value=level) for level in levels]
+        label = f"{title.lower()} ({unit})"
+        yield Panel(title=title + of, y_label=label, lines=lines, levels=limits, bands=bands)
 
 
 def worst_damped(proof: Proof) -> JudgedHistory | None:
@@ -154,89 +132,63 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
     outputs = [axis.of("fSwayEstimated") for axis in axes]
     estimates = [trace.issued[output] for output in outputs if output in trace.issued]
 
-    def lines(names: Sequence[str], columns: Array) -> list[Line]:
-        return [
-            Line(name=name, x=times, y=column, style=style)
-            for name, column, style in zip(names, columns.T, (SETPOINT, COMMAND), strict=False)
-        ]
-
-    def panel(title: str, y_label: str, lines: list[Line]) -> Panel:
-        return Panel(title=title, x_label=TIME, y_label=y_label, lines=lines, bands=bands)
+    def panel(title: str, y_label: str, names: Sequence[str], columns: Array) -> Panel:
+        drawn = zip(names, columns.T, (SETPOINT, COMMAND), strict=False)
+        lines = [Line(name=name, x=times, y=column, style=style) for name, column, style in drawn]
+        return Panel(title=title, y_label=y_label, lines=lines, bands=bands)
 
     along = [axis.name or "gusts" for axis in axes]
     shown = f"{sensor.quantity} ({unit}/s)" if sensor.quantity == "rate" else f"{sensor.quantity} ({unit})"
     true = trace.sway["this history"][few]
     sways = np.stack([true, length(np.stack(estimates, axis=1))[few, 0]], axis=1)
-    sway = panel(f"Sway of the {end_load}", "sway (mm)", lines(["true", "estimated"], 1e3 * sways))
+    sway = panel(f"Sway of the {end_load}", "sway (mm)", ["true", "estimated"], 1e3 * sways)
+    pushes = np.diff(sensed.pushed(edges), 2, axis=0)[few] / cycle**2
+    title = f"What the sensor shows: {sensor.quantity} of {' and '.join(sensor.names)}"
     panels = [
-        panel("Gusts", "push (m/s²)", lines(along, np.diff(sensed.pushed(edges), 2, axis=0)[few] / cycle**2)),
-        panel(
-            f"What the sensor shows: {sensor.quantity} of {' and '.join(sensor.names)}",
-            shown,
-            lines(sensor.names if len(axes) > 1 else ["shown"], trace.measured[few]),
-        ),
+        panel("Gusts", "push (m/s²)", along, pushes),
+        panel(title, shown, sensor.names if len(axes) > 1 else ["shown"], trace.measured[few]),
         attrs.evolve(sway, levels=[Level(value=sign * limit) for sign in _signs(spec)]),
-        *(
-            panel(
-                f"Position of {axis.name}" if axis.name else "Position",
-                f"position ({axis.unit})",
-                lines(["setpoint"], trace.issued[axis.of("fPosition")][few, None]),
-            )
-            for axis in axes
-        ),
     ]
+    for axis in axes:
+        title = f"Position of {axis.name}" if axis.name else "Position"
+        places = trace.issued[axis.of("fPosition")][few, None]
+        panels.append(panel(title, f"position ({axis.unit})", ["setpoint"], places))
     caption = "Shaded: not promised. Dashed in red: what may remain."
     return [Figure(caption=caption, panels=panels, columns=1), _remains_figure(spec, proof)]
 
 
 def _remains_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw what remains by the strongest gust, and by the first live parameter where there is one."""
-    sensed = [(one, one.history.sensed) for one in _sound(proof)]
-    gusts = [max(abs(gust.acceleration) for gust in sensor.gusts) for _, sensor in sensed if sensor]
-    shares = 100.0 * np.array([proof.fraction(one) for one, _ in sensed])
-    title, gust_label, stated = "What remains after gusts", "strongest gust (m/s²)", spec.planner.disturbance
+    judged, stated, live = _sound(proof), spec.planner.disturbance, spec.planner.live
     assert stated is not None and stated.gust is not None
-    panel: Panel | Map = Panel(
-        title=title,
-        x_label=gust_label,
-        y_label="share of its limit (%)",
-        lines=[Line(name="history", x=np.array(gusts), y=shares, style=Style(dash="points"))],
-        levels=[Level(value=100.0)],
+    sensors = [one.history.sensed for one in judged]
+    gusts = [max(abs(gust.acceleration) for gust in sensor.gusts) for sensor in sensors if sensor]
+    names = [*live][:1]
+    panel = _shares_panel(
+        "What remains after gusts",
+        [*(_labelled(spec, name) for name in names), "strongest gust (m/s²)"],
+        np.array([*([one.history.live[name] for one in judged] for name in names), gusts]),
+        [*(live[name] for name in names), (0.0, stated.gust.acceleration)],
+        [proof.fraction(one) for one in judged],
     )
-    for name, across in [*spec.planner.live.items()][:1]:
-        places = np.array([[one.history.live[name] for one, _ in sensed], gusts])
-        labels = (_labelled(spec, name), gust_label)
-        panel = _map(title, labels, places, (across, (0.0, stated.gust.acceleration)), shares)
-    return Figure(
-        caption="Every history with a sound sensor and gusts; white: none there.", panels=[panel], columns=1
-    )
+    caption = "Every history with a sound sensor and gusts; white: none there."
+    return Figure(caption=caption, panels=[panel], columns=1)
 
 
 def map_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw the worst share of the limit in cells of two live parameters, or of every history over one."""
     live = spec.planner.live
-    shares = 100.0 * np.array([proof.fraction(one) for one in proof.judged])
-    title = "Worst residual sway"
-    if len(live) == 2:
-        places = np.array([[one.history.live[name] for one in proof.judged] for name in live])
-        labels = [_labelled(spec, name) for name in live]
-        panel: Panel | Map = _map(title, labels, places, [*live.values()], shares)
-    else:
-        name = next(iter(live), "")
-        places = np.array([one.history.live.get(name, one.number) for one in proof.judged])
-        order = np.argsort(places, kind="stable")
-        panel = Panel(
-            title=title,
-            x_label=_labelled(spec, name) if name else "history",
-            y_label="share of its limit (%)",
-            lines=[Line(name="history", x=places[order], y=shares[order], style=Style(dash="points"))],
-            levels=[Level(value=100.0)],
-        )
-    return Figure(
-        caption="Over what the block is given; white: no history there.",
-        panels=[panel],
-        columns=1,
+    names = [*live] if len(live) == 2 else [*live][:1]
+    places = [[one.history.live[name] for one in proof.judged] for name in names]
+    panel = _shares_panel(
+        "Worst residual sway",
+        [_labelled(spec, name) for name in names] or ["history"],
+        np.array(places or [[one.number for one in proof.judged]]),
+        [live[name] for name in names],
+        [proof.fraction(one) for one in proof.judged],
     )
+    caption = "Over what the block is given; white: no history there."
+    return Figure(caption=caption, panels=[panel], columns=1)
 
 
 def _labelled(spec: Spec, name: str) -> str:
@@ -253,10 +205,6 @@ def _unpromised(trace: Trace) -> Iterator[Band]:
         yield Band(low=float(trace.times[begin]), high=float(trace.times[min(end, last)]))
 
 
-def _stops(trace: Trace) -> list[float]:
-    return [one.time for one in trace.history.commands if one.command not in {"position", "velocity"}]
-
-
 def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:
     """Draw targets or the stick while they hold, with gaps between."""
     commands = trace.history.commands
@@ -269,33 +217,39 @@ def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:
     return [Line(name="command", x=x, y=y, style=COMMAND)]
 
 
-def _centres(ends: tuple[float, float]) -> Array:
-    low, high = ends
-    return low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
-
-
-def _map(
+def _shares_panel(
     title: str,
     labels: Sequence[str],
     places: Array,
     ranges: Sequence[tuple[float, float]],
-    shares: Array,
-) -> Map:
-    """Draw the greatest share in each cell of two ranges; where no history was, not a number."""
-    worst = np.full((CELLS, CELLS), np.nan)
-    for place, share in zip(places.T.tolist(), shares, strict=True):
-        cell = tuple(
-            min(CELLS - 1, int(CELLS * (value - low) / (high - low)))
-            for value, (low, high) in zip(place, ranges, strict=True)
+    fractions: Sequence[float],
+) -> Panel | Map:
+    """Draw histories' shares of the limit over one quantity, or the greatest in each cell of two ranges.
+
+    Places have the shape (quantities, histories). A cell in which no history was is not a number.
+    """
+    shares = 100.0 * np.array(fractions)
+    if len(labels) == 1:
+        order = np.argsort(places[0], kind="stable")
+        return Panel(
+            title=title,
+            x_label=labels[0],
+            y_label="share of its limit (%)",
+            lines=[Line(name="history", x=places[0][order], y=shares[order], style=Style(dash="points"))],
+            levels=[Level(value=100.0)],
         )
-        worst[cell] = np.fmax(worst[cell], share)
+    low, high = np.transpose(ranges)
+    cells = np.minimum(CELLS * (places.T - low) / (high - low), CELLS - 1).astype(int)
+    worst = np.full((CELLS, CELLS), np.nan)
+    np.fmax.at(worst, tuple(cells.T), shares)
+    centres = [start + (end - start) * (np.arange(CELLS) + 0.5) / CELLS for start, end in ranges]
     return Map(
         title=title,
         x_label=labels[0],
         y_label=labels[1],
         unit="% of limit",
-        x=_centres(ranges[0]),
-        y=_centres(ranges[1]),
+        x=centres[0],
+        y=centres[1],
         values=worst.T,
         limit=100.0,
         cells=True,

@@ -39,30 +39,27 @@ def maps_figure(grid: Robustness) -> Figure:
     (across, x), (upwards, y) = grid.errors.items()
     stated = grid.spec.robustness.uncertain
     framed = across in stated and upwards in stated
-    return Figure(
-        caption=(
-            f"How much of its allowed residual sway the load takes up that takes most, where {across} and "
-            f"{upwards} are off at once. Thick line: all of it"
-            + ("; dotted: the ranges that the spec states." if framed else ".")
-        ),
-        columns=min(COLUMNS, len(grid.residual)),
-        panels=[
-            Map(
-                title=Phrase(
-                    "{method} over {across} and {upwards}", method=method, across=across, upwards=upwards
-                ),
-                x_label=_off(grid, across),
-                y_label=_off(grid, upwards),
-                unit="%",
-                x=100.0 * x,
-                y=100.0 * y,
-                values=100.0 * grid.fraction(method).T,
-                limit=100.0,
-                frame=(100.0 * stated[across], 100.0 * stated[upwards]) if framed else None,
-            )
-            for method in grid.residual
-        ],
+    template = "{method} over {across} and {upwards}"
+    panels = [
+        Map(
+            title=Phrase(template, method=method, across=across, upwards=upwards),
+            x_label=_off(grid, across),
+            y_label=_off(grid, upwards),
+            unit="%",
+            x=100.0 * x,
+            y=100.0 * y,
+            values=100.0 * grid.fraction(method).T,
+            limit=100.0,
+            frame=(100.0 * stated[across], 100.0 * stated[upwards]) if framed else None,
+        )
+        for method in grid.residual
+    ]
+    dotted = "; dotted: the ranges that the spec states" if framed else ""
+    caption = (
+        f"How much of its allowed residual sway the load takes up that takes most, where {across} and "
+        f"{upwards} are off at once. Thick line: all of it{dotted}."
     )
+    return Figure(caption=caption, columns=min(COLUMNS, len(grid.residual)), panels=panels)
 
 
 def _curves(name: str, curve: Robustness, styles: Mapping[str, Style]) -> Panel:
@@ -84,6 +81,5 @@ def _curves(name: str, curve: Robustness, styles: Mapping[str, Style]) -> Panel:
 
 
 def _off(curve: Robustness, name: str) -> str:
-    nominal = curve.spec.plant.parameters[name]
-    (unit,) = (known.unit for known in curve.spec.machine().parameters if known.name == name)
+    nominal, unit = curve.spec.plant.parameters[name], curve.spec.machine().units[name]
     return Phrase("{name} off {nominal:g} {unit} by (%)", name=name, nominal=nominal, unit=unit)

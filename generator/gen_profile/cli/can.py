@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import Count, output_options
+from gen_profile.cli.options import bitrate_option, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -28,14 +29,9 @@ def can() -> None:
     "--interface", metavar="NAME", help="Only this interface, such as socketcan; all of them by default."
 )
 @click.option("--channel", metavar="NAME", help="Ask on this channel of it which nodes are there.")
-@click.option(
-    "--bitrate",
-    type=Count(10_000, 1_000_000),
-    default=500_000,
-    help="Of the channel in bit/s, where no system sets it; 500000 by default.",
-)
+@bitrate_option("channel")
 @output_options
-def list_(interface: str | None, channel: str | None, bitrate: int, as_json: bool) -> None:
+def list_(interface: str | None, channel: str | None, bitrate: int) -> None:
     """List CAN interfaces, their channels, and the nodes that answer.
 
     No bus is touched unless a channel is named. There, every node id is asked what it is, if no controller is
@@ -51,23 +47,15 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
     if interface is not None and channel is not None:
         nodes = _nodes(Port(interface=interface, channel=channel), bitrate)
     by_interface = {name: detection.channels(name) for name in names}
-    document = {
-        "interfaces": [
-            {
-                "name": name,
-                "channels": [
-                    {"name": one.name, "bitrate": one.bitrate, "state": one.state} for one in channels
-                ],
-                "needs": detection.needs(name),
-            }
-            for name, channels in by_interface.items()
-        ],
-        "nodes": None if nodes is None else [_told(node) for node in nodes],
-    }
+    interfaces = [
+        {"name": name, "channels": list(map(attrs.asdict, channels)), "needs": detection.needs(name)}
+        for name, channels in by_interface.items()
+    ]
+    document = {"interfaces": interfaces, "nodes": None if nodes is None else list(map(_told, nodes))}
     lines = list(_interface_words(by_interface))
     if nodes is not None:
         lines += _node_words(nodes, f"{interface} {channel}")
-    print_outcome(document, "\n".join(lines), as_json)
+    print_outcome(document, "\n".join(lines))
 
 
 def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:
@@ -117,7 +105,6 @@ def _node_words(nodes: tuple[IdentifiedNode, ...], where: str) -> Iterator[str]:
     for node in nodes:
         numbers = {"vendor": node.vendor, "product": node.product, "serial": node.serial}
         stated = [f"{what} 0x{number:08X}" for what, number in numbers.items() if number is not None]
-        kind = (
-            f"drive ({', '.join(node.mode_names) or 'no mode to stream in'})" if node.is_drive else "no drive"
-        )
+        modes = ", ".join(node.mode_names) or "no mode to stream in"
+        kind = f"drive ({modes})" if node.is_drive else "no drive"
         yield f"  {node.number}: " + ", ".join([*filter(None, [node.name]), kind, *stated])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,20 +23,19 @@ from gen_profile.cli.options import (
     folder_option,
     output_options,
     plot_option,
+    repeatable,
     require_formats,
     scheduler_option,
     spec_options,
     version_option,
 )
-from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
+from gen_profile.cli.outcome import fail, leave_unproved, not_written, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
-from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
+from gen_profile.cli.signing import require_signature, sign, signed_by_option, signing_key, signing_option
 from gen_profile.errors import CertificateError, OutputError, SpecError
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.certificate.document import Certificate
     from gen_profile.designs.design import Design
     from gen_profile.plants.plant import Plant
@@ -66,39 +67,30 @@ def cli() -> None:
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
 @certify_option
-@sign_option
+@signing_option("manifest")
 @output_options
 def design(
     chosen: SpecChoice,
     formats: tuple[str, ...],
     folder: Path,
-    cycle_time: str | None,
-    plc_layout: str | None,
-    csv_dialect: str | None,
-    csv_columns: str | None,
+    *,
     method: str | None,
     no_check: bool,
     keep_failed: bool,
     certify: bool,
     key_path: Path | None,
-    as_json: bool,
+    **export: str | None,
 ) -> None:
     """Design, export and verify (the default)."""
     if certify and no_check:
         raise SpecError("--certify: proves what the check has passed; leave --no-check out.")
-    columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
-    stated = {
-        "export.cycle_time": cycle_time,
-        "can.sync_period": cycle_time,
-        "export.plc_layout": plc_layout,
-        "export.csv_dialect": csv_dialect,
-        "export.csv_columns": columns,
-        "solver.method": method,
-    }
+    stated: dict[str, object] = {f"export.{key}": value for key, value in export.items()}
+    if (columns := export["csv_columns"]) is not None:
+        stated["export.csv_columns"] = [name.strip() for name in columns.split(",")]
+    stated |= {"can.sync_period": export["cycle_time"], "solver.method": method}
     spec = chosen.changed(stated).spec()
     require_formats(formats)
     key = signing_key(key_path)
-    from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.designs.design import design as run
 
@@ -108,13 +100,11 @@ def design(
         sign(folder, key)
     certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])
     worst = max(certificates.values(), key=lambda certificate: certificate.demand, default=None)
-    document = outcome.to_dict() | {"certificate": None if worst is None else worst.to_dict()}
-    print_outcome(document, words.design(outcome, certificates), as_json)
+    document = outcome.to_dict() | {"certificate": worst and worst.to_dict()}
+    print_outcome(document, words.design(outcome, certificates))
     warn(outcome.check)
     if not outcome.passed and outcome.check is not None:
-        before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
-        kept = "The files were kept." if outcome.artefacts else f"Nothing was written{before}."
-        fail(outcome.check.reasons(), kept)
+        fail(outcome.check.reasons(), "The files were kept." if outcome.artefacts else not_written(folder))
     if refusals:
         leave_unproved(refusals)
 
@@ -145,13 +135,7 @@ def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
     help="What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
 )
 @output_options
-def compare(
-    chosen: SpecChoice,
-    picture: Path | None,
-    every: bool,
-    base: str | None,
-    as_json: bool,
-) -> None:
+def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | None) -> None:
     """Compare optimal profiles with shapers."""
     spec = chosen.changed({"solver.base": base}).spec()
     from gen_profile.cli import words
@@ -160,7 +144,53 @@ def compare(
     with progress() as tell:
         comparison = run(spec, tell)
         draw(comparison, picture, tell, every=every)
-    print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
+    print_outcome(comparison.to_dict(), words.comparison(comparison))
+
+
+@cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")
+@spec_options
+@click.option(
+    "--parameter",
+    "parameters",
+    metavar="NAME",
+    multiple=True,
+    help="What is off: once for a curve, twice for a map; the first uncertain parameter by default.",
+)
+@click.option(
+    "--method",
+    "methods",
+    metavar="NAME",
+    multiple=True,
+    help="Method to try, as compare names them. Repeatable; all by default.",
+)
+@click.option(
+    "--range",
+    "half_range",
+    metavar="SHARE",
+    type=click.FloatRange(0.0, 0.9, min_open=True),
+    help="Greatest relative error, such as 0.3; one and a half times the spec's range by default.",
+)
+@click.option(
+    "--points",
+    type=Count(3, 1001),
+    help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
+)
+@plot_option
+@click.option("--csv", "path", type=OutputFile(), help="Write the numbers as a table.")
+@output_options
+def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, **options: Any) -> None:
+    """Show residual sway over one or two parameters, optimal motions beside shapers."""
+    spec = chosen.spec()
+    from gen_profile.artefacts.writing import deliver
+    from gen_profile.cli import words
+    from gen_profile.comparison.robustness import robustness as run
+
+    with progress() as tell:
+        curves = run(spec, **options, progress=tell)
+        draw(curves, picture, tell)
+        if path is not None:
+            deliver(path, curves.table().encode("utf-8"))
+    print_outcome(curves.to_dict(), words.robustness(curves))
 
 
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
@@ -169,24 +199,9 @@ def compare(
 @click.option("--samples", type=Count(0, 1_000_000), help="Draw N machines, in place of check.samples.")
 @click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
 @click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
-@click.option(
-    "--scale",
-    metavar="AXIS=FACTOR",
-    multiple=True,
-    help="Judge the motion smaller along an axis, as a playback block plays it. Repeatable.",
-)
-@click.option(
-    "--mirror",
-    metavar="AXIS",
-    multiple=True,
-    help="Judge the motion the other way along an axis. Repeatable.",
-)
-@click.option(
-    "--offset",
-    metavar="AXIS=DISTANCE",
-    multiple=True,
-    help="Judge the motion begun elsewhere along an axis, in m or rad. Repeatable.",
-)
+@repeatable("--scale", "AXIS=FACTOR", "Judge the motion smaller along an axis, as a playback block plays it.")
+@repeatable("--mirror", "AXIS", "Judge the motion the other way along an axis.")
+@repeatable("--offset", "AXIS=DISTANCE", "Judge the motion begun elsewhere along an axis, in m or rad.")
 @click.option("--csv", "table_path", type=OutputFile(), help="Write all scenarios as a table, one row each.")
 @certify_option
 @click.option("--certificate", type=InputFile(), help="Check a certificate again, and nothing else.")
@@ -200,14 +215,7 @@ def compare(
 @block_plot_option
 @signed_by_option
 @output_options
-def check(
-    artefact: Path,
-    chosen: SpecChoice,
-    *,
-    public_path: Path | None,
-    as_json: bool,
-    **options: Any,
-) -> None:
+def check(artefact: Path, chosen: SpecChoice, *, public_path: Path | None, **options: Any) -> None:
     """Replay, co-simulate and judge an artefact.
 
     The spec comes from the manifest beside the artefact unless one is named.
@@ -223,7 +231,7 @@ def check(
     unproved: Sequence[str] = ()
     if options["certificate"] is not None:
         _require_only(options, ("certificate",), "a check by co-simulation, without --certificate")
-        _repeat_proof(artefact, spec, options["certificate"], as_json=as_json)
+        _repeat_proof(artefact, spec, options["certificate"])
         return
     if is_planner_block(artefact):
         _require_only(options, BLOCK_OPTIONS, "a motion, and this is a planner block")
@@ -232,11 +240,16 @@ def check(
     else:
         _require_only(options, (*MOTION_OPTIONS, "certify"), "a planner block, and this is none")
         judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
-        certificate = _certified(judgement.path, spec) if _to_certify(judgement, options) else None
+        if options["certify"] and judgement.variant is not None:
+            raise SpecError(
+                "--certify: is for the motion as planned, without --scale, --mirror and --offset."
+            )
+        certify = options["certify"] and judgement.check.passed
+        certificate = _certified(judgement.path, spec) if certify else None
         text, document = words.judgement(judgement, certificate), judgement.to_dict()
-        document["certificate"] = None if certificate is None else certificate.to_dict()
-        unproved = () if certificate is None else certificate.reasons()
-    print_outcome(document, text, as_json)
+        document["certificate"] = certificate and certificate.to_dict()
+        unproved = certificate.reasons() if certificate else ()
+    print_outcome(document, text)
     warn(judgement.check)
     if not judgement.check.passed:
         fail(judgement.check.reasons(), "Do not deploy it.")
@@ -260,51 +273,31 @@ def _check_motion(
     artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **options: Any
 ) -> Judgement:
     from gen_profile.artefacts.writing import deliver
-    from gen_profile.verification.check import check_artefact
-    from gen_profile.verification.scenario_table import table
+    from gen_profile.verification.check import check_artefact, scenario_table
 
     with progress() as tell:
         tell("checking by co-simulation")
-        judgement = check_artefact(
-            artefact,
-            spec,
-            row=scenario,
-            progress=tell,
-            **options,
-        )
+        judgement = check_artefact(artefact, spec, row=scenario, progress=tell, **options)
     if table_path is not None:
-        deliver(table_path, table(judgement.spec, judgement.check).encode("utf-8"))
+        deliver(table_path, scenario_table(judgement).encode("utf-8"))
     return judgement
-
-
-def _to_certify(judgement: Judgement, options: Mapping[str, Any]) -> bool:
-    """Tell whether to prove what a check has found; not where it failed."""
-    if options["certify"] and judgement.variant is not None:
-        raise SpecError("--certify: is for the motion as planned, without --scale, --mirror and --offset.")
-    return options["certify"] and judgement.check.passed
 
 
 def _certified(path: Path, spec: Spec | None) -> Certificate:
     from gen_profile.certificate.from_file import certify_artefact
 
     with progress() as tell:
-        return certify_artefact(
-            path, spec, progress=lambda done, total: tell("proving it for boxes of machines", done, total)
-        )
+        return certify_artefact(path, spec, progress=partial(tell, "proving it for boxes of machines"))
 
 
-def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_json: bool) -> None:
+def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path) -> None:
     from gen_profile.certificate.from_file import check_certificate
     from gen_profile.cli import words
 
     with progress() as tell:
-        proved = check_certificate(
-            artefact,
-            certificate,
-            spec,
-            progress=lambda done, total: tell("proving it again for boxes of machines", done, total),
-        )
-    print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved), as_json)
+        stage = "proving it again for boxes of machines"
+        proved = check_certificate(artefact, certificate, spec, progress=partial(tell, stage))
+    print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved))
 
 
 def _check_block(
@@ -323,21 +316,20 @@ def _check_block(
 
 @cli.command(epilog="Example: gen-profile formats")
 @output_options
-def formats(as_json: bool) -> None:
+def formats() -> None:
     """List the export formats."""
     from gen_profile_exporters.registry import formats as known
 
     rows = {name: f"{form.summary} ({form.suffix}; {form.proof})" for name, form in known().items()}
-    print_outcome(
-        {"formats": {name: form._asdict() for name, form in known().items()}}, _definitions(rows), as_json
-    )
+    document = {name: form._asdict() for name, form in known().items()}
+    print_outcome({"formats": document}, _definitions(rows))
 
 
 @cli.command(epilog="Example: gen-profile plants gantry-crane --plot crane.png")
 @click.argument("name", metavar="[NAME]", required=False)
 @plot_option
 @output_options
-def plants(name: str | None, picture: Path | None, as_json: bool) -> None:
+def plants(name: str | None, picture: Path | None) -> None:
     """List the machines with their axes, loads and parameters, or a single one."""
     from gen_profile.plants.registry import find_plant, plant_types
 
@@ -354,7 +346,7 @@ def plants(name: str | None, picture: Path | None, as_json: bool) -> None:
         (plant,) = known
         draw_machine(plant, plant.nominal(), picture, f"{plant.type}: {plant.summary}")
     document = {plant.type: _plant_document(plant) for plant in known}
-    print_outcome({"plants": document}, "\n\n".join(map(_plant_words, known)), as_json)
+    print_outcome({"plants": document}, "\n\n".join(map(_plant_words, known)))
 
 
 def _plant_document(plant: Plant) -> dict[str, Any]:
@@ -388,7 +380,7 @@ def _plant_words(plant: Plant) -> str:
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_presets)
 @click.option("--out", "path", type=OutputFile(), help="Write it to a new file, in place of stdout.")
 @output_options
-def presets(name: str | None, path: Path | None, as_json: bool) -> None:
+def presets(name: str | None, path: Path | None) -> None:
     """List the built-in specs, or print one to begin your own with."""
     from gen_profile.spec.reading import preset_text
     from gen_profile.spec.reading import presets as known
@@ -396,21 +388,17 @@ def presets(name: str | None, path: Path | None, as_json: bool) -> None:
     if name is None:
         if path is not None:
             raise SpecError("--out: name the preset to write, as gen-profile presets paper does.")
-        print_outcome({"presets": known()}, _definitions(known()), as_json)
+        print_outcome({"presets": known()}, _definitions(known()))
         return
     text = words = preset_text(name)
     if path is not None:
-        _write_new(path, text)
+        from gen_profile.artefacts.writing import deliver
+
+        if path.exists():
+            raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
+        deliver(path, text.encode("utf-8"))
         words = f"{path} is a copy of the preset {name}. Change it, then: gen-profile {path}"
-    print_outcome({"preset": name, "toml": text}, words.rstrip("\n"), as_json)
-
-
-def _write_new(path: Path, text: str) -> None:
-    from gen_profile.artefacts.writing import deliver
-
-    if path.exists():
-        raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
-    deliver(path, text.encode("utf-8"))
+    print_outcome({"preset": name, "toml": text}, words.rstrip("\n"))
 
 
 def _definitions(rows: dict[str, str]) -> str:

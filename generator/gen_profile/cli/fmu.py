@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import click
 
@@ -11,9 +11,6 @@ from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
 KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
@@ -56,7 +53,6 @@ def fmu(
     source_only: bool,
     path: Path | None,
     author: str | None,
-    as_json: bool,
 ) -> None:
     """Write an FMU of a plant, profile, planner, or a plant with either; or two of them as an SSP."""
     if input_name is not None and kind not in {"plant", "ssp"}:
@@ -82,8 +78,7 @@ def fmu(
             progress=tell,
         )
     document = made.to_dict()
-    names = [
-        name["name"] + ("" if name["runs_here"] else " (not run)") for name in document["platforms"]
-    ] or ["sources only"]
-    text = f"{made.path}: FMI {version}, {', '.join(names)}, {len(made.content)} bytes"
-    print_outcome(document, text, as_json)
+    names = [one["name"] + " (not run)" * (not one["runs_here"]) for one in document["platforms"]]
+    holds = ", ".join(names) or "sources only"
+    text = f"{made.path}: FMI {version}, {holds}, {len(made.content)} bytes"
+    print_outcome(document, text)

@@ -1,5 +1,8 @@
 """Command groups of which one command runs when none is named."""
 
+from pathlib import Path
+from typing import Any
+
 import click
 from click.shell_completion import CompletionItem
 
@@ -10,11 +13,13 @@ from gen_profile.suggestion import suggestion
 class DefaultGroup(click.Group):
     """Put `default` before arguments that begin with neither a command nor an option of the group."""
 
-    default = "design"
+    def __init__(self, *arguments: Any, default: str = "design", **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.default = default
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, the default command put in."""
-        if args[:1] == ["help"] and not _exists("help"):
+        if args[:1] == ["help"] and not Path("help").exists():
             args = [*args[1:], "--help"]
         own = {option for parameter in self.get_params(ctx) for option in parameter.opts}
         completing_first_word = ctx.resilient_parsing and not args
@@ -27,7 +32,7 @@ class DefaultGroup(click.Group):
         """Refuse a first word that is nearly a command: the default would complain of the rest."""
         word = args[0] if args and not ctx.resilient_parsing else ""
         near = suggestion(word, self.commands)
-        if word.isidentifier() and "did you mean" in near and not _exists(word):
+        if word.isidentifier() and "did you mean" in near and not Path(word).exists():
             raise SpecError(f"There is no command or spec {word}{near}")
 
     def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -48,9 +53,3 @@ class DefaultGroup(click.Group):
         default = self.commands[self.default]
         inner = default.make_context(self.default, [], parent=ctx, resilient_parsing=True)
         return [*super().shell_complete(ctx, incomplete), *default.shell_complete(inner, incomplete)]
-
-
-def _exists(word: str) -> bool:
-    from pathlib import Path
-
-    return Path(word).exists()

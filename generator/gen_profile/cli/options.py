@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
@@ -13,9 +14,6 @@ from gen_profile.cli.outcome import print_warnings
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from os import PathLike
-    from pathlib import Path
-
     from gen_profile.spec.model import Spec
 
 DEFAULT_PRESET = "paper"
@@ -32,13 +30,10 @@ class Count(click.IntRange):
 
 
 class PathType(click.Path):
-    """A path as Python's own type, which takes a while to load and is not needed to tell what there is."""
+    """A path as Python's own type."""
 
-    def coerce_path_result(self, value: str | PathLike[str]) -> Path:
-        """Make a path of a word."""
-        from pathlib import Path
-
-        return Path(value)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(path_type=Path, **options)
 
 
 class InputFile(PathType):
@@ -148,42 +143,47 @@ class SpecChoice(NamedTuple):  # attrs would take as long to load as half of cli
             raise
 
 
+def completed(known: Mapping[str, str | None], incomplete: str) -> list[CompletionItem]:
+    """Offer what goes on as a word begins, with what help says of each."""
+    return [CompletionItem(name, help=text) for name, text in known.items() if name.startswith(incomplete)]
+
+
 def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import formats
 
-    return [
-        CompletionItem(name, help=known.summary)
-        for name, known in formats().items()
-        if name.startswith(incomplete)
-    ]
+    return completed({name: known.summary for name, known in formats().items()}, incomplete)
 
 
 def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Offer presets with their summaries."""
     from gen_profile.spec.reading import presets
 
-    return [
-        CompletionItem(name, help=text) for name, text in presets().items() if name.startswith(incomplete)
-    ]
+    return completed(presets(), incomplete)
+
+
+def preset_option(text: str) -> Callable[[Command], Command]:
+    """Take a preset by its name."""
+    return click.option("--preset", metavar="NAME", shell_complete=complete_presets, help=text)
+
+
+def bitrate_option(channel: str) -> Callable[[Command], Command]:
+    """Take the bit rate of a CAN channel."""
+    words = f"Of the {channel} in bit/s, where no system sets it; 500000 by default."
+    return click.option("--bitrate", type=Count(10_000, 1_000_000), default=500_000, help=words)
+
+
+def spec_output_option(name: str) -> Callable[[Command], Command]:
+    """Take the file of a spec that is written, which may be the one that was read."""
+    words = f"Spec to write; ./{name} by default."
+    return click.option("--out", type=OutputFile(replaces="spec_path"), default=name, help=words)
 
 
 def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add what every command that takes a spec takes; the command gets it as `chosen`."""
 
     @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=PathType())
-    @click.option(
-        "--preset",
-        metavar="NAME",
-        shell_complete=complete_presets,
-        help="Use a built-in spec (see gen-profile presets).",
-    )
-    @click.option(
-        "--set",
-        "overrides",
-        metavar="KEY=VALUE",
-        multiple=True,
-        help="Override a key of the spec, such as plant.L1=0.5. Repeatable.",
-    )
+    @preset_option("Use a built-in spec (see gen-profile presets).")
+    @repeatable("--set", "KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
     @wraps(command)
     def choosing(
         *, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], **options: Any
@@ -192,6 +192,25 @@ def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(chosen=chosen, **options)
 
     return choosing
+
+
+def repeatable(
+    option: str, metavar: str, text: str, *, into: str | None = None
+) -> Callable[[Command], Command]:
+    """Make an option that may be given more than once; its values go into one parameter."""
+    words = f"{text} Repeatable."
+    return click.option(option, into or option[2:], metavar=metavar, multiple=True, help=words)
+
+
+def with_options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Add several options, which the help lists in this order."""
+
+    def decorate(command: Any) -> Any:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
 
 
 def version_option(command: Command) -> Command:
@@ -271,24 +290,19 @@ certify_option = click.option(
 def output_options(command: Command) -> Command:
     """Add how every command says what came of it; let none write over what it reads."""
 
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
+    @click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks.")
     @wraps(command)
-    def careful(**values: Any) -> Any:
+    def careful(*, as_json: bool, **values: Any) -> Any:
+        del as_json  # which is for `print_outcome`
         _require_apart(click.get_current_context())
         return command(**values)
 
-    guarded = cast("Command", careful)
-    for decorate in (
-        click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."),
-        click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout."),
-    ):
-        guarded = decorate(guarded)
-    return guarded
+    return cast("Command", careful)
 
 
 def _require_apart(context: click.Context) -> None:
     """Refuse to write a file that is read, or two files of one name."""
-    from pathlib import Path
-
     files: dict[Path, click.Parameter] = {}
     by_role = sorted(context.command.params, key=lambda parameter: isinstance(parameter.type, OutputFile))
     for parameter in by_role:

@@ -14,14 +14,21 @@ import click
 from gen_profile.errors import CertificateError, CheckFailed, GenProfileError, NoMotion, OutputError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.proof.verdict import Proof
     from gen_profile.verification.verdict import Check
 
 INTERRUPTED = 128 + signal.SIGINT  # as shells count it
 
 
-def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
-    """Print an outcome for people, or for programs.
+def as_json() -> bool:
+    """Whether the command is to print one JSON document."""
+    return bool(click.get_current_context().params["as_json"])
+
+
+def print_outcome(document: dict[str, Any], text: str) -> None:
+    """Print an outcome for people, or for programs, as the command was asked to.
 
     Raises
     ------
@@ -29,7 +36,7 @@ def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
         stdout does not take it, as on a full disk.
     """
     try:
-        click.echo(_json(document) if as_json else text)
+        click.echo(_json(document) if as_json() else text)
     except BrokenPipeError:  # a reader that left early, which click knows
         raise
     except OSError as error:
@@ -48,6 +55,14 @@ def print_warnings(sentences: Iterable[str]) -> None:
         if sentence not in said:
             click.echo(f"Warning: {sentence}", err=True)
         said.add(sentence)
+
+
+def not_written(folder: Path) -> str:
+    """Say that nothing was delivered to a folder now."""
+    from gen_profile.artefacts.manifest import FILENAME
+
+    before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
+    return f"Nothing was written{before}."
 
 
 def fail(reasons: Sequence[str], consequence: str = "") -> NoReturn:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,39 +21,35 @@ from gen_profile.cli.options import (
     PathType,
     SpecChoice,
     block_plot_option,
+    completed,
     folder_option,
     output_options,
+    repeatable,
     scheduler_option,
     spec_options,
+    with_options,
 )
-from gen_profile.cli.outcome import fail, print_outcome, print_warnings, warn
+from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
-from gen_profile.cli.signing import sign, sign_option, signing_key
+from gen_profile.cli.signing import sign, signing_key, signing_option
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.progress import Progress
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.streaming.outcome import Source
 
 CLEARED = "\r\x1b[K"  # the line, of a terminal
 
 
-class PlannerGroup(DefaultGroup):
-    """Write where no command is named."""
-
-    default = "write"
-
-
 def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import containers
 
-    known = (*containers(), "c", "linux", "openplc")
-    return [CompletionItem(name) for name in known if name.startswith(incomplete)]
+    return completed(dict.fromkeys((*containers(), "c", "linux", "openplc")), incomplete)
 
 
-@cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner --preset bay-crane --out deploy")
+@cli.group(
+    cls=DefaultGroup, default="write", epilog="Example: gen-profile planner --preset bay-crane --out deploy"
+)
 def planner() -> None:
     """Write a PLC block that plans every motion itself, and execute it.
 
@@ -81,25 +78,23 @@ def planner() -> None:
 @click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")
 @block_plot_option
-@sign_option
+@signing_option("manifest")
 @output_options
 def write(
     chosen: SpecChoice,
     formats: tuple[str, ...],
     folder: Path,
+    *,
     histories: int | None,
-    scheduler: str | None,
     no_check: bool,
-    keep_failed: bool,
     picture: Path | None,
     key_path: Path | None,
-    as_json: bool,
+    **options: Any,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
     spec = chosen.spec()
     if picture is not None and no_check:
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
-    from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.designs.planner import deploy_planner
     from gen_profile.planner.forms import require_forms
@@ -114,9 +109,8 @@ def write(
             folder,
             histories=histories or HISTORIES,
             check=not no_check,
-            keep_failed=keep_failed,
-            scheduler=scheduler,
             progress=tell,
+            **options,
         )
         if picture is not None and outcome.proof is not None:
             from gen_profile.charts.proof import draw
@@ -124,17 +118,14 @@ def write(
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
     if outcome.proof is None or outcome.proof.passed:
         sign(folder, key)
-    print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
+    print_outcome(outcome.to_dict(), words.deployment(outcome))
     warn(outcome.proof)
     print_warnings(outcome.warnings)
     if outcome.proof is not None and not outcome.proof.passed:
-        before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
-        kept = "The block was kept." if outcome.files else f"Nothing was written{before}."
+        kept = "The block was kept." if outcome.files else not_written(folder)
         if outcome.suggestions:
-            tried = "; or with ".join(
-                f"{one} ({100.0 * one.fraction:.0f} % of the limit)" for one in outcome.suggestions
-            )
-            kept = f"It would pass with {tried}.\n{kept}"
+            tried = [f"{one} ({100.0 * one.fraction:.0f} % of the limit)" for one in outcome.suggestions]
+            kept = f"It would pass with {'; or with '.join(tried)}.\n{kept}"
         fail(outcome.proof.reasons(), kept)
 
 
@@ -171,12 +162,7 @@ def write(
 )
 @output_options
 def play(
-    block: Path,
-    commands_path: Path,
-    path: Path,
-    events_path: Path | None,
-    sensor_path: Path | None,
-    as_json: bool,
+    block: Path, commands_path: Path, path: Path, events_path: Path | None, sensor_path: Path | None
 ) -> None:
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
@@ -204,13 +190,13 @@ def play(
         "error_ids": list(setpoints.errors),
         "promise": not setpoints.unpromised,
     }
-    print_outcome(document, text, as_json)
+    print_outcome(document, text)
 
 
 @planner.command(epilog="Example: gen-profile planner explain events.csv")
 @click.argument("events", type=InputFile())
 @output_options
-def explain(events: Path, as_json: bool) -> None:
+def explain(events: Path) -> None:
     """Say in words what a planner block's events mean: a CSV with time_s, code, value."""
     from gen_profile.planner.events import read_events
 
@@ -221,7 +207,7 @@ def explain(events: Path, as_json: bool) -> None:
             for one in events_read
         ]
     }
-    print_outcome(document, "\n".join(one.words for one in events_read) or "No events.", as_json)
+    print_outcome(document, "\n".join(one.words for one in events_read) or "No events.")
 
 
 def _read(path: Path, what: str = "commands") -> str:
@@ -233,56 +219,27 @@ def _read(path: Path, what: str = "commands") -> str:
         raise OutputError(f"Cannot read the {what} {path}: it is no UTF-8 text.") from error
 
 
-def planner_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add what tells of a planner and its commands."""
-    for decorate in (
-        click.option(
-            "--live-parameter",
-            "live_parameters",
-            metavar="NAME=VALUE",
-            multiple=True,
-            help="What a live parameter of --planner is from the start. Repeatable.",
-        ),
-        click.option(
-            "--commands",
-            "commands_path",
-            type=InputFile(),
-            help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
-        ),
-        click.option(
-            "--planner",
-            "block",
-            metavar="BLOCK",
-            type=PathType(),
-            help="Stream what this written planner block issues.",
-        ),
-    ):
-        command = decorate(command)
-    return command
-
-
-def require_no_others(given: Mapping[str, object]) -> None:
-    """Refuse options that do not go with others that were given.
-
-    Raises
-    ------
-    SpecError
-    """
-    for option, value in given.items():
-        if value:
-            raise SpecError(f"{option}: not with --planner; leave one of them out.")
-
-
-def require_planner(commands_path: Path | None, live_parameters: tuple[str, ...]) -> None:
-    """Refuse what only a planner takes.
-
-    Raises
-    ------
-    SpecError
-    """
-    for option, value in (("--commands", commands_path), ("--live-parameter", live_parameters)):
-        if value:
-            raise SpecError(f"{option}: commands a planner block; name it by --planner.")
+planner_options = with_options(
+    click.option(
+        "--planner",
+        "block",
+        metavar="BLOCK",
+        type=PathType(),
+        help="Stream what this written planner block issues.",
+    ),
+    click.option(
+        "--commands",
+        "commands_path",
+        type=InputFile(),
+        help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
+    ),
+    repeatable(
+        "--live-parameter",
+        "NAME=VALUE",
+        "What a live parameter of --planner is from the start.",
+        into="live_parameters",
+    ),
+)
 
 
 def planned(

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,8 +15,6 @@ import click
 from gen_profile.progress import Progress
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.charts.plot import Drawn
 
 FIRST_LINE, LONGEST_PAUSE = 2.0, 30.0  # s after which a log hears of work again, and at the longest

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +16,7 @@ from gen_profile.cli.options import (
     SpecChoice,
     export_option,
     output_options,
+    repeatable,
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome
@@ -22,8 +24,6 @@ from gen_profile.cli.progress import progress
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.spec.model import Spec
 
 
@@ -35,12 +35,11 @@ if TYPE_CHECKING:
     type=OutputFile(),
     help="File to write, .html or .pdf; an .html named after the spec in this folder by default.",
 )
-@click.option(
+@repeatable(
     "--field",
-    "fields",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="What the page shall also say, as Customer=ACME; without a value, a line to sign. Repeatable.",
+    "NAME=VALUE",
+    "What the page shall also say, as Customer=ACME; without a value, a line to sign.",
+    into="fields",
 )
 @export_option("Format whose file is checked and named by its hash")
 @click.option(
@@ -70,49 +69,38 @@ def report(
     path: Path | None,
     fields: tuple[str, ...],
     formats: tuple[str, ...],
-    log: Path | None,
-    log_start: float | None,
-    log_columns: str | None,
     no_compare: bool,
-    as_json: bool,
+    **log: Any,
 ) -> None:
     """Write everything about a design, or about a planner block and its proof, into one HTML file."""
     from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.report.print import printed, require_browser
 
-    options = {
-        "log": log,
-        "log_start": log_start,
-        "log_columns": log_columns,
-        "compared": not no_compare,
-    }
+    options = {**log, "compared": not no_compare}
     if chosen.path is not None and _holds_block(chosen.path):
-        made_of = _of_block(chosen.path)
+        name, make, words = _of_block(chosen.path)
     elif chosen.path is not None and _is_artefact(chosen.path):
-        made_of = _of_artefact(chosen.path, **options)
+        name, make, words = _of_artefact(chosen.path, **options)
     else:
-        made_of = _of_design(chosen.spec(), formats, **options)
-    from pathlib import Path
-
-    out = path or Path(f"{made_of.name}.html")
+        name, make, words = _of_design(chosen.spec(), formats, **options)
+    out = path or Path(f"{name}.html")
     on_paper = out.suffix.lower() == ".pdf"
     if not on_paper and out.suffix.lower() not in {".html", ".htm"}:
         raise OutputError(f"--out {out}: name a file that ends in .html or .pdf.")
     if on_paper:
         require_browser()
     require_place(out)
-    parted = [one.partition("=") for one in fields]
+    parted = (one.partition("=") for one in fields)
+    pairs = [(name.strip(), value.strip()) for name, _, value in parted]
     with progress() as tell:
-        made = made_of.make(
-            fields=[(name.strip(), value.strip()) for name, _, value in parted], progress=tell
-        )
+        made = make(fields=pairs, progress=tell)
         if on_paper:
             from attrs import evolve
 
             tell("printing")
             made = evolve(made, content=printed(made.content))
         deliver(out, made.content)
-    print_outcome(made.to_dict(out), made_of.words(made, out), as_json)
+    print_outcome(made.to_dict(out), words(made, out))
     if faults := made.faults():
         fail(faults)
 
@@ -122,19 +110,15 @@ for parameter in report.params:
         parameter.metavar = "[SPEC.toml|FILE]"
 
 
-class _Subject(NamedTuple):
-    """What a report is about: its name, and how a page is made and described."""
-
-    name: str
-    make: Callable[..., Any]
-    words: Callable[[Any, Path], str]
+# what a report is about: its name, and how a page is made and described
+_Subject = tuple[str, Callable[..., Any], Callable[[Any, Path], str]]
 
 
 def _of_design(spec: Spec, formats: tuple[str, ...], **options: Any) -> _Subject:
     from gen_profile.cli import words
     from gen_profile.report.build import report as run
 
-    return _Subject(name=spec.name, make=partial(run, spec, formats, **options), words=words.report)
+    return spec.name, partial(run, spec, formats, **options), words.report
 
 
 def _of_block(path: Path) -> _Subject:
@@ -146,7 +130,7 @@ def _of_block(path: Path) -> _Subject:
     for parameter in click.get_current_context().command.params:
         if parameter.name not in taken and _given(parameter.name):
             raise SpecError(f"{parameter.opts[0]}: is for a design, and {path} holds a planner block.")
-    return _Subject(name=path.stem, make=partial(planner_report, path), words=words.planner_report)
+    return path.stem, partial(planner_report, path), words.planner_report
 
 
 def _of_artefact(path: Path, **options: Any) -> _Subject:
@@ -157,9 +141,7 @@ def _of_artefact(path: Path, **options: Any) -> _Subject:
     for name, option in {"preset": "--preset", "overrides": "--set", "formats": "--export"}.items():
         if _given(name):
             raise SpecError(f"{option}: is for a spec; {path} is of the one in its manifest.")
-    return _Subject(
-        name=path.name.partition(".")[0], make=partial(artefact_report, path, **options), words=words.report
-    )
+    return path.name.partition(".")[0], partial(artefact_report, path, **options), words.report
 
 
 def _given(name: str | None) -> bool:

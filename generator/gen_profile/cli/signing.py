@@ -5,7 +5,8 @@ The key is named by the user alone: a spec may be a stranger's.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,19 +14,19 @@ from gen_profile.cli.options import InputFile
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
     from gen_profile.artefacts.signature import Key
 
-sign_option = click.option(
-    "--sign",
-    "key_path",
-    type=InputFile(),
-    help="Sign the manifest with this secret key, made by minisign -GW.",
-)
 signed_by_option = click.option(
     "--signed-by", "public_path", type=InputFile(), help="Refuse what this public key has not signed."
 )
+
+
+def signing_option(what: str) -> Callable[[Any], Any]:
+    """Take the key that signs a manifest, or something else."""
+    words = f"Sign the {what} with this secret key, made by minisign -GW."
+    return click.option("--sign", "key_path", type=InputFile(), help=words)
 
 
 def signing_key(path: Path | None) -> Key | None:

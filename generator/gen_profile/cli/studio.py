@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,13 +11,12 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, controller_options
 from gen_profile.cli.options import Count, PathType, output_options, spec_options
+from gen_profile.cli.outcome import as_json
 from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.cli.options import SpecChoice
     from gen_profile.studio.watching import Watching
 
@@ -40,13 +40,7 @@ if TYPE_CHECKING:
 @controller_options(required=False)
 @output_options
 def studio(
-    chosen: SpecChoice,
-    port: int,
-    *,
-    no_browser: bool,
-    artefact: Path | None,
-    as_json: bool,
-    **controller: Any,
+    chosen: SpecChoice, port: int, *, no_browser: bool, artefact: Path | None, **controller: Any
 ) -> None:
     """Turn every knob of a spec in the browser, and see the swing at once."""
     require_installed("gen-profile studio needs Tornado", "studio", "tornado")
@@ -56,8 +50,8 @@ def studio(
         raise SpecError("--watch, --to: go together: name the file, and the controller that uses its table.")
     access = None if artefact is None else Access(**controller)
     text, source, folder = chosen.text()
-    words = ("--preset", source) if chosen.path is None else (source,)
-    start = changed_start(words, text, chosen.overrides, folder)
+    called = ("--preset", source) if chosen.path is None else (source,)
+    start = changed_start(called, text, chosen.overrides, folder)
     if not start.programs:  # else the page asks first
         chosen.spec()
     import asyncio
@@ -65,14 +59,13 @@ def studio(
     from gen_profile.studio.server import serve
 
     def ready(address: str, code: str) -> None:
-        if as_json:
+        if as_json():
             import json
 
             click.echo(json.dumps({"address": address, "code": code}, indent=2))
         else:
-            click.echo(
-                f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it.", err=True
-            )
+            words = f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it."
+            click.echo(words, err=True)
 
     def renew(code: str) -> None:
         click.echo(f"The code was used. Another browser that asks for one: {code}", err=True)
@@ -80,9 +73,8 @@ def studio(
     with ExitStack() as stack:
         watching = None if artefact is None or access is None else _watching(artefact, access, stack)
         try:
-            asyncio.run(
-                serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
-            )
+            pages = serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
+            asyncio.run(pages)
         except KeyboardInterrupt:
             click.echo("The studio is closed.", err=True)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import click
 
@@ -19,9 +19,6 @@ from gen_profile.cli.options import (
 )
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @cli.command(
@@ -63,7 +60,6 @@ def sweep(
     folder: Path,
     scheduler: str | None,
     workers: int | None,
-    as_json: bool,
 ) -> None:
     """Design, check and export every combination of some values.
 
@@ -81,7 +77,7 @@ def sweep(
     store = prepare(text, chosen.overrides, parse_grid(axes), formats, folder)
     with progress() as tell:
         done = run(store, scheduler=scheduler, workers=workers, progress=tell)
-    print_outcome(done.to_dict(), words.sweep(done), as_json)
+    print_outcome(done.to_dict(), words.sweep(done))
 
 
 @cli.command(
@@ -96,7 +92,7 @@ def sweep(
     help="Folder to write the profile to, with its manifest; it stays where it is by default.",
 )
 @output_options
-def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+def lookup(words: tuple[str, ...], out: Path | None) -> None:
     """Find the nearest safe profile of a sweep.
 
     Every key that was varied is an option here. Nearness counts in steps of the grid: what is more than one
@@ -108,7 +104,7 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     folder, asked = _folder_and_values(words)
     with progress() as tell:
         nearest = run(folder, asked, tell, out=out)
-    print_outcome(nearest.to_dict(), tables.found_profile(nearest), as_json)
+    print_outcome(nearest.to_dict(), tables.found_profile(nearest))
 
 
 @cli.command(epilog="Example: gen-profile library swept --out crane.st")
@@ -121,7 +117,7 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )
 @output_options
-def library(folder: Path, path: Path, as_json: bool) -> None:
+def library(folder: Path, path: Path) -> None:
     """Put a sweep's PLC blocks into one.
 
     An input of the block selects the profile.
@@ -131,7 +127,7 @@ def library(folder: Path, path: Path, as_json: bool) -> None:
 
     with progress() as tell:
         written = write_library(folder, path, tell)
-    print_outcome(written.to_dict(), tables.library(written), as_json)
+    print_outcome(written.to_dict(), tables.library(written))
 
 
 def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
@@ -154,6 +150,4 @@ def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
             "name one folder or file that was swept to, and a value for every key varied there, "
             "such as --plant.L1 5.2."
         )
-    from pathlib import Path
-
     return Path(folders[0]), asked

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,6 @@ from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, named, number
 from gen_profile.units import RATES
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.certificate.document import Certificate
     from gen_profile.comparison.compare import Comparison
     from gen_profile.comparison.robustness import Robustness
@@ -68,15 +67,13 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
     if solution is not None:
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time
         solver = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
-    residual = (
-        f"{mm(figures['sway_residual_peak_m'])} nominal, {mm(figures['sway_residual_worst_m'])} at worst"
-    )
+    nominal, worst = (mm(figures[f"sway_residual_{which}_m"]) for which in ("peak", "worst"))
     rows = [
         ("move", _move(outcome.spec)),
         ("solver", solver),
         *_peaks(outcome),
         ("sway on the way", mm(figures["sway_transient_peak_m"])),
-        ("residual sway", residual),
+        ("residual sway", f"{nominal} nominal, {worst} at worst"),
         *([] if outcome.check is None else (*_groups(outcome.check), *_wind(outcome.check))),
         ("check", _verdict(outcome.check)),
         *(row for certificate in certificates.values() for row in _proved(certificate)),
@@ -96,7 +93,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
     """Tell how an artefact was judged, and what is proved of it."""
     check = judged.check
     findings = [
-        (finding.scenario.name, ", ".join(f"{load} {mm(sway)}" for load, sway in finding.residual.items()))
+        (finding.scenario.name, _by_load(finding.residual))
         for finding in check.findings
         if finding.scenario.group == "machines" or len(check.findings) == 1
     ]
@@ -129,14 +126,12 @@ def _proved(certificate: Certificate) -> Iterator[tuple[str, str]]:
     )
     fraction = "" if certificate.fraction == 1.0 else f"{100.0 * certificate.fraction:.3g} % of "
     yield "machines", f"{fraction}all with {machines}" if machines else "the nominal one"
-    bounds = ", ".join(f"{load} {mm(bound)}" for load, bound in certificate.bounds.items())
+    bounds = _by_load(certificate.bounds)
     said = [f"{bounds}, from {certificate.arrival:.4g} s on"] if bounds else []
     if (way := certificate.on_the_way) is not None and way.bound is not None:
         said.append(f"{way.limit.load} {mm(way.bound)} at any time")
-    yield (
-        "proved" if certificate.proved else "not proved",
-        f"at most {'; '.join(said)}" if said else "no bound",
-    )
+    most = f"at most {'; '.join(said)}" if said else "no bound"
+    yield "proved" if certificate.proved else "not proved", most
     for axis, kinds in (certificate.asked or {}).items():
         bounds = ", ".join(f"{claim['bound']:.4g} {claim['unit']}" for claim in kinds.values())
         yield "setpoints", f"ask {axis} for at most {bounds}"
@@ -149,9 +144,7 @@ def deployment(outcome: Deployment) -> str:
     if outcome.margins is not None:
         later, times = outcome.margins.delay, outcome.margins.gain
         rows.append(("sensor margins", f"{later:.2g} s later than stated, {times:.2g} times too much"))
-    rows += [] if outcome.proof is None else _proof(outcome.proof)
-    if outcome.proof is None:
-        rows.append(("proof", "skipped"))
+    rows += [("proof", "skipped")] if outcome.proof is None else _proof(outcome.proof)
     rows += [("wrote", f"{outcome.folder / file.path}, {file.bytes} bytes") for file in outcome.files]
     return _block(outcome.spec.name, rows)
 
@@ -170,8 +163,8 @@ def block_judgement(judged: BlockJudgement) -> str:
         ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
         ("given", worst.history.reported(judged.spec.machine().units)),
         ("commands", "; ".join(commands)),
-        ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
-        ("sway on the way", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.on_the_way.items())),
+        ("residual sway", _by_load(worst.residual)),
+        ("sway on the way", _by_load(worst.on_the_way)),
         ("history kept", "passed" if judged.check.passed else "FAILED"),
     ]
     return _block(str(judged.path), rows)
@@ -179,15 +172,12 @@ def block_judgement(judged: BlockJudgement) -> str:
 
 def _proof(proof: Proof) -> list[tuple[str, str]]:
     document, verdict = proof.to_dict(), "passed" if proof.passed else "FAILED"
-    worst = ", ".join(f"{load} {mm(sway)}" for load, sway in proof.worst.residual.items())
-    groups = [
-        (
-            f"{group['group']}, {group['histories']}",
-            f"worst {100.0 * group['worst_share']:.3g} % of the limit, "
-            + ", ".join(f"{100.0 * float(q):g} % ≤ {100.0 * s:.3g} %" for q, s in group["quantiles"].items()),
-        )
-        for group in document["groups"]
-    ]
+
+    groups = []
+    for group in document["groups"]:
+        most = (f"{100.0 * float(q):g} % ≤ {100.0 * s:.3g} %" for q, s in group["quantiles"].items())
+        shares = f"worst {100.0 * group['worst_share']:.3g} % of the limit, {', '.join(most)}"
+        groups.append((f"{group['group']}, {group['histories']}", shares))
     limits = ", ".join(
         f"{axis.name} {name} {100.0 * document['limits'][axis.prefix + name]:.4g} %".lstrip()
         for axis in proof.worst.history.axes.values()
@@ -196,7 +186,7 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
     return [
         *groups,
         ("limits", limits),
-        ("worst history", f"{proof.worst.number}: residual sway {worst}"),
+        ("worst history", f"{proof.worst.number}: residual sway {_by_load(proof.worst.residual)}"),
         ("proof", f"{verdict}: {100.0 * document['share']:.3g} % of the limit"),
     ]
 
@@ -220,8 +210,8 @@ def _wind(check: Check) -> list[tuple[str, str]]:
     """Tell how far the wind holds the loads aside, where the spec states one."""
     if check.wind is None:
         return []
-    aside = ", ".join(f"{load} {mm(by)}" for load, by in check.wind.loads.items())
-    return [(f"wind, {check.wind.force:g} N", f"holds aside {aside} ({check.wind.machine}); not judged")]
+    held = f"holds aside {_by_load(check.wind.loads)} ({check.wind.machine}); not judged"
+    return [(f"wind, {check.wind.force:g} N", held)]
 
 
 def comparison(compared: Comparison) -> str:
@@ -256,10 +246,9 @@ def robustness(curves: Robustness) -> str:
         span = "" if ends is None else f"{100.0 * ends[0]:+.1f} … {100.0 * ends[1]:+.1f} %"
         cells = (method, number(1e3 * curves.end_load(method).max()), f"{kept:.0f} %", span)
         table.add_row(*cells[: len(heads)])
-    ranges = (
-        f"{name} {100.0 * off[0]:+.3g} … {100.0 * off[-1]:+.3g} %" for name, off in curves.errors.items()
-    )
-    title = f"{curves.spec.name}: {_move(curves.spec)}; tried {', '.join(ranges)}"
+    ranges = {name: (100.0 * off[0], 100.0 * off[-1]) for name, off in curves.errors.items()}
+    tried = ", ".join(f"{name} {low:+.3g} … {high:+.3g} %" for name, (low, high) in ranges.items())
+    title = f"{curves.spec.name}: {_move(curves.spec)}; tried {tried}"
     left_out = [f"{method}: {reason}" for method, reason in curves.left_out.items()]
     return "\n".join([title, _text(table), *left_out])
 
@@ -267,14 +256,11 @@ def robustness(curves: Robustness) -> str:
 def identification(identified: Identification, path: Path) -> str:
     """Tell what was identified, how well, and how the measurements agree with it."""
     document = identified.to_dict()
-    rows = [
-        (
-            name,
-            f"{row['value']:.6g} ± {row['half_range']:.2g} {row['unit']} "
-            f"(±{100.0 * row['half_range'] / abs(row['value'] or 1.0):.2g} %; {row['given']:g} before)",
-        )
-        for name, row in document["parameters"].items()
-    ]
+    rows = []
+    for name, row in document["parameters"].items():
+        size = f"{row['value']:.6g} ± {row['half_range']:.2g} {row['unit']}"
+        fraction = 100.0 * row["half_range"] / abs(row["value"] or 1.0)
+        rows.append((name, f"{size} (±{fraction:.2g} %; {row['given']:g} before)"))
     for row in document["readings"]:
         what = row["parameter"] if "parameter" in row else f"period of mode {row['mode']}"
         read = row["value"] if "parameter" in row else row["seconds"]
@@ -333,14 +319,9 @@ def _rests(identified: Identification) -> Iterator[tuple[str, str]]:
 def sweep(done: Sweep) -> str:
     """Tell how many cases ended how, with an example of each failure."""
     rows = [("varied", ", ".join(f"{axis.key} ({len(axis.values)})" for axis in done.store.grid.axes))]
-    rows += [
-        (
-            status,
-            f"{count} of {len(done.store.grid)}"
-            + (f"; {done.reasons[status]}" if status in done.reasons else ""),
-        )
-        for status, count in done.statuses.items()
-    ]
+    for status, count in done.statuses.items():
+        example = f"; {done.reasons[status]}" if status in done.reasons else ""
+        rows.append((status, f"{count} of {len(done.store.grid)}{example}"))
     if done.kept:
         rows.append(("kept", f"{done.kept} that had been finished before"))
     return _block(done.store.name, [*rows, ("wrote", str(done.table))])
@@ -365,11 +346,9 @@ def found_profile(nearest: LookupResult) -> str:
 def library(written: Library) -> str:
     """Tell what is in a library."""
     count = len(written.profiles)
+    size = f"{count} profile{'s'[: count > 1]}, {written.bytes / 1000:.4g} kB of text"
     rows = [
-        (
-            "block",
-            f"{written.block}, {count} profile{'s'[: count > 1]}, {written.bytes / 1000:.4g} kB of text",
-        ),
+        ("block", f"{written.block}, {size}"),
         *zip(["wrote", *[""] * len(written.files)], map(str, written.files), strict=False),
         ("", f"{written.index} tells which is which"),
     ]
@@ -405,16 +384,11 @@ def _cost_of_lag(figures: Mapping[str, float], effort: str) -> list[tuple[str, s
 
 
 def _move(spec: Spec) -> str:
-    units = [axis.unit for axis in spec.machine().actuated]
-    distances = ", ".join(
-        f"{name} {distance:g} {unit}"
-        for name, distance, unit in zip(spec.axis, spec.move.distance, units, strict=True)
-    )
-    uncertain = ", ".join(
-        f"{name} ±{100 * fraction:g} %" for name, fraction in spec.robustness.uncertain.items()
-    )
+    axes = zip(spec.machine().actuated, spec.move.distance, strict=True)
+    distances = ", ".join(f"{axis.name} {distance:g} {axis.unit}" for axis, distance in axes)
     duration = "the shortest time" if spec.move.shortest else f"{spec.move.duration:g} s"
-    return f"{spec.plant.type}, {distances} in {duration}" + (f", {uncertain}" if uncertain else "")
+    ranges = (f"{name} ±{100 * fraction:g} %" for name, fraction in spec.robustness.uncertain.items())
+    return ", ".join([spec.plant.type, f"{distances} in {duration}", *ranges])
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:
@@ -424,10 +398,12 @@ def _peaks(outcome: Design) -> list[tuple[str, str]]:
     peaks: dict[str, list[str]] = {}
     for one in demands(outcome.spec, outcome.plan.evaluation.command):
         peaks.setdefault(one.axis.name, []).append(f"{one.asked:.4g} {one.unit}")
-    return [
-        (kind if len(peaks) == 1 else f"{kind}, {axis}", ", ".join(of_axis))
-        for axis, of_axis in peaks.items()
-    ]
+    title = kind if len(peaks) == 1 else f"{kind}, {{}}"
+    return [(title.format(axis), ", ".join(of_axis)) for axis, of_axis in peaks.items()]
+
+
+def _by_load(sways: Mapping[str, float]) -> str:
+    return ", ".join(f"{load} {mm(sway)}" for load, sway in sways.items())
 
 
 def _verdict(check: Check | None) -> str:

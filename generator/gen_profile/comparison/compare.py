@@ -60,9 +60,8 @@ class Recommendation:
 
 def efficient(rows: Mapping[str, Figures]) -> frozenset[str]:
     """Find the Pareto front: methods that no other one beats in some objective without losing in another."""
-    return frozenset(
-        method for method, row in rows.items() if not any(_dominates(other, row) for other in rows.values())
-    )
+    beaten = {name for name, row in rows.items() if any(_dominates(other, row) for other in rows.values())}
+    return frozenset(rows.keys() - beaten)
 
 
 def recommend(
@@ -107,10 +106,8 @@ def _least(
     words = figure(winner)
     others = [method for method in rows if (method in optimal) != (winner in optimal)]
     if others:
-        second = best(others)
-        words += (
-            f"; the best {'optimal motion' if second in optimal else 'shaper'}, {second}: {figure(second)}"
-        )
+        second, kind = best(others), "shaper" if winner in optimal else "optimal motion"
+        words += f"; the best {kind}, {second}: {figure(second)}"
     kept = f"Of the methods that keep the residual sway below {limit} on all machines, it"
     return Recommendation(method=winner, reason=f"{kept} {does} ({words}).", aim=aim, figures=words)
 
@@ -268,18 +265,15 @@ def compare(
             elif isinstance(error, InfeasibleProblem) and candidate.requirements:
                 impossible[candidate.requirements] = left_out[candidate.method]
     figures = {row.method: row.figures for row in rows}
+    safe = {row.method: row.figures for row in rows if row.safe}
+    optimal, unit = [name for name in figures if name.startswith("optimal")], spec.machine().actuated[0].unit
     return Comparison(
         spec=spec,
         rows=tuple(rows),
         left_out=left_out,
         too_slow=too_slow,
         efficient=efficient(figures),
-        recommended=recommend(
-            {row.method: row.figures for row in rows if row.safe},
-            limit=_limit_in_words(spec),
-            unit=spec.machine().actuated[0].unit,
-            optimal=[method for method in figures if method.startswith("optimal")],
-        ),
+        recommended=recommend(safe, limit=_limit_in_words(spec), unit=unit, optimal=optimal),
     )
 
 

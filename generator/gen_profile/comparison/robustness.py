@@ -275,12 +275,8 @@ def robustness_of(spec: Spec, motions: Mapping[str, Profile], errors: Mapping[st
     machines = np.tile([nominal[name] for name in names], (grid[0].size, 1))
     for name, off in zip(errors, grid, strict=True):
         machines[:, names.index(name)] *= 1.0 + off.ravel()
-    frequencies = np.array(
-        [
-            linearize(plant, dict(zip(names, row, strict=True)), spec.move.target).frequencies[[0, -1]]
-            for row in machines
-        ]
-    )
+    rows = (dict(zip(names, row, strict=True)) for row in machines)
+    frequencies = np.array([linearize(plant, one, spec.move.target).frequencies[[0, -1]] for one in rows])
     watch = max(SHORTEST_WATCH, 4.0 * np.pi / float(frequencies[:, 0].min()))
     step = STEP_PHASE / float(frequencies[:, 1].max())
     tau = spec.actuator.tau or 0.0

@@ -259,8 +259,8 @@ def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, 
     known = [*machines, *further_scenarios(spec, machines)]
     checks = []
     for setpoints in replayed:
-        worst = worst_machines(spec, setpoints, known, progress)
-        rows = [*known, *worst.machines]
+        worst, tried = worst_machines(spec, setpoints, known, progress)
+        rows = [*known, *worst]
         if spec.check.foreign is not None:
             check = judge_external(spec, spec.check.foreign, setpoints, rows)
         else:
@@ -272,7 +272,7 @@ def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, 
                 by_fmpy=by_fmpy,
                 progress=progress,
             )
-        checks.append(attrs.evolve(check, searched=worst.tried))
+        checks.append(attrs.evolve(check, searched=tried))
     return max(checks, key=lambda check: check.demand)
 
 

@@ -8,10 +8,9 @@ from scipy.interpolate import CubicSpline
 
 from gen_profile.evaluation.simulation import driven_swing, motion_of
 from gen_profile.identification.measurements import SwingLog
-from gen_profile.identification.swing_model import SwingModel, swing_model
+from gen_profile.identification.swing_model import SwingingMachine, SwingModel, swing_model
 from gen_profile.motion.profile import Array, Profile, SampledProfile
-from gen_profile.plants.plant import Plant
-from gen_profile.problem.linearization import linearize
+from gen_profile.problem.dynamics import parameter_rows
 
 FINE, COARSE = 60.0, 16.0  # places in a swing of the fastest mode, between which splines are laid
 SWUNG = 0.1  # rad or m, about as far as loads swing: what steps of a start are compared with
@@ -73,8 +72,8 @@ class DrivenModel(SwingModel):
         logged = np.interp(np.arange(0.0, log.times[-1], step), log.times, log.values)
         logged = logged - logged.mean()
         before, after = len(logged), int((self.motion.duration + OUTSIDE * self.slowest) / step)
-        rows = np.array([[one[q.name] for q in self.plant.parameters] for one in machines])
-        at_rest = np.zeros((len(rows), 2 * len(self.plant.unactuated)))
+        rows = parameter_rows(self.machine.plant, machines)
+        at_rest = np.zeros((len(rows), 2 * len(self.machine.plant.unactuated)))
         shown = self._shown(rows, at_rest, step * np.arange(float(before + after))).T
         swings = np.concatenate([np.zeros((len(rows), before)), shown], axis=1)  # and stands before
         windows = np.lib.stride_tricks.sliding_window_view(swings, before, axis=1)
@@ -107,21 +106,19 @@ class DrivenModel(SwingModel):
 
     def _shown(self, machines: Array, starts: Array, times: Array) -> Array:
         """Say what the log would show of machines, from `lead` before the motion on: (times, machines)."""
-        moving, load = motion_of(self.motion), self.plant.loads.index(self.log.load)
+        plant, moving = self.machine.plant, motion_of(self.motion)
 
         def motion(nodes: Array) -> Array:
             values = moving(np.maximum(nodes - self.lead, 0.0))
             values[nodes < self.lead, self.motion.axes :] = 0.0
             return values
 
-        sway, angle = driven_swing(self.plant, machines, motion=motion, starts=starts, times=times)
-        shown = (sway if self.log.quantity == "sway" else angle)[:, :, load].T
+        sway, angle = driven_swing(plant, machines, motion=motion, starts=starts, times=times)
+        shown = (sway if self.log.quantity == "sway" else angle)[:, :, plant.loads.index(self.log.load)].T
         return np.asarray(CubicSpline(times, shown)(times, 1) if self.log.quantity == "rate" else shown)
 
 
-def driven_model(
-    plant: Plant, parameters: Mapping[str, float], played: SampledProfile, log: SwingLog
-) -> DrivenModel:
+def driven_model(machine: SwingingMachine, played: SampledProfile, log: SwingLog) -> DrivenModel:
     """Put a log beside a machine of about these parameters that plays setpoints.
 
     Raises
@@ -129,11 +126,10 @@ def driven_model(
     InfeasibleProblem
         The log is too short or too sparse to show how the machine swings, or shows a greater swing than any.
     """
-    free = swing_model(plant, parameters, tuple(map(float, played.position[-1])), log)
-    fastest = 2.0 * np.pi / float(linearize(plant, parameters, free.q_a).frequencies[-1])
+    free = swing_model(machine, log)
+    fastest = 2.0 * np.pi / float(machine.linear.frequencies[-1])
     return DrivenModel(
-        plant=plant,
-        q_a=free.q_a,
+        machine=machine,
         log=log,
         shown=free.shown,
         period=np.inf,

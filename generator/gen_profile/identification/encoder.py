@@ -91,15 +91,13 @@ class Encoder:
 
     def _asked(self, bus: BusABC) -> int:
         """Ask how many counts a turn has."""
+        why = ""
         try:
             answer = Link(bus, SystemClock()).sdo(self.node).upload(RESOLUTION, 0)
+            if counts := int.from_bytes(answer, "little"):
+                return counts
         except SdoError as error:
-            answer = b""
             why = f" ({error})"
-        else:
-            why = ""
-        if counts := int.from_bytes(answer, "little"):
-            return counts
         raise OutputError(
             f"Node {self.node} on {self.port.channel} does not tell the counts of a turn (6001h){why}: state "
             "them, or compare node id and bit rate."

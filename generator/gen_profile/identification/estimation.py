@@ -11,10 +11,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
+from gen_profile.identification.fit import Fit, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.identification.misfit import Misfit, elsewhere, explanations, misfits
-from gen_profile.identification.swing_model import swing_model
+from gen_profile.identification.swing_model import SwingingMachine, swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import AND, OR_WITH, Phrase, joined
@@ -93,7 +93,7 @@ def estimate(
     InfeasibleProblem
         The measurements do not determine the parameters.
     """
-    models = [swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs]
+    models = [swing_model(machine, log) for log in logs]
     fit = fit_of(machine, names, readings, models)
     progress("fitting")
     try:
@@ -115,9 +115,8 @@ def estimate(
         sigma if one is None else one.widened(sigma, len(model.log.times))
         for one, sigma, model in zip(misfit_of_logs, noise.tolist(), fit.models, strict=True)
     ]
-    return _estimate(
-        uncertainty(fit, unknowns, np.array(effective)), noise, misfit_of_logs, effective, progress
-    )
+    around = uncertainty(fit, unknowns, np.array(effective))
+    return _estimate(around, noise, misfit_of_logs, effective, progress)
 
 
 def _estimate(
@@ -131,7 +130,7 @@ def _estimate(
     fit, unknowns = around.fit, around.unknowns
     factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     progress("finding the ranges")
-    half_ranges = around.half_ranges(factor)
+    half_ranges, lefts = around.half_ranges(factor), fit.left(unknowns)
 
     def by_name(relative: Array) -> dict[str, float]:
         return dict(zip(fit.names, map(float, relative * fit.scale), strict=True))
@@ -147,9 +146,7 @@ def _estimate(
         misfits=misfit_of_logs,
         widened=tuple(float(wide / sigma) for wide, sigma in zip(effective, noise, strict=True)),
         rests_on=_rests_on(around),
-        swings=tuple(
-            model.log.values + left for model, left in zip(fit.models, fit.left(unknowns), strict=True)
-        ),
+        swings=tuple(one.log.values + left for one, left in zip(fit.models, lefts, strict=True)),
     )
 
 
@@ -167,16 +164,8 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
     if not explained:
         return
     model, left = next((m, one) for m, one in zip(fit.models, misfit_of_logs, strict=True) if one is not None)
-    units = {q.name: q.unit for q in fit.machine.plant.parameters}
     template = "another {freed} than the spec's ({values})"
-    others = [
-        Phrase(
-            template,
-            freed=joined(AND, one.freed),
-            values=", ".join(f"{name} {value:.4g} {units[name]}" for name, value in one.values.items()),
-        )
-        for one in explained
-    ]
+    others = [Phrase(template, freed=joined(AND, one.freed), values=one.words) for one in explained]
     freed = joined(AND, explained[0].freed)
     template = "free {freed}, too, or measure {which} directly"
     cure: str = Phrase(template, freed=freed, which="it" if len(explained[0].freed) == 1 else "them")
@@ -187,14 +176,8 @@ def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> N
         "{model.log.unit} RMS, {ratio:.2g} times the noise, is left of it, strongest at "
         "{left.frequency:.3g} rad/s. Nothing is left with {others}; {cure}."
     )
-    raise InfeasibleProblem(
-        template,
-        model=model,
-        left=left,
-        ratio=left.rms / left.noise,
-        others=joined(OR_WITH, others),
-        cure=cure,
-    )
+    ratio, others_joined = left.rms / left.noise, joined(OR_WITH, others)
+    raise InfeasibleProblem(template, model=model, left=left, ratio=ratio, others=others_joined, cure=cure)
 
 
 def _rests_on(around: Uncertainty) -> dict[str, dict[str, float]]:
@@ -208,10 +191,8 @@ def _rests_on(around: Uncertainty) -> dict[str, dict[str, float]]:
     unknowns[own] = around.unknowns[: len(fit.names)]
     _, slopes = wider.residuals(unknowns, around.noise)
     starts = list(range(len(wider.names), slopes.shape[1]))
-    moved = {
-        name: np.linalg.lstsq(slopes[:, [*own, *starts]], -0.01 * slopes[:, places[name]], rcond=None)[0]
-        for name in exact
-    }
+    free = slopes[:, [*own, *starts]]
+    moved = {name: np.linalg.lstsq(free, -0.01 * slopes[:, places[name]], rcond=None)[0] for name in exact}
     return {
         name: {other: float(by[place] * fit.scale[place]) for other, by in moved.items()}
         for place, name in enumerate(fit.names)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -17,26 +16,15 @@ from scipy.optimize import least_squares
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.measurements import DirectReading, Period
-from gen_profile.identification.swing_model import STEP, SwingModel
+from gen_profile.identification.swing_model import STEP, SwingingMachine, SwingModel
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import AND, joined
-from gen_profile.plants.plant import Plant
-from gen_profile.problem.linearization import linearize
 
 NOISE_ROUNDS = 2
 HELD = 0.3  # relative, by which a parameter may leave the spec's while only a part of a log is looked at
 TOLERANCE = 1e-6  # relative, of the sum of squares: it has as many terms as the logs have samples
 HALF = 0.5  # of a swing, which is left where two have the same phase within a twelfth of a period
 STEPS = 30  # of a search; near a solution five are enough
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class SwingingMachine:
-    """What is known beforehand: the machine, all its parameters, and where its axes stood."""
-
-    plant: Plant
-    parameters: Mapping[str, float]
-    q_a: tuple[float, ...]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -100,11 +88,9 @@ class Fit:
             left = self.left(unknowns)
         except (InfeasibleProblem, CosimulationError, np.linalg.LinAlgError):
             return None
-        linear = [
-            float(np.std(one)) < HALF * float(np.std(model.log.values))
-            for model, one in zip(self.models, left, strict=True)
-        ]
-        return unknowns if all(linear) else None
+        pairs = zip(self.models, left, strict=True)
+        linear = all(np.std(one) < HALF * np.std(model.log.values) for model, one in pairs)
+        return unknowns if linear else None
 
     def near(self, unknowns: Array) -> tuple[Array, Array]:
         """Find the unknowns that agree best with all that was logged, near a guess, and the noise."""
@@ -120,7 +106,7 @@ class Fit:
 
     def beginning(self, parameters: Mapping[str, float]) -> Fit:
         """Begin the search at other parameters."""
-        return attrs.evolve(self, machine=attrs.evolve(self.machine, parameters=dict(parameters)))
+        return attrs.evolve(self, machine=self.machine.of(parameters))
 
     def small(self) -> Fit:
         """Take all swings to be small."""
@@ -166,7 +152,7 @@ class Fit:
         """
         p = len(self.names)
         spread = np.array([reading.uncertainty for reading in self.readings])
-        measured = np.array([_measured(reading) for reading in self.readings])
+        measured = np.array([one.seconds if isinstance(one, Period) else one.value for one in self.readings])
         slopes = np.zeros((len(measured), len(unknowns)))
         predicted = self.predicted(unknowns)
         for column, step in enumerate(STEP * np.eye(p, len(unknowns))):
@@ -196,16 +182,13 @@ class Fit:
     def predicted(self, unknowns: Array) -> Array:
         """Say what the readings would be on a machine."""
         parameters = self.parameters(unknowns)
-        linear = linearize(self.machine.plant, parameters, self.machine.q_a)
+        linear = self.machine.of(parameters).linear
         damped = linear.frequencies * np.sqrt(np.maximum(1.0 - linear.damping_ratios**2, 1e-12))
-        return np.array(
-            [
-                2.0 * np.pi / damped[reading.mode - 1]
-                if isinstance(reading, Period)
-                else parameters[reading.parameter]
-                for reading in self.readings
-            ]
+        values = (
+            2.0 * np.pi / damped[one.mode - 1] if isinstance(one, Period) else parameters[one.parameter]
+            for one in self.readings
         )
+        return np.array([*values])
 
     def parameters(self, unknowns: Array) -> dict[str, float]:
         """Put the unknowns' parameters among the others, by name."""
@@ -215,9 +198,12 @@ class Fit:
     def left(self, unknowns: Array, until: float = np.inf) -> list[Array]:
         """Say what is left of every log up to a time in s, in rad or m."""
         residuals, _ = self.residuals(unknowns, np.ones(len(self.models)), until)
-        counts = [len(self.readings), *(model.samples(until) for model in self.models)]
-        ends = np.cumsum(counts)
-        return [residuals[low:high] for low, high in pairwise(ends.tolist())]
+        return self.of_logs(residuals, until)
+
+    def of_logs(self, values: Array, until: float = np.inf) -> list[Array]:
+        """Pick every log's part of residuals, or of what has their places last, up to a time in s."""
+        ends = np.cumsum([len(self.readings), *(model.samples(until) for model in self.models)])
+        return np.split(values, ends, axis=-1)[1:-1]
 
     def _noise(self, unknowns: Array, until: float, parameters: int) -> Array:
         """Estimate every log's standard deviation, widened where neighbouring residuals are alike."""
@@ -225,14 +211,12 @@ class Fit:
         for model, residuals in zip(self.models, self.left(unknowns, until), strict=True):
             count = len(residuals)
             square = residuals @ residuals
-            correlation = (
-                min(max(float(residuals[1:] @ residuals[:-1] / square), 0.0), 0.99) if square > 0.0 else 0.0
-            )
+            alike = float(residuals[1:] @ residuals[:-1] / square) if square > 0.0 else 0.0
+            correlation = min(max(alike, 0.0), 0.99)
             freedom = max(count - model.unknowns - parameters, 1)
             resolution = np.ptp(model.log.values) * 1e-9 or 1e-12  # an exact log has no noise at all
-            noise.append(
-                max(np.sqrt(square / freedom * (1.0 + correlation) / (1.0 - correlation)), resolution)
-            )
+            wide = np.sqrt(square / freedom * (1.0 + correlation) / (1.0 - correlation))
+            noise.append(max(wide, resolution))
         return np.array(noise)
 
 
@@ -253,7 +237,3 @@ def fit_of(
         readings=tuple(readings),
         models=tuple(models),
     )
-
-
-def _measured(reading: DirectReading | Period) -> float:
-    return reading.seconds if isinstance(reading, Period) else reading.value

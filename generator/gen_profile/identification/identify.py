@@ -12,7 +12,6 @@ import tomli_w
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, INITIAL_RESIDUAL_RATIO, Estimate, estimate
-from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
     GREATEST,
@@ -24,7 +23,7 @@ from gen_profile.identification.measurements import (
     SwingLog,
     parse_swing,
 )
-from gen_profile.identification.swing_model import shortened
+from gen_profile.identification.swing_model import SwingingMachine, shortened
 from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.one_thread import one_thread
 from gen_profile.phrase import AND, Phrase, joined
@@ -70,17 +69,15 @@ class Identification(Drawable):
 
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong with the measurements, though parameters were found; a sentence each."""
-        logs = (sentence for row in self.to_dict()["logs"] for sentence in _log_warnings(row))
-        if (factor := self.estimate.contradiction) == 1.0:
-            return tuple(logs)
-        return (
-            *logs,
-            Phrase("the readings contradict one another; ranges widened {factor:.2g} times", factor=factor),
-        )
+        logs = [sentence for row in self.to_dict()["logs"] for sentence in _log_warnings(row)]
+        if (factor := self.estimate.contradiction) != 1.0:
+            template = "the readings contradict one another; ranges widened {factor:.2g} times"
+            logs.append(Phrase(template, factor=factor))
+        return tuple(logs)
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        estimated, units = self.estimate, {q.name: q.unit for q in self.spec.machine().parameters}
+        estimated, units = self.estimate, self.spec.machine().units
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
@@ -107,30 +104,26 @@ class Identification(Drawable):
                 }
                 for reading, model in zip(self.readings, estimated.model, strict=True)
             ],
-            "logs": [
-                {
-                    "load": log.load,
-                    "quantity": log.quantity,
-                    "samples": log.logged,
-                    "averages": len(log.times) if len(log.times) < log.logged else None,
-                    "lasts_s": float(log.times[-1]),
-                    "unit": log.unit,
-                    "swing": float(np.ptp(log.values)) / 2.0,
-                    "noise": noise,
-                    "unrest": initial_residual_ratio,
-                    "misfit": None
-                    if left is None
-                    else {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": widened},
-                }
-                for log, noise, initial_residual_ratio, left, widened in zip(
-                    self.logs,
-                    estimated.noise,
-                    estimated.initial_residual_ratio,
-                    estimated.misfits,
-                    estimated.widened,
-                    strict=True,
-                )
-            ],
+            "logs": [self._log(index) for index in range(len(self.logs))],
+        }
+
+    def _log(self, index: int) -> dict[str, Any]:
+        """Nest plain values of one log."""
+        log, found = self.logs[index], self.estimate
+        misfit = None
+        if (left := found.misfits[index]) is not None:
+            misfit = {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": found.widened[index]}
+        return {
+            "load": log.load,
+            "quantity": log.quantity,
+            "samples": log.logged,
+            "averages": len(log.times) if len(log.times) < log.logged else None,
+            "lasts_s": float(log.times[-1]),
+            "unit": log.unit,
+            "swing": float(np.ptp(log.values)) / 2.0,
+            "noise": found.noise[index],
+            "unrest": found.initial_residual_ratio[index],
+            "misfit": misfit,
         }
 
 
@@ -262,19 +255,11 @@ def identify(
         raise SpecError(
             "at: must be places in m or rad, found {places}.", places=", ".join(f"{x:g}" for x in stood)
         )
-    logs = tuple(
-        shortened(log, plant, spec.plant.parameters, stood)
-        for log in measurements
-        if isinstance(log, SwingLog)
-    )
+    machine = SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood)
+    logs = tuple(shortened(log, machine) for log in measurements if isinstance(log, SwingLog))
     with one_thread():
-        estimated = estimate(
-            SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
-            [q.name for q in plant.parameters if q.name in asked],
-            readings,
-            logs,
-            progress,
-        )
+        names = [q.name for q in plant.parameters if q.name in asked]
+        estimated = estimate(machine, names, readings, logs, progress)
     return Identification(
         given=spec,
         spec=_identified(spec, estimated),
@@ -330,45 +315,36 @@ def _log_warnings(row: Mapping[str, Any]) -> Iterator[str]:
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
     known = {q.name: q for q in plant.parameters}
-    read = {reading.parameter for reading in readings if isinstance(reading, DirectReading)}
+    direct = [one for one in readings if isinstance(one, DirectReading)]
+    read = {one.parameter for one in direct}
     faults = [
         f"{'measured' if name in read else 'free'} {name}: unknown parameter{suggestion(name, known)}"
         for name in sorted(asked - known.keys())
     ]
-    for reading in (reading for reading in readings if isinstance(reading, DirectReading)):
-        parameter = known.get(reading.parameter)
-        if parameter and not parameter.lower <= reading.value <= parameter.upper:
-            faults.append(
-                f"measured {parameter.name}: must be from {parameter.lower:g} to {parameter.upper:g} "
-                f"{parameter.unit}, found {reading.value:g}."
-            )
+    for reading in direct:
+        q = known.get(reading.parameter)
+        if q and not q.lower <= reading.value <= q.upper:
+            bounds = f"{q.lower:g} to {q.upper:g} {q.unit}"
+            faults.append(f"measured {q.name}: must be from {bounds}, found {reading.value:g}.")
     modes = len(plant.unactuated)
-    faults += [
-        f"period: the machine has {modes} modes, found mode {reading.mode}."
-        for reading in readings
-        if isinstance(reading, Period) and reading.mode > modes
-    ]
+    beyond = [one.mode for one in readings if isinstance(one, Period) and one.mode > modes]
+    faults += [f"period: the machine has {modes} modes, found mode {mode}." for mode in beyond]
     if not asked:
-        faults.append(
-            "Name what to identify: parameters to free, or a direct reading, NAME=VALUE±UNCERTAINTY."
-        )
+        what = "parameters to free, or a direct reading, NAME=VALUE±UNCERTAINTY"
+        faults.append(f"Name what to identify: {what}.")
     if faults:
         raise SpecError(*faults)
 
 
 def _identified(spec: Spec, estimated: Estimate) -> Spec:
     """Put the parameters and their ranges into a spec."""
-    shares = {
-        name: estimated.half_range[name] / abs(value)
-        for name, value in estimated.values.items()
-        if value != 0.0
-    }
+    known = {name: abs(value) for name, value in estimated.values.items() if value != 0.0}
+    shares = {name: estimated.half_range[name] / size for name, size in known.items()}
     wide = {name: fraction for name, fraction in shares.items() if fraction > WIDEST}
     if wide:
         template = "{name} to ±{percent:.0f} % only"
-        words = joined(
-            AND, [Phrase(template, name=name, percent=100.0 * fraction) for name, fraction in wide.items()]
-        )
+        each = [Phrase(template, name=name, percent=100.0 * share) for name, share in wide.items()]
+        words = joined(AND, each)
         if estimated.contradiction > 1.0:
             template = (
                 "The measurements contradict one another by {contradiction:.2g} times their "
@@ -378,28 +354,21 @@ def _identified(spec: Spec, estimated: Estimate) -> Spec:
         raise InfeasibleProblem(
             "The measurements determine {words}; measure better, or take it as known.", words=words
         )
-    values = {
-        name: _rounded(value, estimated.standard_uncertainty[name])
-        for name, value in estimated.values.items()
-    }
+    sigma = estimated.standard_uncertainty
+    values = {name: _rounded(value, sigma[name]) for name, value in estimated.values.items()}
     robustness = spec.robustness
     robust = robustness.method if robustness.uncertain else "sensitivity"
     stated = robustness.uncertain  # what a rope does in service: that it was measured once narrows nothing
-    found_shares = {
-        name: max(_rounded_up(fraction), stated.get(name, 0.0)) for name, fraction in shares.items()
-    }
-    uncertain = {**stated, **found_shares}
+    widened = {name: max(_rounded_up(share), stated.get(name, 0.0)) for name, share in shares.items()}
+    uncertain = {**stated, **widened}
     order = [name for name in spec.plant.parameters if name in uncertain]
-    return attrs.evolve(
-        spec,
-        plant=attrs.evolve(
-            spec.plant,
-            parameters={**spec.plant.parameters, **values},
-            defaults=tuple(name for name in spec.plant.defaults if name not in estimated.values),
-        ),
-        robustness=attrs.evolve(
-            robustness, method=robust, uncertain={name: uncertain[name] for name in order}
-        ),
+    return spec.changed(
+        {
+            "plant.parameters": {**spec.plant.parameters, **values},
+            "plant.defaults": tuple(name for name in spec.plant.defaults if name not in estimated.values),
+            "robustness.method": robust,
+            "robustness.uncertain": {name: uncertain[name] for name in order},
+        }
     )
 
 

@@ -22,10 +22,10 @@ from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.evaluation.simulation import driven_swing, motion_of
 from gen_profile.identification.driven_model import COARSE, DrivenModel, driven_model, through
 from gen_profile.identification.estimation import taken_as_exact
-from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
+from gen_profile.identification.fit import Fit, fit_of
 from gen_profile.identification.measurements import DirectReading, SwingLog
 from gen_profile.identification.misfit import GROSS, Explanation, likeliest, misfits, nothing_left
-from gen_profile.identification.swing_model import STILL, shortened
+from gen_profile.identification.swing_model import STILL, SwingingMachine, shortened
 from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile
@@ -80,12 +80,7 @@ class Machines:
         return attrs.evolve(self, ranges=kept)
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Lesson:
-    """What is left of the ranges after a run, and by what evidence, in plain values."""
-
-    machines: Machines
-    evidence: Mapping[str, Any]
+Lesson = tuple[Machines, dict[str, Any]]  # what is left after a run, and by what evidence, in plain values
 
 
 def narrowed_by_log(
@@ -109,12 +104,12 @@ def narrowed_by_log(
         No machine of the ranges shows this log; or it is of no run of this motion.
     """
     progress("comparing the run with machines of the ranges")
-    drawn, plant = machines.drawn(DRAWN), machines.plant
-    stood = tuple(map(float, played.position[-1]))
-    model = driven_model(plant, drawn[0], played, shortened(log, plant, drawn[0], stood, SAMPLES))
+    drawn, stood = machines.drawn(DRAWN), tuple(map(float, played.position[-1]))
+    middle = SwingingMachine(plant=machines.plant, parameters=drawn[0], q_a=stood)
+    model = driven_model(middle, played, shortened(log, middle, SAMPLES))
     starts, residual = model.guesses(drawn)
     model = attrs.evolve(model, lead=max(float(starts[np.argmin(residual), -3]), 0.0) + model.fastest)
-    free = _free_fit(machines, drawn[0], model)
+    free = _free_fit(machines, model)
     fit = attrs.evolve(free, bounds=np.array([machines.ranges[name] for name in free.names]).T / free.scale)
     best = np.argsort(residual)[:BEST]
     begun = [np.array([drawn[k][name] for name in fit.names]) / fit.scale for k in best]
@@ -145,10 +140,8 @@ def narrowed_by_log(
         "left": left,
         "unexplained_rad_per_s": None if lines is None else lines.frequency,
     }
-    return Lesson(
-        machines=machines.within(dict(zip(fit.names, map(tuple, ends.tolist()), strict=True))),
-        evidence=evidence,
-    )
+    ranges = dict(zip(fit.names, map(tuple, ends.tolist()), strict=True))
+    return machines.within(ranges), evidence
 
 
 def narrowed_by_sight(
@@ -176,14 +169,12 @@ def narrowed_by_sight(
     plant, drawn = machines.plant, machines.drawn(SLABS * PER_SLAB ** min(len(machines.ranges), MOST))
     frequencies = linearize(plant, drawn[0], played.position[-1]).frequencies
     apart = 2.0 * np.pi / COARSE / float(frequencies[-1])
-    times = played.times[-1] + np.arange(0.0, watch, apart)
+    times = np.concatenate([[0.0], played.times[-1] + np.arange(0.0, watch, apart)])
     motion = motion_of(through(played, apart))
     peaks = []
     for part in np.array_split(parameter_rows(plant, drawn), SLABS):
         at_rest = np.zeros((len(part), 2 * len(plant.unactuated)))
-        sway, _ = driven_swing(
-            plant, part, motion=motion, starts=at_rest, times=np.concatenate([[0.0], times])
-        )
+        sway, _ = driven_swing(plant, part, motion=motion, starts=at_rest, times=times)
         peaks.append(peak(sway[:, 1:])[:, plant.loads.index(seen.parameter)])
     left = np.concatenate(peaks)
     possible = np.abs(left - seen.value) <= seen.uncertainty
@@ -200,17 +191,17 @@ def narrowed_by_sight(
         slab = (high - low) / SLABS
         first, last = (np.floor((end - low) / slab) for end in (values.min(), values.max()))
         kept[name] = (float(low + (first - 1.0) * slab), float(low + (last + 2.0) * slab))
-    return Lesson(machines=machines.within(kept), evidence=evidence)
+    return machines.within(kept), evidence
 
 
-def _free_fit(machines: Machines, middle: Mapping[str, float], model: DrivenModel) -> Fit:
+def _free_fit(machines: Machines, model: DrivenModel) -> Fit:
     """Pose the fit of what has ranges, as far as the plant takes it; what a log does not tell stays near."""
+    middle = model.machine.parameters
     known = [
         DirectReading(parameter=name, value=middle[name], uncertainty=LOOSE * (high - low) / 2.0)
         for name, (low, high) in machines.ranges.items()
     ]
-    machine = SwingingMachine(plant=machines.plant, parameters=middle, q_a=model.q_a)
-    return fit_of(machine, list(machines.ranges), known, [model])
+    return fit_of(model.machine, list(machines.ranges), known, [model])
 
 
 def _fitted(fit: Fit, begun: Sequence[Array]) -> tuple[Array, Array]:
@@ -246,11 +237,7 @@ def _require_unchanged(fit: Fit, model: DrivenModel, unknowns: Array, *, certain
         )
     if not (explained or certain):
         return
-    units = {q.name: q.unit for q in fit.machine.plant.parameters}
-    others = " or with ".join(
-        ", ".join(f"{name} {value:.4g} {units[name]}" for name, value in one.values.items())
-        for one in explained
-    )
+    others = " or with ".join(one.words for one in explained)
     cure = f"nothing but noise is left with {others}: the machine has changed, or the spec was wrong there"
     if not others:
         cure = "nor does any that differs in one more parameter: look at how and of what this was logged"
@@ -282,26 +269,26 @@ class Learning:
     spec : Spec
         With the ranges that are left, and their middles as values.
     before : Machines
-    lessons : tuple of Lesson
-        One of each run.
+    runs : tuple of dict
+        What each run showed, in plain values.
     """
 
     spec: Spec
     before: Machines
-    lessons: tuple[Lesson, ...]
+    runs: tuple[dict[str, Any], ...]
 
     def warnings(self) -> tuple[str, ...]:
         """Say what no machine of the ranges explains, though it excludes some; a sentence each."""
         return tuple(
-            f"a swing at {at:.3g} rad/s in the log of {lesson.evidence['load']} is none of the machine's, "
+            f"a swing at {at:.3g} rad/s in the log of {run['load']} is none of the machine's, "
             "and no other value of one parameter explains it: this run excludes little"
-            for lesson in self.lessons
-            if (at := lesson.evidence.get("unexplained_rad_per_s")) is not None
+            for run in self.runs
+            if (at := run.get("unexplained_rad_per_s")) is not None
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        units, ranges = {q.name: q.unit for q in self.spec.machine().parameters}, self.spec.checked_ranges()
+        units, ranges = self.spec.machine().units, self.spec.checked_ranges()
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
@@ -310,7 +297,7 @@ class Learning:
                 name: {"unit": units[name], "before": list(ends), "range": list(ranges[name])}
                 for name, ends in self.before.ranges.items()
             },
-            "runs": [dict(lesson.evidence) for lesson in self.lessons],
+            "runs": list(self.runs),
         }
 
 
@@ -359,15 +346,15 @@ def learn(
         if spec.move.initial:
             raise SpecError("seen: tells of machines only where the load hung at rest before; log a run.")
     machines = before = Machines(plant=plant, parameters=spec.plant.parameters, ranges=ranges)
-    lessons = []
+    showed = []
     with one_thread():
         for run in runs:
             if isinstance(run, SwingLog):
-                lessons.append(narrowed_by_log(machines, played, run, progress))
+                machines, evidence = narrowed_by_log(machines, played, run, progress)
             else:
-                lessons.append(narrowed_by_sight(machines, played, run, observation_time(spec)))
-            machines = lessons[-1].machines
-    return Learning(spec=_learned(spec, machines), before=before, lessons=tuple(lessons))
+                machines, evidence = narrowed_by_sight(machines, played, run, observation_time(spec))
+            showed.append(evidence)
+    return Learning(spec=_learned(spec, machines), before=before, runs=tuple(showed))
 
 
 def _learned(spec: Spec, machines: Machines) -> Spec:

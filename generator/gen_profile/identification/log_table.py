@@ -94,11 +94,9 @@ class LogTable:
             return names.index(column)
         if column.isdecimal() and 1 <= int(column) <= len(self.rows[head]):
             return int(column) - 1
-        hint = (
-            suggestion(column, names)
-            if names
-            else Phrase("; there are {rows}, without names.", rows=len(self.rows[head]))
-        )
+        hint: str = Phrase("; there are {rows}, without names.", rows=len(self.rows[head]))
+        if names:
+            hint = suggestion(column, names)
         raise OutputError(
             "{source}: there is no column {column!r}{hint}", source=source, column=column, hint=hint
         )
@@ -139,11 +137,9 @@ class LogTable:
             values_here = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
             for place, text, value in zip(places, held, values_here, strict=True):
                 if not abs(value) <= GREATEST:
-                    name = (
-                        self.cell(head, place)
-                        if self.is_head(head)
-                        else Phrase("column {number}", number=place + 1)
-                    )
+                    name: str = Phrase("column {number}", number=place + 1)
+                    if self.is_head(head):
+                        name = self.cell(head, place)
                     template = "{source}, row {row}: {name} holds {text!r}, which is no number of a log."
                     raise OutputError(template, source=source, row=row + 1, name=name, text=text[:40])
             values.extend(values_here)
@@ -208,9 +204,8 @@ def read_table(text: str, source: str) -> LogTable:
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise OutputError("{source}: the log is empty.", source=source)
-    separator = next(
-        (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines)), ","
-    )
+    common = (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines))
+    separator = next(common, ",")
     return LogTable(rows=_Rows(lines, separator, source), decimal_comma=separator != ",")
 
 

@@ -129,11 +129,8 @@ def parse_reading(text: str, option: str = "measured") -> DirectReading:
             f"{option} {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
         )
     name, value, uncertainty = match.groups()
-    return DirectReading(
-        parameter=name,
-        value=float(value),
-        uncertainty=_spread(f"{option} {text!r}", float(value), float(uncertainty)),
-    )
+    spread = _spread(f"{option} {text!r}", float(value), float(uncertainty))
+    return DirectReading(parameter=name, value=float(value), uncertainty=spread)
 
 
 def parse_period(text: str) -> Period:

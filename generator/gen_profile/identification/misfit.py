@@ -17,7 +17,6 @@ from gen_profile.identification.fit import Fit
 from gen_profile.identification.swing_model import SwingModel, shortened
 from gen_profile.identification.uncertainty import WIDEST, uncertainty
 from gen_profile.motion.profile import Array
-from gen_profile.problem.linearization import linearize
 
 HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
 MOST_LINES = 2000
@@ -105,8 +104,8 @@ def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
 
 def misfit(model: SwingModel, parameters: Mapping[str, float], residuals: Array) -> Misfit | None:
     """Look for lines in the residuals of a log, in rad or m; None where there is nothing but noise."""
-    log, fastest = model.log, linearize(model.plant, parameters, model.q_a).frequencies[-1]
-    periodogram = spectrum(log.times, residuals, float(fastest))
+    log, fastest = model.log, float(model.machine.of(parameters).linear.frequencies[-1])
+    periodogram = spectrum(log.times, residuals, fastest)
     lines = periodogram.power > periodogram.threshold
     if not lines.any():
         return None
@@ -152,10 +151,10 @@ class Explanation:
     noise: Array
 
     @property
-    def values(self) -> dict[str, float]:
-        """All parameters that are then identified."""
-        parameters = self.fit.parameters(self.unknowns)
-        return {name: parameters[name] for name in self.fit.names}
+    def words(self) -> str:
+        """All parameters that are then identified, with their values."""
+        parameters, units = self.fit.parameters(self.unknowns), self.fit.machine.plant.units
+        return ", ".join(f"{name} {parameters[name]:.4g} {units[name]}" for name in self.fit.names)
 
     def squares(self, noise: Array) -> float:
         """Sum up the squares of what is left, in variances of some noise."""
@@ -175,9 +174,7 @@ def elsewhere(fit: Fit) -> Explanation | None:
 
 def _rough(fit: Fit) -> Fit:
     """Fit fewer averages of the logs."""
-    parameters = fit.machine.parameters
-    logs = [shortened(m.log, m.plant, parameters, m.q_a, ROUGHLY) for m in fit.models]
-    models = (attrs.evolve(m, log=log) for m, log in zip(fit.models, logs, strict=True))
+    models = (attrs.evolve(one, log=shortened(one.log, fit.machine, ROUGHLY)) for one in fit.models)
     return attrs.evolve(fit, models=tuple(models))
 
 
@@ -197,25 +194,19 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
     rough = _rough(fit)
     begun: list[tuple[str, ...]] = [()]
     for _ in range(min(TRIED, len(more))):
-        sets = {
-            frozenset((*freed, name)): (*freed, name) for freed in begun for name in more if name not in freed
-        }
+        longer = [(*freed, name) for freed in begun for name in more if name not in freed]
+        sets = {frozenset(freed): freed for freed in longer}
         tried = {freed: _of_small_swings(rough.freed(freed), freed[-1]) for freed in sets.values()}
-        least = min(one.squares for one in tried.values())
-        equivalent = {
-            freed: one for freed, one in tried.items() if one.squares <= EQUIVALENT * least < math.inf
-        }
-        if not equivalent:
-            return ()
-        candidates = [
-            explained
-            for freed, one in equivalent.items()
-            if one.explains
-            and (explained := nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
-        ]
-        if likely := likeliest(candidates):
+        most = EQUIVALENT * min(one.squares for one in tried.values())
+        begun = [freed for freed, one in tried.items() if one.squares <= most < math.inf]
+        worthwhile = {freed: tried[freed].fit for freed in begun if tried[freed].explains}
+        found = (
+            nothing_left(attrs.evolve(one, models=fit.models), freed) for freed, one in worthwhile.items()
+        )
+        if likely := likeliest([one for one in found if one is not None]):
             return likely
-        begun = list(equivalent)
+        if not begun:
+            return ()
     return ()
 
 

@@ -74,26 +74,23 @@ class Uncertainty:
 
     def initial_residual_ratio(self) -> tuple[float, ...]:
         """Say how many times farther off than the rest the first period of every log is."""
-        ratios, first = [], len(self.fit.readings)
-        for model in self.fit.models:
-            residuals = self.residuals[first : first + len(model.log.times)]
-            first += len(residuals)
-            early, late = np.split(np.square(residuals), [model.samples(model.period)])
+        ratios = []
+        for model, squares in zip(self.fit.models, self.fit.of_logs(self.residuals**2), strict=True):
+            early, late = np.split(squares, [model.samples(model.period)])
             ratios.append(float(np.sqrt(early.mean() / late.mean())) if len(late) and late.any() else 1.0)
         return tuple(ratios)
 
     def _by_resolution(self) -> Array:
         """Follow the logs' rounding errors through the fit, shape (p,)."""
         answers = self.covariance @ _own_slopes(self.slopes, len(self.fit.names)).T
-        variance, first = np.zeros(len(answers)), len(self.fit.readings)
-        for model, sigma in zip(self.fit.models, self.noise, strict=True):
-            rows = slice(first, first + len(model.log.times))
-            first = rows.stop
+        variance, fit = np.zeros(len(answers)), self.fit
+        parts = fit.models, self.noise, fit.of_logs(self.residuals), fit.of_logs(answers)
+        for model, sigma, residuals, by in zip(*parts, strict=True):
             step = model.log.resolution
-            exact = self.residuals[rows] * sigma + model.log.values
+            exact = residuals * sigma + model.log.values
             zeros = step * (np.arange(ZEROS)[:, None] / ZEROS - 0.5)
             errors = np.round((exact + zeros) / step) * step - (exact + zeros)
-            variance += np.square(answers[:, rows] @ errors.T / sigma).mean(axis=1)
+            variance += np.square(by @ errors.T / sigma).mean(axis=1)
         return np.sqrt(variance)
 
     def _half_range(self, index: int, factor: float) -> float:

@@ -7,10 +7,17 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.charts.curves import Shown, end_load_sway
 from gen_profile.charts.plotly_json import rounded
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing
+from gen_profile.plants.looks import body_size, drawings, pose_of
+from gen_profile.spec.model import Spec
 
+TWINS = 2  # machines beside the nominal one
+FRAME_RATE = 30.0  # 1/s; the page draws between frames
+MOST_FRAMES = 600
 PLACE_DIGITS, SWING_DIGITS = 4, 6  # of the picture's size; a swing can be drawn larger than it is
 MARGIN = 0.06  # around a picture, of its size
 FLATTEST, NARROWEST = 0.2, 1.2  # height of a picture over its width
@@ -129,3 +136,36 @@ def _moving(drawing: Drawing, box: Sequence[float]) -> dict[str, Any]:
             for shape in drawing.shapes
         ],
     }
+
+
+def animation(spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], arrival: float) -> Animation:
+    """Let the nominal machine and those that sway the most play the move, and swing on.
+
+    Parameters
+    ----------
+    spec : Spec
+    evaluation : MotionEvaluation
+    shown : sequence of Shown
+        Of which the first ranks play.
+    arrival : float
+        When the axes stand still, in s.
+    """
+    until = evaluation.motion.duration + evaluation.watch
+    times = np.linspace(0.0, until, min(MOST_FRAMES, int(np.ceil(FRAME_RATE * until)) + 1))
+    responses = evaluation.swing.at(times)
+    plant = spec.machine()
+    size = body_size(plant, evaluation.machines[0].parameters, responses[0].position)
+    actors = []
+    for one in (one for one in shown if one.rank <= TWINS):
+        response, parameters = responses[one.index], evaluation.machines[one.index].parameters
+        pose = pose_of(plant, parameters, response.position, response.q_u, size)
+        sway = end_load_sway(spec, response)
+        drawn = drawings(plant, pose)
+        actors.append(Actor(name=one.name, colour=one.style.colour, sway=sway, drawings=drawn))
+    return Animation(
+        times=times,
+        arrival=arrival,
+        limit=spec.check.residual_sway[plant.loads[-1]],
+        load=plant.end_load_name,
+        actors=actors,
+    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import sha256, versions
+from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import Design, design
@@ -149,14 +149,12 @@ def artefact_report(path: Path, **options: Any) -> Report:
 
 def _page(outcome: Design, comparison: Comparison | None, measured: Measured | None) -> Page:
     spec, check = outcome.spec, _checked(outcome)
-    libraries = ", ".join(f"{library} {number}" for library, number in versions())
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",
         verdicts=[verdict(check), *([] if measured is None else [measured_verdict(measured)])],
         facts=facts(spec, outcome.plan.evaluation, outcome.figures, check),
         sections=list(sections(outcome, check, comparison, measured)),
-        colophon=f"Made by {libraries}.",
     )
 
 

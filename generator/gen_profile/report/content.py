@@ -11,6 +11,7 @@ from typing import TypeVar
 import attrs
 from attrs.validators import instance_of
 
+from gen_profile.artefacts.manifest import versions
 from gen_profile.charts.figure import Figure
 from gen_profile.report.animation import Animation
 
@@ -130,6 +131,10 @@ class Section:
         return "".join(letter if letter.isalnum() else "-" for letter in self.title.lower())
 
 
+def _libraries() -> str:
+    return f"Made by {', '.join(f'{library} {number}' for library, number in versions())}."
+
+
 @attrs.frozen(kw_only=True)
 class Page:
     """A whole report.
@@ -154,7 +159,7 @@ class Page:
     verdicts: Sequence[Verdict]
     facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
-    colophon: str
+    colophon: str = attrs.field(factory=_libraries)
     papers: Sequence[tuple[str, str]] = ()
     signatures: Sequence[str] = ()
 

@@ -154,9 +154,8 @@ def _known_columns(
     if columns is None:
         head = _head(table, ())
         names = list(table.rows[head])
-        by_name = {
-            name: _column(_with_unit(table, head, place), spec, where) for place, name in enumerate(names)
-        }
+        titles = {name: _with_unit(table, head, place) for place, name in enumerate(names)}
+        by_name = {name: _column(title, spec, where) for name, title in titles.items()}
         known = {name: column for name, column in by_name.items() if column is not None}
         places = [names.index(name) for name in known]
     else:
@@ -280,11 +279,8 @@ def _column(name: str, spec: Spec, where: str) -> _Column | None:
     quantity = WORDS[match["quantity"].lower()]
     if quantity == "time":
         seconds = {"": 1.0, "s": 1.0, "ms": 1e3}
-        return (
-            _Column(quantity="time", owner="", divisor=seconds[unit])
-            if unit in seconds and not owner
-            else None
-        )
+        known = unit in seconds and not owner
+        return _Column(quantity="time", owner="", divisor=seconds[unit]) if known else None
     plant = spec.machine()
     if quantity == "position":
         owners = [axis.name for axis in plant.actuated]

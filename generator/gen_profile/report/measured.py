@@ -90,6 +90,11 @@ class MeasuredSway:
         """Whether the load keeps its limit; None where that cannot be said."""
         return None if self.residual is None else self.residual <= self.limit
 
+    def to_dict(self) -> dict[str, float | bool | None]:
+        """Nest plain values for JSON."""
+        judged = {"residual_m": self.residual, "limit_m": self.limit, "passed": self.passed}
+        return {**self.signal.to_dict(), **judged}
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Measured:
@@ -137,15 +142,7 @@ class Measured:
             "start_s": self.start,
             "nearest": self.nearest,
             "positions": {name: signal.to_dict() for name, signal in self.positions.items()},
-            "sways": {
-                name: {
-                    **sway.signal.to_dict(),
-                    "residual_m": sway.residual,
-                    "limit_m": sway.limit,
-                    "passed": sway.passed,
-                }
-                for name, sway in self.sways.items()
-            },
+            "sways": {name: sway.to_dict() for name, sway in self.sways.items()},
             "angles": {name: signal.to_dict() for name, signal in self.angles.items()},
         }
 
@@ -218,13 +215,8 @@ def _the_move(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> M
     def cut(signals: Mapping[str, Array]) -> dict[str, Array]:
         return {name: values[kept] for name, values in signals.items()}
 
-    return attrs.evolve(
-        log,
-        times=log.times[kept] - start,
-        positions=cut(log.positions),
-        sways=cut(log.sways),
-        angles=cut(log.angles),
-    )
+    positions, sways, angles = map(cut, (log.positions, log.sways, log.angles))
+    return attrs.evolve(log, times=log.times[kept] - start, positions=positions, sways=sways, angles=angles)
 
 
 def _nearest(move: MeasuredLog, responses: Sequence[Response], loads: Sequence[str]) -> int | None:
@@ -245,12 +237,8 @@ def _sway(spec: Spec, load: str, signal: Signal, *, arrival: float, from_angles:
     if after.any() and signal.times[-1] - arrival >= PERIODS * 2.0 * np.pi / frequencies[0]:
         left = signal.measured[after]
         residual = float(np.abs(left - _zero(signal.times[after], left, frequencies)).max())
-    return MeasuredSway(
-        signal=signal,
-        residual=residual,
-        limit=spec.check.residual_sway[load],
-        from_angles=from_angles,
-    )
+    limit = spec.check.residual_sway[load]
+    return MeasuredSway(signal=signal, residual=residual, limit=limit, from_angles=from_angles)
 
 
 def _zero(times: Array, values: Array, frequencies: Array) -> float:
@@ -295,14 +283,9 @@ def _best_start(evaluation: MotionEvaluation, log: MeasuredLog) -> float:
     starts = np.linspace(first, max(last, first + duration), STARTS)
     best = int(np.argmin([apart(start) for start in starts]))
     step = starts[1] - starts[0]
-    return float(
-        minimize_scalar(
-            apart,
-            bounds=(starts[best] - step, starts[best] + step),
-            method="bounded",
-            options={"xatol": 1e-6},
-        ).x
-    )
+    around = (starts[best] - step, starts[best] + step)
+    refined = minimize_scalar(apart, bounds=around, method="bounded", options={"xatol": 1e-6})
+    return float(refined.x)
 
 
 def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Array]:
@@ -324,15 +307,10 @@ def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Arr
     measured = np.stack(list(move.angles.values()))
     q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
     unknown = null_space(gain).sum(axis=1)[:, None]
-    sways, other = (
-        [
-            np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
-            for sway in plant.outputs(list(q), list(q_a.T), p).sway
-        ]
-        for q in (q_u, q_u + ANYTHING * unknown)
-    )
-    return {
-        name: sway
-        for name, sway, same in zip(plant.loads, sways, other, strict=True)
-        if np.allclose(sway, same, rtol=1e-9, atol=1e-12)
-    }
+
+    def swayed(q: Any) -> list[Array]:
+        sways = plant.outputs(list(q), list(q_a.T), p).sway
+        return [np.broadcast_to(np.asarray(one, dtype=np.float64), len(q_a)).copy() for one in sways]
+
+    both = zip(plant.loads, swayed(q_u), swayed(q_u + ANYTHING * unknown), strict=True)
+    return {name: sway for name, sway, same in both if np.allclose(sway, same, rtol=1e-9, atol=1e-12)}

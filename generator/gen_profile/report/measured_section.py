@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gen_profile.charts.curves import sway_levels
-from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel, Style
+from gen_profile.charts.figure import PALETTE, Band, Figure, Line, Panel, Style
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, mm, number, place_unit
 from gen_profile.motion.profile import Array
@@ -30,11 +30,8 @@ def measured_verdict(measured: Measured) -> Verdict:
                 "{source} tells no sway for as long as one slow swing after the arrival, nor do the angles "
                 "in it alone: log those of all ropes."
             )
-        return Verdict(
-            word="Measured, not judged.",
-            passed=None,
-            sentences=(Phrase(template, source=measured.log.source),),
-        )
+        sentence = Phrase(template, source=measured.log.source)
+        return Verdict(word="Measured, not judged.", passed=None, sentences=[sentence])
     load, worst = max(judged.items(), key=lambda pair: _share(pair[1]))
     passed = bool(measured.passed)
     others = [name for name in measured.loads if name not in judged]
@@ -43,36 +40,23 @@ def measured_verdict(measured: Measured) -> Verdict:
         "On the machine the {load} swings by {residual} after the arrival, and {limit} are allowed "
         "({source})."
     )
-
-    return Verdict(
-        word="Measured: kept." if passed else "Measured: exceeded.",
-        passed=passed,
-        sentences=(
-            Phrase(template, load=load, residual=residual, limit=limit, source=measured.log.source),
-            *(
-                [Phrase("Not measured: the sway of the {others}.", others=joined(AND_THE, others))]
-                if others
-                else []
-            ),
-        ),
-    )
+    sentences = [Phrase(template, load=load, residual=residual, limit=limit, source=measured.log.source)]
+    if others:
+        template = "Not measured: the sway of the {others}."
+        sentences.append(Phrase(template, others=joined(AND_THE, others)))
+    word = "Measured: kept." if passed else "Measured: exceeded."
+    return Verdict(word=word, passed=passed, sentences=sentences)
 
 
 def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Section:
     """Draw what was measured over what was planned, with the deviations."""
     template = "The move begins at {start} s in {source}."
-    words = [
-        Phrase(template, start=number(measured.start), source=measured.log.source),
-        *_likeness(evaluation, measured),
-    ]
-    if measured.log.ignored:
-        words.append(
-            Phrase("Columns that were left alone: {ignored}.", ignored=", ".join(measured.log.ignored))
-        )
-    figure = Figure(
-        caption="Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on.",
-        panels=[*_panels(spec, evaluation, measured)],
-    )
+    words: list[str] = [Phrase(template, start=number(measured.start), source=measured.log.source)]
+    words += _likeness(evaluation, measured)
+    if ignored := ", ".join(measured.log.ignored):
+        words.append(Phrase("Columns that were left alone: {ignored}.", ignored=ignored))
+    caption = "Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on."
+    figure = Figure(caption=caption, panels=[*_panels(spec, evaluation, measured)])
     return Section(title="What the machine did", words=[" ".join(words)], blocks=[_table(measured), figure])
 
 
@@ -100,10 +84,8 @@ def _row(name: str, signal: Signal, sway: MeasuredSway | None = None) -> TableRo
     cells = [name, *(f"{number(1e3 * value)} m{signal.unit}" for value in (signal.rms, signal.peak))]
     if sway is None or sway.residual is None:
         return TableRow(cells=[*cells, "", "", ""])
-    fraction = Share(_share(sway))
-    return TableRow(
-        cells=[*cells, mm(sway.residual), mm(sway.limit), fraction], mark="" if sway.passed else "failed"
-    )
+    judged = (mm(sway.residual), mm(sway.limit), Share(_share(sway)))
+    return TableRow(cells=[*cells, *judged], mark="" if sway.passed else "failed")
 
 
 def _share(sway: MeasuredSway) -> float:
@@ -111,54 +93,38 @@ def _share(sway: MeasuredSway) -> float:
 
 
 def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Iterator[Panel]:
-    arrival = Band(low=measured.arrival, high=measured.arrival)
+    bands = [Band(low=measured.arrival, high=measured.arrival)]
     names = [axis.name for axis in spec.machine().actuated]
     for axis, signal in measured.positions.items():
-        times, position, planned, deviation = _thinned(signal)
         unit, factor = place_unit(spec, names.index(axis))
-        yield Panel(
-            title=Phrase("Position of {axis}", axis=axis),
-            y_label=Phrase("position ({unit})", unit=unit),
-            lines=[_planned(times, factor * planned), _measured(times, factor * position)],
-            bands=[arrival],
-        )
-        yield Panel(
-            title=Phrase("Deviation of {axis}", axis=axis),
-            y_label=Phrase("deviation (m{unit})", unit=signal.unit),
-            lines=[_measured(times, 1e3 * deviation)],
-            bands=[arrival],
-        )
+        title, label = Phrase("Position of {axis}", axis=axis), Phrase("position ({unit})", unit=unit)
+        yield Panel(title=title, y_label=label, lines=_lines(signal, factor), bands=bands)
+        title = Phrase("Deviation of {axis}", axis=axis)
+        label = Phrase("deviation (m{unit})", unit=signal.unit)
+        deviation = _line("measured", signal.times, 1e3 * signal.deviation, MEASURED)
+        yield Panel(title=title, y_label=label, lines=[deviation], bands=bands)
     loads = list(spec.machine().loads)
     for load, sway in measured.sways.items():
-        times, values, planned, _ = _thinned(sway.signal)
-        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * values)]
+        lines = _lines(sway.signal, 1e3)
+        times = lines[0].x
         if measured.nearest:
             like = evaluation.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
-            name = machine(evaluation.machines[measured.nearest].name)
-            lines.append(
-                Line(name=Phrase("planned, {name}", name=name), x=times, y=1e3 * like, style=NEAREST)
-            )
+            name = Phrase("planned, {name}", name=machine(evaluation.machines[measured.nearest].name))
+            lines.append(Line(name=name, x=times, y=1e3 * like, style=NEAREST))
         levels = sway_levels(spec, load, measured.arrival, float(times[-1]))
-        yield _swinging(Phrase("Sway of the {load}", load=load), "sway (mm)", lines, levels, arrival)
+        title = Phrase("Sway of the {load}", load=load)
+        yield Panel(title=title, y_label="sway (mm)", lines=lines, levels=levels, bands=bands)
     for load, signal in measured.angles.items():
-        times, values, planned, _ = _thinned(signal)
-        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * values)]
-        yield _swinging(Phrase("Angle of the {load}", load=load), "angle (mrad)", lines, [], arrival)
+        title = Phrase("Angle of the {load}", load=load)
+        yield Panel(title=title, y_label="angle (mrad)", lines=_lines(signal, 1e3), bands=bands)
 
 
-def _swinging(title: str, label: str, lines: list[Line], levels: list[Level], arrival: Band) -> Panel:
-    return Panel(title=title, y_label=label, lines=lines, levels=levels, bands=[arrival])
+def _lines(signal: Signal, factor: float) -> list[Line]:
+    planned = _line("planned", signal.times, factor * signal.planned, PLANNED)
+    return [planned, _line("measured", signal.times, factor * signal.measured, MEASURED)]
 
 
-def _planned(times: Array, values: Array) -> Line:
-    return Line(name="planned", x=times, y=values, style=PLANNED)
-
-
-def _measured(times: Array, values: Array) -> Line:
-    return Line(name="measured", x=times, y=values, style=MEASURED)
-
-
-def _thinned(signal: Signal) -> tuple[Array, Array, Array, Array]:
-    """Leave out samples that no screen would show: times, measured, planned and deviation."""
-    kept = np.unique(np.linspace(0, len(signal.times) - 1, DRAWN).round().astype(int))
-    return signal.times[kept], signal.measured[kept], signal.planned[kept], signal.deviation[kept]
+def _line(name: str, times: Array, values: Array, style: Style) -> Line:
+    """Draw a signal without samples that no screen would show."""
+    kept = np.unique(np.linspace(0, len(times) - 1, DRAWN).round().astype(int))
+    return Line(name=name, x=times[kept], y=values[kept], style=style)

@@ -4,7 +4,6 @@ import base64
 import hashlib
 import json
 from importlib.resources import files
-from typing import Any
 
 from gen_profile.charts.figure import Figure
 from gen_profile.charts.plotly_json import figure_json
@@ -55,15 +54,11 @@ def render(page: Page) -> bytes:
 
 
 def _data(page: Page) -> str:
+    """Write JSON that may stand in a script element of any page."""
     document = {
         "figures": [figure_json(block) for block in page.blocks(Figure)],
         "animations": [block.to_json() for block in page.blocks(Animation)],
     }
-    return _json(document)
-
-
-def _json(document: Any) -> str:
-    """Write JSON that may stand in a script element of any page."""
     text = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.translate(HARMLESS)
 

@@ -8,12 +8,10 @@ from typing import Any
 import attrs
 import tomli_w
 
-from gen_profile.artefacts.manifest import sha256, versions
+from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.charts.proof import damping_figures, history_figure, map_figure, worst_damped
 from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, number
-from gen_profile.planner.commands import Command
-from gen_profile.planner.interface import BlockAxis
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.check import BlockJudgement, check_block
 from gen_profile.proof.closed_loop import Trace, trace
@@ -75,25 +73,21 @@ def planner_report(
 def _page(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Page:
     spec, proof = judgement.spec, judgement.check
     units = spec.machine().units
-    live = ", ".join(
-        f"{name} {low:g} to {high:g} {units[name]}" for name, (low, high) in spec.planner.live.items()
-    )
-    libraries = ", ".join(f"{library} {number}" for library, number in versions())
+    ranges = spec.planner.live.items()
+    live = ", ".join(f"{name} {low:g} to {high:g} {units[name]}" for name, (low, high) in ranges)
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
         verdicts=[_verdict(proof, judgement.path)],
         facts=_facts(proof),
         sections=[*_sections(judgement, followed, gusty)],
-        colophon=f"Made by {libraries}.",
     )
 
 
 def _verdict(proof: Proof, path: Path) -> Verdict:
     """Say first whether the block may be deployed, and how to see the worst history again."""
-    again = (
-        f"gen-profile check {quote(path.name)} --history {proof.worst.number} runs the worst history again."
-    )
+    command = f"gen-profile check {quote(path.name)} --history {proof.worst.number}"
+    again = f"{command} runs the worst history again."
     if not proof.passed:
         return Verdict(word="Failed.", passed=False, sentences=[*proof.reasons(), again])
     load = _worst_load(proof, proof.worst)
@@ -129,47 +123,35 @@ def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -
     """Put the page in the order in which an engineer asks."""
     spec, proof = judgement.spec, judgement.check
     worst = proof.worst
-    reported = worst.history.reported(spec.machine().units)
-    commands = len(worst.history.commands)
-    yield Section(
-        title="The worst history",
-        words=(
-            f"History {worst.number}: {commands} commands from {worst.history.start_words} on"
-            + (f"; the block is given {reported}." if reported else "."),
-        ),
-        blocks=[
-            history_figure(spec, proof, followed),
-            Listing(title="Its commands", text=_commands(worst.history)),
-        ],
-    )
+    started = f"{len(worst.history.commands)} commands from {worst.history.start_words} on"
+    words = f"History {worst.number}: {started}{_given(spec, worst.history)}."
+    commands = Listing(title="Its commands", text=_commands(worst.history))
+    figure = history_figure(spec, proof, followed)
+    yield Section(title="The worst history", words=[words], blocks=[figure, commands])
     if gusty is not None and (damped := worst_damped(proof)) is not None:
-        given = damped.history.reported(spec.machine().units)
-        yield Section(
-            title="Damping by the sensor",
-            words=[
-                f"History {damped.number}, of those with a sound sensor and gusts the one after which most "
-                + (f"remains; the block is given {given}." if given else "remains.")
-            ],
-            blocks=damping_figures(spec, proof, gusty),
+        words = (
+            f"History {damped.number}, of those with a sound sensor and gusts the one after which most "
+            f"remains{_given(spec, damped.history)}."
         )
+        figures = damping_figures(spec, proof, gusty)
+        yield Section(title="Damping by the sensor", words=[words], blocks=figures)
     if len(proof.judged) > 1:
         yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(spec, proof)])
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
     yield Section(title="How it was proved", blocks=[_groups(proof), Terms(rows=[*_proved(proof)])])
-    digest = sha256(read_artefact(judgement.path))
-    yield Section(
-        title="Files",
-        blocks=[
-            Terms(
-                rows=[
-                    (f"{judgement.path.name}, SHA-256", digest),
-                    ("Manifest", MANIFEST_WORDS[judgement.manifest]),
-                    ("Spec, SHA-256", spec.sha256()),
-                ]
-            ),
-            Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict())),
-        ],
-    )
+    files = [
+        (f"{judgement.path.name}, SHA-256", sha256(read_artefact(judgement.path))),
+        ("Manifest", MANIFEST_WORDS[judgement.manifest]),
+        ("Spec, SHA-256", spec.sha256()),
+    ]
+    whole = Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict()))
+    yield Section(title="Files", blocks=[Terms(rows=files), whole])
+
+
+def _given(spec: Spec, history: History) -> str:
+    """Continue a sentence by what the block is given in a history."""
+    given = history.reported(spec.machine().units)
+    return f"; the block is given {given}" if given else ""
 
 
 def _worst_load(proof: Proof, judged: JudgedHistory) -> str:
@@ -179,17 +161,11 @@ def _worst_load(proof: Proof, judged: JudgedHistory) -> str:
 
 def _commands(history: History) -> str:
     """Write a history's commands as the table that `planner play` reads."""
-    axes = list(history.axes.values())
-    rows = [
-        ",".join([f"{command.time:.6g}", command.command, *_cells(command, axes)])
-        for command in history.commands
-    ]
-    return "\n".join([",".join(["time_s", "command", *(axis.of("value") for axis in axes)]), *rows])
-
-
-def _cells(command: Command, axes: Sequence[BlockAxis]) -> list[str]:
-    """Write a command's values, empty where it has none."""
-    return [f"{value:.6g}" for value in command.values] or [""] * len(axes)
+    rows = [["time_s", "command", *(axis.of("value") for axis in history.axes.values())]]
+    for one in history.commands:
+        values = [f"{value:.6g}" for value in one.values] or [""] * len(history.axes)
+        rows.append([f"{one.time:.6g}", one.command, *values])
+    return "\n".join(map(",".join, rows))
 
 
 def _ranking(spec: Spec, proof: Proof) -> Table:

@@ -16,22 +16,25 @@ from gen_profile.charts.curves import (
     sway_figure,
 )
 from gen_profile.charts.figure import PLAIN
+from gen_profile.charts.robustness import curves_figure, maps_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison
+from gen_profile.comparison.robustness import Robustness, error_grid, robustness_of
 from gen_profile.designs.design import Design
 from gen_profile.evaluation.demands import demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
 from gen_profile.motion.metrics import extremes
-from gen_profile.report.actors import animation
+from gen_profile.report.animation import animation
 from gen_profile.report.content import Block, Listing, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.measured import Measured
 from gen_profile.report.measured_section import measured_section
-from gen_profile.report.robustness import robustness_section
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 from gen_profile.verification.verdict import Check
 
+MOST_CURVES = 4  # parameters that have a curve each
+MAPPED = 4  # methods that have a map each
 MOST_LISTED = 40  # scenarios; the worst of them say enough
 GROUPED = ("how many", "median (mm)", "99 % (mm)", "worst (mm)", "verdict")
 # head → figure, and how many of the head's unit make one of the figure's
@@ -70,13 +73,13 @@ def facts(
 ) -> list[tuple[str, str]]:
     """Name the few numbers that say what the motion is."""
     load, finding = check.worst
-    margin = check.limit[load] - finding.residual[load] - check.error_bound
+    margin, several = check.limit[load] - finding.residual[load] - check.error_bound, len(spec.axis) > 1
     return [
         ("Duration", f"{number(evaluation.motion.duration)} s"),
         *(
-            (f"Peak {one.quantity}{_of(spec, one.axis.name)}", f"{number(one.asked)} {one.unit}")
+            (f"Peak {one.quantity}" + f", {one.axis.name}" * several, f"{number(one.asked)} {one.unit}")
             for one in demands(spec, evaluation.command)
-            if one.quantity != "jerk" or len(spec.axis) == 1
+            if one.quantity != "jerk" or not several
         ),
         ("Sway on the way, nominal", mm(figures["sway_transient_peak_m"])),
         (f"Residual sway of the {load}, worst", mm(finding.residual[load])),
@@ -92,22 +95,15 @@ def sections(
     spec, evaluation, shown = outcome.spec, outcome.plan.evaluation, select_machines(outcome.plan.evaluation)
     if measured is not None:
         yield measured_section(spec, evaluation, measured)
-    yield Section(
-        title="The machine plays the move",
-        words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),
-        blocks=[animation(spec, evaluation, shown, check.arrival)],
-    )
-    yield Section(
-        title="Limits and margins",
-        blocks=[_limits(spec, evaluation, outcome.figures, check)],
-    )
-    yield Section(
-        title="The motion", blocks=[motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]
-    )
-    yield Section(
-        title="The loads",
-        blocks=[sway_figure(spec, evaluation, shown, check.arrival), *_scenarios(check)],
-    )
+    words = "All machines follow the same setpoints. Dashed: where the loads would be if nothing swung."
+    played = animation(spec, evaluation, shown, check.arrival)
+    yield Section(title="The machine plays the move", words=[words], blocks=[played])
+    limits = _limits(spec, evaluation, outcome.figures, check)
+    yield Section(title="Limits and margins", blocks=[limits])
+    figures = [motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]
+    yield Section(title="The motion", blocks=figures)
+    sways = sway_figure(spec, evaluation, shown, check.arrival)
+    yield Section(title="The loads", blocks=[sways, *_scenarios(check)])
     robust = _robustness(spec, evaluation, comparison)
     if robust is not None:
         yield robust
@@ -115,10 +111,6 @@ def sections(
         yield _methods(comparison)
     yield _evidence(outcome)
     yield _files(outcome)
-
-
-def _of(spec: Spec, axis: str) -> str:
-    return f", {axis}" if len(spec.axis) > 1 else ""
 
 
 def _wind(check: Check) -> list[tuple[str, str]]:
@@ -153,16 +145,9 @@ def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]
             unit, factor = place_unit(spec, column)
             low, high = (factor * end for end in limits.travel)
             least, most = (factor * end for end in extremes(evaluation.command, 0, column))
-            margin = min(least - low, high - most)
-            yield TableRow(
-                cells=(
-                    f"travel of {axis.name}",
-                    f"{number(least)} to {number(most)} {unit}",
-                    f"{number(low)} to {number(high)} {unit}",
-                    f"{number(margin)} {unit}",
-                    "",
-                ),
-            )
+            margin = f"{number(min(least - low, high - most))} {unit}"
+            ranges = (f"{number(a)} to {number(b)} {unit}" for a, b in ((least, most), (low, high)))
+            yield TableRow(cells=(f"travel of {axis.name}", *ranges, margin, ""))
 
 
 def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> TableRow:
@@ -176,75 +161,79 @@ def _scenarios(check: Check) -> Iterator[Table]:
     if len(groups) > 1:
         yield Table(head=("scenarios", "", *GROUPED), rows=[_group(group) for group in groups], words=2)
     loads = list(check.limit)
-    worst_first = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))
-    listed = worst_first[:MOST_LISTED]
-    what = "scenario" if len(listed) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
-    yield Table(
-        head=(what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
-        rows=[
-            TableRow(
-                cells=(
-                    machine(finding.scenario.name),
-                    *(number(1e3 * finding.residual[load]) for load in loads),
-                    Share(_demand(check, finding.residual)),
-                    "passed" if check.keeps_limit(finding) else "failed",
-                ),
-                mark="" if check.keeps_limit(finding) else "failed",
-            )
-            for finding in listed
-        ],
-    )
+    worst_first = sorted(check.findings, key=check.fraction_after, reverse=True)
+    rows = []
+    for finding in worst_first[:MOST_LISTED]:
+        sways = (number(1e3 * finding.residual[load]) for load in loads)
+        mark = "" if check.keeps_limit(finding) else "failed"
+        share = Share(check.fraction_after(finding))
+        cells: list[str | Share] = [machine(finding.scenario.name), *sways, share, mark or "passed"]
+        rows.append(TableRow(cells=cells, mark=mark))
+    what = "scenario" if len(rows) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
+    head = (what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict")
+    yield Table(head=head, rows=rows)
 
 
 def _group(group: Mapping[str, Any]) -> TableRow:
     sways = (group["quantiles_m"]["0.5"], group["quantiles_m"]["0.99"], group["worst"]["residual_peak_m"])
-    verdict = "passed" if group["passed"] else "failed"
-    return TableRow(
-        cells=(
-            group["group"],
-            group["what"],
-            str(group["rows"]),
-            *(number(1e3 * sway) for sway in sways),
-            verdict if group["counts"] else f"{verdict}, not counted",
-        ),
-        mark="" if group["passed"] else "failed",
-    )
-
-
-def _demand(check: Check, residual: Mapping[str, float]) -> float:
-    return max((residual[load] + check.error_bound) / limit for load, limit in check.limit.items())
+    mark, uncounted = "" if group["passed"] else "failed", "" if group["counts"] else ", not counted"
+    cells = [group["group"], group["what"], str(group["rows"]), *(number(1e3 * sway) for sway in sways)]
+    return TableRow(cells=[*cells, f"{mark or 'passed'}{uncounted}"], mark=mark)
 
 
 def _robustness(spec: Spec, evaluation: MotionEvaluation, comparison: Comparison | None) -> Section | None:
-    own = own_method(spec)
-    if comparison is None:
-        return robustness_section(spec, own, {own: evaluation.motion}, {own: PLAIN})
-    motions = {row.method: row.evaluation.motion for row in comparison.rows}
-    return robustness_section(
-        spec, own, {**motions, own: evaluation.motion}, {own: PLAIN, **compared_styles(comparison)}
-    )
+    """Draw residual sway over the error of every uncertain parameter, and over two of them together.
+
+    None where the spec states none. Where there are many, those are drawn with which the design sways most.
+    """
+    own, names = own_method(spec), list(spec.robustness.uncertain)
+    if not names:
+        return None
+    motions, styles = {own: evaluation.motion}, {own: PLAIN}
+    if comparison is not None:
+        motions = {row.method: row.evaluation.motion for row in comparison.rows} | motions
+        styles |= compared_styles(comparison)
+    curves = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    telling = sorted(names, key=lambda name: float(curves[name].fraction(own).max()), reverse=True)
+    drawn = {name: one for name, one in curves.items() if name in telling[:MOST_CURVES]}
+    figure = curves_figure(drawn, styles)
+    if len(names) > MOST_CURVES:
+        more = f" Of {len(names)} uncertain parameters those {MOST_CURVES} with which it sways most."
+        figure = attrs.evolve(figure, caption=figure.caption + more)
+    figures = [figure]
+    if len(names) > 1:
+        shown = [own, *(method for method in motions if styles[method].shown and method != own)][:MAPPED]
+        both = {method: motions[method] for method in shown}
+        pair = [name for name in names if name in telling[:2]]
+        figures.append(maps_figure(robustness_of(spec, both, error_grid(spec, pair))))
+    words = " ".join(_reach(name, one, own) for name, one in curves.items())
+    return Section(title="Robustness", words=[words], blocks=figures)
+
+
+def _reach(name: str, curve: Robustness, own: str) -> str:
+    """Say between which errors every load keeps its limit."""
+    reach = curve.insensitivity(own)
+    if reach is None:
+        return f"On the machine as specified a load exceeds its limit, whatever {name}."
+    low, high = (f"{100.0 * end:+.3g}\N{NO-BREAK SPACE}%".replace("-", "−") for end in reach)
+    (errors,) = curve.errors.values()
+    if reach == (errors[0], errors[-1]):
+        return f"Every load keeps its limit over all errors of {name} tried, {low} to {high}."
+    return f"Every load keeps its limit while the error of {name} is between {low} and {high}."
 
 
 def _methods(comparison: Comparison) -> Section:
     spec = comparison.spec
     unit = spec.machine().actuated[0].unit
     own = own_method(spec)
-    table = Table(
-        head=("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front"),
-        rows=[
-            TableRow(
-                cells=(
-                    row.method,
-                    *(number(factor * row.figures[key]) for key, factor in COMPARED.values()),
-                    "yes" if row.safe else "no",
-                    "yes" if row.method in comparison.efficient else "",
-                ),
-                mark="own" if row.method == own else "",
-            )
-            for row in comparison.rows
-        ],
-    )
-    blocks: list[Block] = [table]
+    head = ("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front")
+    rows = []
+    for row in comparison.rows:
+        figures = (number(factor * row.figures[key]) for key, factor in COMPARED.values())
+        answers = ("yes" if row.safe else "no", "yes" if row.method in comparison.efficient else "")
+        mark = "own" if row.method == own else ""
+        rows.append(TableRow(cells=(row.method, *figures, *answers), mark=mark))
+    blocks: list[Block] = [Table(head=head, rows=rows)]
     if comparison.rows:
         figure = comparison_figure(comparison)
         more = " Click on a method's name to show or hide its curves."
@@ -263,10 +252,8 @@ def _methods(comparison: Comparison) -> Section:
 def _evidence(outcome: Design) -> Section:
     solution = outcome.plan.solution
     if solution is None:
-        shaper = outcome.spec.solver
-        words = (
-            f"The motion is a {shaper.base} move through the shaper {shaper.method}; nothing was optimised."
-        )
+        base, method = outcome.spec.solver.base, outcome.spec.solver.method
+        words = f"The motion is a {base} move through the shaper {method}; nothing was optimised."
         return Section(title="Solver evidence", words=(words,), blocks=[])
     optimum = solution.raise_for_status()
     blocks: list[Block] = [Terms(rows=[*_solver(solution)])]
@@ -295,29 +282,15 @@ def _solver(solution: Solution) -> Iterator[tuple[str, str]]:
 
 def _files(outcome: Design) -> Section:
     spec = outcome.spec
-    table = Table(
-        head=("format", "file", "bytes", "SHA-256"),
-        rows=[
-            TableRow(cells=(artefact.format, artefact.path, str(artefact.bytes), artefact.sha256))
-            for artefact in outcome.artefacts
-        ],
-        words=2,
-        code=True,
-    )
+    rows = [TableRow(cells=(a.format, a.path, str(a.bytes), a.sha256)) for a in outcome.artefacts]
+    table = Table(head=("format", "file", "bytes", "SHA-256"), rows=rows, words=2, code=True)
     hashes = {"Spec": spec.sha256(), "Motion": outcome.plan.evaluation.command.payload_hash()}
     if spec.plant.file is not None:
         hashes[f"Machine {spec.plant.file.name}"] = spec.plant.file.sha256
     if spec.check.foreign is not None:
         hashes[f"Judge {spec.check.foreign.name}"] = spec.check.foreign.sha256
-    return Section(
-        title="Files",
-        words=(
-            "gen-profile writes these very bytes for this spec in these formats"
-            + ("." if outcome.passed else ", where it may keep what failed its check: this did."),
-        ),
-        blocks=[
-            table,
-            Terms(rows=[(f"{name}, SHA-256", digest) for name, digest in hashes.items()]),
-            Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict())),
-        ],
-    )
+    words = "gen-profile writes these very bytes for this spec in these formats"
+    words += "." if outcome.passed else ", where it may keep what failed its check: this did."
+    digests = Terms(rows=[(f"{name}, SHA-256", digest) for name, digest in hashes.items()])
+    whole = Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict()))
+    return Section(title="Files", words=[words], blocks=[table, digests, whole])

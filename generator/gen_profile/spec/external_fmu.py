@@ -42,7 +42,7 @@ def external_fmu(
     if name is MISFIT:
         return None
     input_, inputs = _inputs(given.get("input"), plant, structurer)
-    kinds = kinds_of(ExternalFmu)
+    kinds, limit = kinds_of(ExternalFmu), given.get("time_limit", TIME_LIMIT)
     return ExternalFmu(
         name=Path(name).name,
         path=folder / name,
@@ -51,9 +51,7 @@ def external_fmu(
         inputs=inputs,
         sway=_sway(given.get("output"), plant, structurer),
         parameters=structurer.fit(given.get("parameters", {}), kinds["parameters"], "check.parameters", {}),
-        time_limit=structurer.fit(
-            given.get("time_limit", TIME_LIMIT), kinds["time_limit"], "check.time_limit", TIME_LIMIT
-        ),
+        time_limit=structurer.fit(limit, kinds["time_limit"], "check.time_limit", TIME_LIMIT),
     )
 
 

@@ -198,10 +198,8 @@ class LimitsSpec(Checked, table="limits"):
 
     def stated(self) -> dict[str, Any]:
         """Every limit that is stated, by its place in the spec, such as ``limits.axis.x.jerk``."""
-        tables: dict[str, LimitsSpec | AxisLimitsSpec] = {
-            "limits": self,
-            **{f"limits.axis.{axis}": own for axis, own in self.axis.items()},
-        }
+        tables: dict[str, LimitsSpec | AxisLimitsSpec] = {"limits": self}
+        tables |= {f"limits.axis.{axis}": own for axis, own in self.axis.items()}
         return {
             f"{table}.{name}": value
             for table, own in tables.items()
@@ -337,14 +335,14 @@ class Spec(Drawable, Checked):
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
-        move, ranges = self.move, self.robustness.uncertain.items()
+        move = self.move
+        ranges = [f"{name} ±{100.0 * share:g} %" for name, share in self.robustness.uncertain.items()]
         return {
             "name": self.name,
             "machine": self.plant.type,
             "move": f"{list(move.start)} to {list(move.target)}",
             "duration": "the shortest" if move.shortest else f"{move.duration:g} s",
-            "uncertain": ", ".join(f"{name} ±{100.0 * fraction:g} %" for name, fraction in ranges)
-            or "nothing",
+            "uncertain": ", ".join(ranges) or "nothing",
         }
 
     def machine(self) -> Plant:

@@ -7,7 +7,7 @@ acceleration that makes it, the ropes' lengths.
 import math
 from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import attrs
 import numpy as np
@@ -38,11 +38,7 @@ FAR = 10.0  # times the load's whole way
 LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
 
 
-class Implausibility(NamedTuple):
-    """What is wrong with a value that is implausible, or impossible, with its place and the cure."""
-
-    sentence: str
-    refused: bool
+Implausibility = tuple[Phrase, bool]  # what is wrong with a value, and whether that is refused
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -75,13 +71,13 @@ def refuse_implausible(spec: Spec) -> None:
     SpecError
         With a sentence for each.
     """
-    if refused := [one.sentence for one in _implausibilities(spec) if one.refused]:
-        raise SpecError(*refused)
+    if sentences := [sentence for sentence, refused in _implausibilities(spec) if refused]:
+        raise SpecError(*sentences)
 
 
 def plausibility_warnings(spec: Spec) -> tuple[str, ...]:
     """Say which values are implausible, a sentence each."""
-    return tuple(one.sentence for one in _implausibilities(spec) if not one.refused)
+    return tuple(sentence for sentence, refused in _implausibilities(spec) if not refused)
 
 
 def _implausibilities(spec: Spec) -> Iterator[Implausibility]:
@@ -95,7 +91,7 @@ def _implausibilities(spec: Spec) -> Iterator[Implausibility]:
 
 def _odd(place: str, problem: str, /, *, refused: bool = False, **values: Any) -> Implausibility:
     """Question the value at a place; the problem is a template, as `gen_profile.phrase.Phrase` takes them."""
-    return Implausibility(placed(place, Phrase(problem, **values)), refused)
+    return placed(place, Phrase(problem, **values)), refused
 
 
 def _thousandth(value: float, what: str) -> Phrase:
@@ -117,9 +113,8 @@ def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Itera
 def _move(spec: Spec) -> Iterator[Implausibility]:
     """Question distances, the duration, and speeds that follow from them."""
     move, axes = spec.move, spec.machine().actuated
-    for axis, distance, speed in zip(
-        axes, map(abs, move.distance), map(abs, move.final_velocity), strict=True
-    ):
+    ways, speeds = map(abs, move.distance), map(abs, move.final_velocity)
+    for axis, distance, speed in zip(axes, ways, speeds, strict=True):
         unit = axis.unit
         meant = distance / 1e3 if unit == "m" else math.radians(distance)
         template = "distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"
@@ -166,9 +161,8 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:
             yield _odd(place, template, far=far, cure=cure)
     for name, rate in spec.planner.live_rate.items():
         statement = Phrase("hoists at {rate:g} m/s", rate=rate)
-        yield from _fast(
-            rate, "m", f"planner.live_rate.{name}", statement, _thousandth(rate, "rates are in m/s")
-        )
+        cure = _thousandth(rate, "rates are in m/s")
+        yield from _fast(rate, "m", f"planner.live_rate.{name}", statement, cure)
     sway, depth = spec.limits.sway, scale.depth[-1]
     if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
         template = "the ropes' {depth:.4g} m" if depth else "{times:g} times the move"

@@ -1,6 +1,6 @@
 """Rules across the fields of a spec, and between a spec and its machine."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 from gen_profile.phrase import Phrase
@@ -60,10 +60,8 @@ def _robustness(spec: Spec) -> Iterator[Fault]:
     if not own.uncertain:
         names = [*spec.plant.parameters]
         one = next((name for name in names if name.startswith("L")), [*names, "L1"][0])  # ropes are
-        problem = Phrase(
-            'required with method = "{method}", such as {{ {one} = 0.2 }}', method=own.method, one=one
-        )
-        yield "robustness.uncertain", problem
+        template = 'required with method = "{method}", such as {{ {one} = 0.2 }}'
+        yield "robustness.uncertain", Phrase(template, method=own.method, one=one)
     for key, method in own.OF_METHOD.items():
         if own.method != method and getattr(own, key) != getattr(usual, key):
             yield f"robustness.{key}", Phrase('only with method = "{method}"', method=method)
@@ -74,8 +72,7 @@ def _move(spec: Spec) -> Iterator[Fault]:
     if not any(move.distance) and move.stops and not any(move.initial.values()):
         yield "move.distance", "must not be zero on every axis"
     if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
-        problem: str = Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE)
-        yield "move.distance", problem
+        yield "move.distance", Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE)
     limited = " ".join(spec.limits.stated())
     if move.shortest and not any(name in limited for name in RATES):
         problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'
@@ -106,8 +103,7 @@ def _can(spec: Spec) -> Iterator[Fault]:
     can = spec.can
     if can.feed_forward in ("torque", "both") and can.torque_per_acceleration is None:
         template = 'required with feed_forward = "{feed_forward}" (‰ of the rated torque per m/s²)'
-        problem: str = Phrase(template, feed_forward=can.feed_forward)
-        yield "can.torque_per_acceleration", problem
+        yield "can.torque_per_acceleration", Phrase(template, feed_forward=can.feed_forward)
     if can.mode != "csp" and can.feed_forward != "none":
         yield "can.feed_forward", 'only with mode = "csp"; remove it or set the mode'
     if can.mode == "csv" and can.following_error is None:
@@ -170,10 +166,7 @@ def _at_end(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Refuse relative ranges of nothing, and those that reach beyond what the machine takes."""
-    tables: dict[str, Mapping[str, float]] = {
-        "robustness": spec.robustness.uncertain,
-        "check": spec.check.uncertain or {},
-    }
+    tables = {"robustness": spec.robustness.uncertain, "check": spec.check.uncertain or {}}
     cure_by_table = {"robustness": "", "check": "; state check.spans"}
     for table, shares in tables.items():
         for parameter in plant.parameters:
@@ -181,10 +174,8 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 continue
             where, value = place(f"{table}.uncertain", parameter.name), spec.plant.parameters[parameter.name]
             if value == 0.0:
-                yield (
-                    where,
-                    Phrase("its value is 0, so a relative range is empty{cure}", cure=cure_by_table[table]),
-                )
+                template = "its value is 0, so a relative range is empty{cure}"
+                yield where, Phrase(template, cure=cure_by_table[table])
             for end in (value * (1.0 + sign * shares[parameter.name]) for sign in (-1.0, 1.0)):
                 if not parameter.lower <= end <= parameter.upper:
                     bounds = Phrase("{own.lower:g} to {own.upper:g} {own.unit}", own=parameter)
@@ -203,11 +194,8 @@ def _wind(spec: Spec, plant: Plant) -> Iterator[Fault]:
             "load aside; state bodies and mechanics in it, or remove the wind",
         )
     elif not end_load_is_a_body(plant):
-        problem = Phrase(
-            "wind does not push the {load}, which is no body of the machine; remove it",
-            load=plant.end_load_name,
-        )
-        yield "check.wind.force", problem
+        template = "wind does not push the {load}, which is no body of the machine; remove it"
+        yield "check.wind.force", Phrase(template, load=plant.end_load_name)
     if spec.check.foreign is not None:
         yield "check.wind.force", "a foreign FMU (check.fmu) has no input for wind; remove one of them"
 
@@ -228,8 +216,7 @@ def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
     unnamed = [name for name in changed if name not in spec.check.foreign.parameters]
     yield from ((place("check.parameters", name), problem) for name in unnamed)
     if spec.move.initial or not spec.move.stops:
-        problem = "judges moves from rest to rest only; remove move.initial and final_velocity"
-        yield "check.fmu", problem
+        yield "check.fmu", "judges moves from rest to rest only; remove move.initial and final_velocity"
 
 
 def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -239,8 +226,8 @@ def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
         own = limits.of(column)
         if own.velocity is not None and abs(move.final_velocity[column]) > own.velocity:
             template = "must keep limits.velocity ({velocity:g}), found {found}"
-            problem = Phrase(template, velocity=own.velocity, found=list(move.final_velocity))
-            yield "move.final_velocity", problem
+            found = list(move.final_velocity)
+            yield "move.final_velocity", Phrase(template, velocity=own.velocity, found=found)
         if own.travel is None:
             continue
         low, high = own.travel
@@ -255,10 +242,8 @@ def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for axis in plant.actuated:
         unit = spec.axis[axis.name].unit if axis.name in spec.axis else axis.unit
         if unit in UNITS and UNITS[unit][0] != axis.unit:
-            problem = Phrase(
-                "{unit} does not measure an axis that moves in {own}", unit=repr(unit), own=axis.unit
-            )
-            yield f"axis.{axis.name}.unit", problem
+            template = "{unit} does not measure an axis that moves in {own}"
+            yield f"axis.{axis.name}.unit", Phrase(template, unit=repr(unit), own=axis.unit)
 
 
 def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:

@@ -100,9 +100,8 @@ class Structurer:
         if origin in (Union, UnionType):
             first, second = get_args(kind)
             several = get_origin(second) is tuple and isinstance(value, list | tuple)
-            fitted = (
-                None if value is None else self.fit(value, second if several else first, where, words=words)
-            )
+            chosen = second if several else first
+            fitted = None if value is None else self.fit(value, chosen, where, words=words)
         elif origin is not None:
             of_form = {Annotated: self._constrained, Mapping: self._mapping, tuple: self._tuple}
             fitted = of_form.get(origin, self._choice)(value, get_args(kind), where, words)

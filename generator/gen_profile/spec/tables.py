@@ -92,10 +92,8 @@ def _misplaced(document: Mapping[str, Any], plant: Plant | None, faults: Faults)
     }
     kinds = kinds_of(Spec).items()
     keys |= {name: kinds_of(kind) for name, kind in kinds if attrs.has(kind) and name not in keys}
-    stated = {"": document} | {
-        name: document[name] for name in keys if isinstance(document.get(name), Mapping)
-    }
-    for table, content in stated.items():
+    inner = {name: document[name] for name in keys if isinstance(document.get(name), Mapping)}
+    for table, content in {"": document, **inner}.items():
         for key in content:
             homes = [f"{name}.{key}" for name, own in keys.items() if key in own]
             if key in parameters and table in ("robustness", "check"):
@@ -216,14 +214,12 @@ def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec
                 template = "{name} must be {form}, found {found:g}{cure}"
                 form = between({"at least": axis.lower, "at most": axis.upper}, axis.unit)
                 faults.add(f"move.{key}", template, name=axis.name, form=form, found=value, cure=cure)
-    kinds = kinds_of(MoveSpec)
+    kind, speeds = kinds_of(MoveSpec)["initial"], table.get("final_velocity", still)
     return MoveSpec(
         start=start,
         target=target,
-        initial=structurer.fit(table.get("initial", {}), kinds["initial"], "move.initial", {}),
-        final_velocity=_per_axis(
-            table.get("final_velocity", still), axes, "move.final_velocity", 0.0, structurer
-        ),
+        initial=structurer.fit(table.get("initial", {}), kind, "move.initial", {}),
+        final_velocity=_per_axis(speeds, axes, "move.final_velocity", 0.0, structurer),
         **_duration(table, structurer),
     )
 

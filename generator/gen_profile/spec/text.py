@@ -66,9 +66,8 @@ def _width(item: object) -> int:
 def _set(table: tomlkit.TOMLDocument | Table, key: str, before: object, after: object) -> None:
     if isinstance(after, dict) and isinstance(before, dict):
         known = table.setdefault(key, tomlkit.table())
-        if (
-            isinstance(known, InlineTable) and not after.keys() <= known.keys()
-        ):  # else the last one lacks its space
+        if isinstance(known, InlineTable) and not after.keys() <= known.keys():
+            # else the last one lacks its space
             held = (f"{name} = {tomlkit.item(value).as_string()}" for name, value in after.items())
             table[key] = tomlkit.value(f"{{ {', '.join(held)} }}")
             return

@@ -17,7 +17,8 @@ from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.orders import Question
-from gen_profile.studio.views import Part, point
+from gen_profile.studio.views import point
+from gen_profile.studio.workers import Part
 
 CURVES = 3  # parameters that have a robustness curve
 MAP_POINTS = 15  # of each parameter's error
@@ -42,7 +43,7 @@ def depth(question: Question) -> Iterator[Part]:
 
 
 def _comparison(compared: Comparison, own: str) -> Part:
-    spec = compared.spec
+    spec, advised = compared.spec, compared.recommended.values()
     return {
         "part": "comparison",
         "own": own,
@@ -58,9 +59,7 @@ def _comparison(compared: Comparison, own: str) -> Part:
             for row in compared.rows
         ],
         "missing": compared.missing(),
-        "recommended": {
-            advice.aim: advice.method for advice in compared.recommended.values() if advice.method
-        },
+        "recommended": {advice.aim: advice.method for advice in advised if advice.method},
     }
 
 

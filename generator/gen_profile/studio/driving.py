@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -29,6 +28,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.studio.orders import DriveQuestion
 from gen_profile.studio.simulated_sensor import SimulatedSensor
 from gen_profile.studio.views import fault
+from gen_profile.studio.workers import Part
 
 MOMENT = 0.1  # s
 FRAMES = 4  # of a moment
@@ -36,33 +36,19 @@ COLOURS = PALETTE[:3]
 SWAYS = 0.35  # rad, of the ropes, that a picture has room for
 COMMANDS = ("velocity", "target", "point", "stop", "quick_stop")
 
-Part = dict[str, Any]
-
 
 def drive(asked: DriveQuestion) -> Iterator[Part]:
     """Go on with a drive, or begin one."""
     try:
-        yield _going(asked).moment(asked)
+        if asked.drive not in _drives:
+            _drives.clear()
+            _drives[asked.drive] = Drive(asked.question.spec())
+        yield _drives[asked.drive].moment(asked)
     except GenProfileError as error:
         yield {"part": "undriven", "faults": [fault(sentence) for sentence in error.sentences]}
 
 
 _drives: dict[int, Drive] = {}  # the one that this process is at, by its number
-
-
-def _going(asked: DriveQuestion) -> Drive:
-    if asked.drive not in _drives:
-        _drives.clear()
-        _drives[asked.drive] = Drive(asked.question.spec())
-    return _drives[asked.drive]
-
-
-@attrs.frozen(kw_only=True)
-class Follower:
-    """A machine that follows the block: its name, and by how much its parameters are off."""
-
-    name: str
-    off: Mapping[str, float]
 
 
 class Drive:
@@ -83,7 +69,7 @@ class Drive:
     def __init__(self, spec: Spec) -> None:
         self._spec, self._plant = spec, spec.machine()
         self._columns = list(planned_axes(spec))
-        self._followers = _followers(spec)
+        self._followers = _followers(spec)  # by their names, how many times its own every parameter is
         self._places = np.array(spec.move.start, dtype=np.float64)
         start = self._places[self._columns]
         self._planner = Planner(spec, start if len(start) > 1 else float(start[0]))
@@ -104,9 +90,8 @@ class Drive:
         """Follow a hand for a moment, and tell what is then to be seen."""
         started = self._axes[None], self._state[:, None]
         outputs, axes, states = self._go_on(asked)
-        position, velocity, low, high = (
-            self._of(outputs, name) for name in ("fPosition", "fVelocity", "fStopLow", "fStopHigh")
-        )
+        names = ("fPosition", "fVelocity", "fStopLow", "fStopHigh")
+        position, velocity, low, high = (self._of(outputs, name) for name in names)
         shown = np.linspace(0, len(axes), FRAMES + 1).round().astype(int)
         places, swung = np.concatenate([started[0], axes]), np.concatenate([started[1], states], axis=1)
         frames = self._animation(places[shown, 0], swung[0, shown])
@@ -154,9 +139,8 @@ class Drive:
                 orders["sensor"] = self._sensor.shows(cycles)
             outputs = self._planner.hold(cycles * cycle, **orders).outputs
             self._tell_live(asked.live)
-            axes = self._at(
-                *(self._of(outputs, name) for name in ("fPosition", "fVelocity", "fAcceleration"))
-            )
+            names = ("fPosition", "fVelocity", "fAcceleration")
+            axes = self._at(*(self._of(outputs, name) for name in names))
             states = self._swing(axes, asked.wind)[:, 1:]
             self._axes, self._state = axes[-1], states[:, -1]
             if self._sensor is not None:
@@ -170,9 +154,8 @@ class Drive:
     def _swinging(self) -> Array:
         """Let the nominal machine swing by as much as is stated, shape (2, n_u)."""
         along = len(sensed_directions(self._spec))
-        swing = stated_swing(
-            self._spec, [(along**-0.5, 0.0)] * along, self._parameters()[0], self._places.tolist()
-        )
+        begun, nominal = [(along**-0.5, 0.0)] * along, self._parameters()[0]
+        swing = stated_swing(self._spec, begun, nominal, self._places.tolist())
         names = [coordinate.name for coordinate in self._plant.unactuated]
         return np.array([[swing[f"{name}{order}"] for name in names] for order in ("", ".rate")])
 
@@ -261,8 +244,8 @@ class Drive:
         nominal = dict(self._spec.plant.parameters)
         nominal |= {name: value for name, value in self._live.items() if name in nominal}
         return [
-            {name: value * one.off.get(name, 1.0) for name, value in nominal.items()}
-            for one in self._followers
+            {name: value * off.get(name, 1.0) for name, value in nominal.items()}
+            for off in self._followers.values()
         ]
 
     def _rows(self) -> Array:
@@ -300,13 +283,13 @@ class Drive:
         q_a = np.concatenate([ends, places])
         still = np.zeros((len(ends), len(self._plant.unactuated)))
         outputs, actors = equations_of(self._plant)[1], []
-        for index, (one, parameters) in enumerate(zip(self._followers, self._parameters(), strict=True)):
+        for index, (name, parameters) in enumerate(zip(self._followers, self._parameters(), strict=True)):
             q_u = np.concatenate([still, swung[:, index]])
             row = parameter_column(self._plant, parameters)
             sway = outputs(q_u, q_a, row)[:, : len(self._plant.loads), 0][:, self._plant.end_load]
             drawn = self._drawn(parameters, q_a, q_u)
             sign = sway[:, -1] if sway.shape[1] == 1 else np.linalg.norm(sway, axis=1)
-            actors.append(Actor(name=one.name, colour=COLOURS[index], sway=sign, drawings=drawn))
+            actors.append(Actor(name=name, colour=COLOURS[index], sway=sign, drawings=drawn))
         return Animation(
             times=np.linspace(0.0, MOMENT, len(q_a)),
             arrival=0.0,
@@ -368,7 +351,7 @@ def _load(drawing: Drawing) -> int:
     return [*drawing.shapes, *loads][-1].points[0]
 
 
-def _followers(spec: Spec) -> Sequence[Follower]:
+def _followers(spec: Spec) -> dict[str, Mapping[str, float]]:
     """Choose the machines: nominal, and both ends of every range beside; a sensor measures but the first."""
     ranges, nominal = spec.checked_ranges(), spec.plant.parameters
     ends = {
@@ -376,9 +359,9 @@ def _followers(spec: Spec) -> Sequence[Follower]:
         for name, (low, high) in ranges.items()
         if nominal[name] != 0.0 and name not in spec.check.spans
     }
-    followers = [Follower(name="nominal", off={})]
+    followers: dict[str, Mapping[str, float]] = {"nominal": {}}
     for side in (0, 1) if ends and spec.planner.sensor is None else ():
         off = {name: both[side] for name, both in ends.items()}
         words = ", ".join(f"{name} {100.0 * (factor - 1.0):+.3g} %" for name, factor in off.items())
-        followers.append(Follower(name=machine(words), off=off))
+        followers[machine(words)] = off
     return followers

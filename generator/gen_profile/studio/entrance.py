@@ -195,10 +195,8 @@ class Guarded(RequestHandler):
         """Show the page on which a code is typed; it loads nothing, for strangers get nothing else."""
         style, texts = _asset("studio.css"), json.loads(_asset("words.json"))["texts"]
         digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-        self.set_header(
-            "Content-Security-Policy",
-            f"{NOTHING}; style-src 'sha256-{digest}'; img-src data:; form-action 'self'",
-        )
+        policy = f"{NOTHING}; style-src 'sha256-{digest}'; img-src data:; form-action 'self'"
+        self.set_header("Content-Security-Policy", policy)
         self.set_header("Referrer-Policy", "same-origin")  # without it, the answer's origin would be null
         german = self.request.headers.get("Accept-Language", "").lower().startswith("de")
         fields = {key: escape(both[german]) for key, both in texts.items() if key.startswith("code.")}

@@ -42,15 +42,8 @@ UNITS = {
 USUAL = {"cost.sway_weight": 50.0, "actuator.tau": 0.1, "cost.sway_scale": 50.0, "check.samples": 100.0}
 USUAL |= {"planner.quick_stop": 1.0, "planner.quick_stop_jerk": 10.0, "can.torque_per_acceleration": 1.0}
 USUAL |= {"can.timeout": 0.02, "can.following_error": 0.01, "can.quick_stop": 1.0}
-LEFT_OUT = {
-    "can.vendor",  # numbers of one drive, which are no knobs
-    "can.product",
-    "check.foreign",
-    "check.default",
-    "check.uncertain",
-    "move.shortest",
-}
-LEFT_OUT |= {"check.path.lag", "export.csv_columns", "plant"}
+LEFT_OUT = {"can.vendor", "can.product"}  # numbers of one drive, which are no knobs
+LEFT_OUT |= {"check.foreign", "check.default", "check.uncertain", "check.path.lag", "export.csv_columns"}
 
 
 @attrs.frozen(kw_only=True)
@@ -141,7 +134,7 @@ def knobs(spec: Spec, document: Mapping[str, Any], start: Spec) -> list[Knob]:
 def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
     parameters = spec.machine().parameters
     yield from _move(spec, document.get("move", {}))
-    yield from (_of_parameter(one, "number", spec.plant.parameters[one.name]) for one in parameters)
+    yield from (_of_parameter(one, "number", "plant", spec.plant.parameters[one.name]) for one in parameters)
     yield from _fields(spec.robustness, "robustness")
     yield from _intervals(spec)
     yield from _fields(spec.cost, "cost")
@@ -152,7 +145,8 @@ def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
     yield from _fields(spec.check, "check")
     yield from _fields(spec.check.path, "check.path")
     yield from _fields(spec.check.wind, "check.wind")
-    yield from (_range(one, "check.spans", spec.check.spans.get(one.name)) for one in parameters)
+    spans = spec.check.spans
+    yield from (_of_parameter(one, "pair", "check.spans", spans.get(one.name)) for one in parameters)
     yield from _planner(spec)
     yield from _axes(spec, document.get("axis", {}))
     yield from _fields(spec.export, "export")
@@ -230,8 +224,8 @@ def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
             )
 
 
-def _of_parameter(one: Parameter, kind: str, value: Any) -> Knob:
-    place = "plant" if kind == "number" else "robustness.uncertain"
+def _of_parameter(one: Parameter, kind: str, place: str, value: Any) -> Knob:
+    """Tell a machine's parameter, or its range, which stand by its name in some table of the spec."""
     return Knob(
         path=f"{place}.{one.name}",
         kind=kind,
@@ -253,43 +247,28 @@ def _intervals(spec: Spec) -> Iterator[Knob]:
         nominal, fraction = spec.plant.parameters[one.name], spec.robustness.uncertain.get(one.name)
         if nominal > 0.0:
             ends = None if fraction is None else [nominal * (1.0 - fraction), nominal * (1.0 + fraction)]
-            yield _of_parameter(one, "interval", ends)
-
-
-def _range(one: Parameter, place: str, value: Any) -> Knob:
-    """Tell a parameter's least and greatest value, for something else than the design."""
-    return attrs.evolve(_of_parameter(one, "pair", value), path=f"{place}.{one.name}", words=place)
+            yield _of_parameter(one, "interval", "robustness.uncertain", ends)
 
 
 def _planner(spec: Spec) -> Iterator[Knob]:
     """Give the block's inputs at run time, and how fast they may change."""
     live, rates = spec.planner.live, spec.planner.live_rate
     for one in spec.machine().parameters:
-        yield _range(one, "planner.live", live.get(one.name))
+        yield _of_parameter(one, "pair", "planner.live", live.get(one.name))
         if one.name in live:
-            rate = _of_parameter(one, "number", rates.get(one.name))
-            yield attrs.evolve(
-                rate,
-                path=f"planner.live_rate.{one.name}",
-                words="planner.live_rate",
-                unit=f"{rate.unit}/s",
-                least=0.0,
-                most=None,
-                optional=True,
-                usual=0.1 * (live[one.name][1] - live[one.name][0]),
-            )
+            low, high = live[one.name]
+            rate = _of_parameter(one, "number", "planner.live_rate", rates.get(one.name))
+            rate = attrs.evolve(rate, unit=f"{rate.unit}/s", least=0.0, most=None, optional=True)
+            yield attrs.evolve(rate, usual=0.1 * (high - low))
     for axis in spec.machine().actuated:
         if axis.name in live:  # a hoist
-            yield Knob(
-                path=f"planner.live.{axis.name}",
-                kind="pair",
-                words="planner.live",
-                name=axis.name,
-                value=live[axis.name],
-                unit=axis.unit,
-                optional=True,
-            )
+            yield _pair("planner.live", f"planner.live.{axis.name}", axis.name, live[axis.name], axis.unit)
     yield from _of_axes(spec, _fields(spec.planner, "planner"))
+
+
+def _pair(words: str, path: str, name: str, value: Any, unit: str) -> Knob:
+    """Tell the least and greatest place of an axis."""
+    return Knob(path=path, kind="pair", words=words, name=name, value=value, unit=unit, optional=True)
 
 
 def _of_axes(spec: Spec, listed: Iterator[Knob]) -> Iterator[Knob]:
@@ -317,15 +296,7 @@ def _limits(spec: Spec) -> Iterator[Knob]:
         for knob in _fields(table, place, words="limits", name=name):
             rate = RATES.get(knob.words.rpartition(".")[2])
             yield attrs.evolve(knob, unit=f"{unit}{rate}") if rate else knob
-        yield Knob(
-            path=f"{place}.travel",
-            kind="pair",
-            words="limits.travel",
-            name=name,
-            value=table.travel,
-            unit=unit,
-            optional=True,
-        )
+        yield _pair("limits.travel", f"{place}.travel", name, table.travel, unit)
 
 
 def _residual_sway(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
@@ -356,15 +327,12 @@ def _axes(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
 
 def _with_slider(knob: Knob, before: Any) -> Knob:
     """Choose the ends of a knob's slider: around the value to begin with, so that they stand still."""
+    known: list[float] = []
     if knob.kind == "interval":
-        ends = [end for value in (before, knob.value) if value for end in value]
-        return attrs.evolve(knob, span=_around(knob, min(ends), max(ends)) if ends else None)
-    if knob.kind != "number" or isinstance(knob.value, bool):
-        return knob
-    known = [value for value in (before, knob.value, knob.usual) if isinstance(value, int | float)]
-    if not known:
-        return knob
-    return attrs.evolve(knob, span=_around(knob, min(known), max(known)))
+        known = [end for value in (before, knob.value) if value for end in value]
+    elif knob.kind == "number":
+        known = [value for value in (before, knob.value, knob.usual) if isinstance(value, int | float)]
+    return attrs.evolve(knob, span=_around(knob, min(known), max(known))) if known else knob
 
 
 def _around(knob: Knob, low: float, high: float) -> tuple[float, float]:

@@ -25,12 +25,11 @@ from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.orders import LogQuestion
 from gen_profile.studio.state import command_of
+from gen_profile.studio.workers import Part
 from gen_profile.work import OutOfWork
 
 MOST_COLUMNS = 64  # of a table that are offered
 MOVED = 0.3  # of the planned way, from which on a log is one of a move
-
-Part = dict[str, Any]
 
 
 def log(asked: LogQuestion) -> Iterator[Part]:
@@ -39,7 +38,8 @@ def log(asked: LogQuestion) -> Iterator[Part]:
         spec = asked.question.spec()
         text = decoded(asked.content, asked.name)
         columns = column_meanings(text, asked.name, spec)[:MOST_COLUMNS]
-        asked = attrs.evolve(asked, free=asked.free or _usual(spec))
+        usual = tuple(spec.robustness.uncertain) or (spec.machine().parameters[0].name,)
+        asked = attrs.evolve(asked, free=asked.free or usual)  # what the spec does not know well
         try:
             read = parse_log(text, asked.name, spec, asked.columns)
         except OutputError as error:
@@ -64,11 +64,6 @@ def _is_move(spec: Spec, read: MeasuredLog) -> bool:
         float(np.ptp(values)) > MOVED * ways[names.index(name)] > 0.0
         for name, values in read.positions.items()
     )
-
-
-def _usual(spec: Spec) -> tuple[str, ...]:
-    """Choose what to identify: what the spec does not know well, or else the first parameter."""
-    return tuple(spec.robustness.uncertain) or (spec.machine().parameters[0].name,)
 
 
 def _reading(asked: LogQuestion, spec: Spec, columns: list[tuple[str, str]], use: str) -> Part:

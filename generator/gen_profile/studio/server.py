@@ -280,9 +280,8 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         for name in names:
             find_exporter(name)
         if question is not None:
-            self._session.make(
-                Order(question=question, formats=names or ("csv",), report=bool(said["report"]))
-            )
+            order = Order(question=question, formats=names or ("csv",), report=bool(said["report"]))
+            self._session.make(order)
 
     def _drop(self, said: dict[str, Any], content: bytes) -> None:
         """Take a file that was dropped on the page: a spec to start with, or a log."""

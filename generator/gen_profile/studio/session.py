@@ -1,9 +1,10 @@
 """What one page asks, and who answers: the newest question only, however fast a hand is."""
 
 import json
+from asyncio import AbstractEventLoop
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any
 
 import attrs
 
@@ -18,28 +19,17 @@ GONE = "The process that solved this has ended, and another one takes its place.
 Tell = Callable[[Message], None]
 
 
-class Loop(Protocol):
-    """The part of an event loop that is needed."""
-
-    def call_later(self, delay: float, callback: Callable[..., None], *args: Any) -> Any:
-        """Call something later."""
-
-    def call_soon_threadsafe(self, callback: Callable[..., None], *args: Any) -> Any:
-        """Call something in the loop's thread."""
-
-
 class RequestQueue:
     """Questions of one kind, numbered upwards; what is overtaken is left unfinished."""
 
-    def __init__(self, kind: str, workers: Workers, loop: Loop, tell: Tell) -> None:
+    def __init__(self, kind: str, workers: Workers, loop: AbstractEventLoop, tell: Tell) -> None:
         self._workers, self._loop, self._tell = workers, loop, tell
         self._worker: Worker | None = None
         self._job = Job(number=-1, kind=kind, question=None)
         self._begun = self._ended = -1
         self._deaths = 0  # of workers, in a row, that had begun nothing
-        self._answers = (
-            False  # whether the worker has begun anything: one that starts is at no older question
-        )
+        # whether the worker has begun anything: one that starts is at no older question
+        self._answers = False
 
     def ask(self, number: int, question: Any) -> None:
         """Ask."""
@@ -90,10 +80,9 @@ class RequestQueue:
             return
         if message.name == LOST:
             self.stop()
-            failed = {**failure("unanswered", [GONE]), "of": self._job.kind, "serial": self._job.number}
-            message = Message(
-                number=self._job.number, kind=self._job.kind, name="failure", text=json.dumps(failed)
-            )
+            kind, number = self._job.kind, self._job.number
+            text = json.dumps({**failure("unanswered", [GONE]), "of": kind, "serial": number})
+            message = Message(number=number, kind=kind, name="failure", text=text)
         elif message.name == BEGUN:
             self._begun, self._answers, self._deaths = message.number, True, 0
         elif message.name == ENDED:
@@ -104,7 +93,7 @@ class RequestQueue:
 class Session:
     """The lines of one page: the picture, then what takes longer; files and logs when they are asked for."""
 
-    def __init__(self, workers: Workers, loop: Loop) -> None:
+    def __init__(self, workers: Workers, loop: AbstractEventLoop) -> None:
         self._loop, self._heard = loop, list[Message]()
         self._tell: Tell = self._heard.append
         self._queues = {kind: RequestQueue(kind, workers, loop, self._take) for kind in ANSWERS}

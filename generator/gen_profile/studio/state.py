@@ -17,7 +17,7 @@ import attrs
 import tomlkit
 
 from gen_profile.errors import SpecError
-from gen_profile.spec.reading import overridden, parse_toml, preset_text
+from gen_profile.spec.reading import Document, overridden, parse_toml, preset_text
 from gen_profile.spec.values import NONE
 from gen_profile.strict_json import parse_json
 
@@ -74,14 +74,12 @@ class WrittenSpec:
 
         They are a machine of one's own, and an external FMU.
         """
-        keys = {"plant": "file", "check": "fmu"}
-        tables = {name: self.document.get(name) for name in keys}
-        named = {
-            f"{name}.{keys[name]}": table.get(keys[name])
-            for name, table in tables.items()
-            if isinstance(table, dict)
-        }
-        return {key: (self.folder / file).absolute() for key, file in named.items() if isinstance(file, str)}
+        programs = {}
+        for name, key in (("plant", "file"), ("check", "fmu")):
+            table = self.document.get(name)
+            if isinstance(table, dict) and isinstance(file := table.get(key), str):
+                programs[f"{name}.{key}"] = (self.folder / file).absolute()
+        return programs
 
 
 def changed_start(words: tuple[str, ...], text: str, changes: tuple[str, ...], folder: Path) -> WrittenSpec:
@@ -219,15 +217,10 @@ class StudioState:
 def overrides(start: WrittenSpec, edits: Mapping[str, Any]) -> list[str]:
     """Write edits as ``--set`` takes them; a table that lost a key is stated as a whole."""
     lost = {key.partition(".")[0] for key, value in edits.items() if value is None}
-    written = [
-        f"{key}={_written(value)}" for key, value in edits.items() if key.partition(".")[0] not in lost
-    ]
     inside = {key: value for key, value in edits.items() if key.partition(".")[0] in lost}
-    stated = [f"{key}={_written(value)}" for key, value in inside.items() if value is not None]
-    document = overridden(start.document, stated)
-    for key in (key for key, value in inside.items() if value is None):
-        _drop(document, key.split("."))
-    return [*written, *(f"{name}={_inline(document.get(name, {}))}" for name in sorted(lost))]
+    outside = [f"{key}={_written(value)}" for key, value in edits.items() if key not in inside]
+    document = _edited(start.document, inside)
+    return [*outside, *(f"{name}={_inline(document.get(name, {}))}" for name in sorted(lost))]
 
 
 def document_of(start: WrittenSpec, edits: Mapping[str, Any]) -> dict[str, Any]:
@@ -248,18 +241,23 @@ def text_of(start: WrittenSpec, edits: Mapping[str, Any]) -> str:
     ------
     SpecError
     """
-    document = tomlkit.parse(start.text)
-    changed = {key: value for key, value in edits.items() if value is not None}
-    document = overridden(document, [f"{key}={_written(value)}" for key, value in changed.items()])
-    for key in edits.keys() - changed.keys():
-        _drop(document, key.split("."))
-    return document.as_string()
+    return _edited(tomlkit.parse(start.text), edits).as_string()
 
 
 def command_of(start: WrittenSpec, edits: Mapping[str, Any], *command: str) -> str:
     """Write the command line that designs what is shown, or does something else with it."""
     changes = [word for override in overrides(start, edits) for word in ("--set", override)]
     return shlex.join(["gen-profile", *command, *start.words, *changes])
+
+
+def _edited(document: Document, edits: Mapping[str, Any]) -> Document:
+    """Copy a document with other values, and without the keys that are taken away."""
+    stated = [f"{key}={_written(value)}" for key, value in edits.items() if value is not None]
+    changed = overridden(document, stated)
+    for key, value in edits.items():
+        if value is None:
+            _drop(changed, key.split("."))
+    return changed
 
 
 def _drop(table: Any, path: list[str]) -> None:
@@ -274,13 +272,8 @@ def _drop(table: Any, path: list[str]) -> None:
 
 def _written(value: Any) -> str:
     """Write a value as a person would behind ``KEY=``: a word without quotes where it stays one."""
-    if (
-        isinstance(value, str)
-        and re.fullmatch(r"[a-z][a-z-]*", value)
-        and value not in ("true", "false", "inf", "nan")
-    ):
-        return value
-    return _inline(value)
+    is_word = isinstance(value, str) and re.fullmatch(r"[a-z][a-z-]*", value)
+    return value if is_word and value not in ("true", "false", "inf", "nan") else _inline(value)
 
 
 def _inline(value: Any) -> str:

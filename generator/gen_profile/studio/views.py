@@ -21,7 +21,7 @@ from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, peak
 from gen_profile.phrase import PLACED, Phrase
 from gen_profile.problem.limits import ROUNDING
-from gen_profile.report.actors import animation
+from gen_profile.report.animation import animation
 from gen_profile.solvers.method_selection import ANSWER
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
@@ -30,7 +30,7 @@ from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.knobs import knobs
 from gen_profile.studio.orders import Question
 from gen_profile.studio.state import command_of, text_of
-from gen_profile.studio.workers import failure
+from gen_profile.studio.workers import Part, failure
 from gen_profile.work import OutOfWork, budget
 
 SAMPLES = 300  # of a curve: as many as a panel has pixels
@@ -43,8 +43,6 @@ FIGURES = {
     "residual": "sway_residual_worst_m",
 }
 SEARCHING = "Looking for what would help …"
-
-Part = dict[str, Any]
 
 
 def picture(question: Question) -> Iterator[Part]:
@@ -95,12 +93,8 @@ def _setting(question: Question, spec: Spec) -> Part:
 
 def _json(knob: Any) -> dict[str, Any]:
     """Leave out what is as by default; the page knows."""
-    fields = attrs.fields(type(knob))
-    values = {field.name: getattr(knob, field.name) for field in fields}
-    names = (
-        name for name, value in values.items() if value != getattr(fields, name).default or name == "value"
-    )
-    return {name: values[name] for name in names}
+    pairs = ((field, getattr(knob, field.name)) for field in attrs.fields(type(knob)))
+    return {one.name: value for one, value in pairs if value != one.default or one.name == "value"}
 
 
 def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any]]:
@@ -108,28 +102,23 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
     by_axis = groupby(demands(spec, evaluation.command), key=lambda one: one.column)
     for (column, of_axis), axis in zip(by_axis, spec.machine().actuated, strict=True):
         limits, name = spec.limits.of(column), axis.name if len(spec.axis) > 1 else ""
-        for one in of_axis:
-            yield {
-                "place": spec.limits.place(column, one.quantity),
-                "quantity": one.quantity,
-                "axis": name,
-                "unit": one.unit,
-                "takes": one.asked,
-                "allowed": one.allowed,
-            }
+        taken: list[tuple[str, str, float, float | None]]
+        taken = [(one.quantity, one.unit, one.asked, one.allowed) for one in of_axis]
         if limits.travel is not None:
             least, most = extremes(evaluation.command, 0, column)
             low, high = limits.travel
             beyond = max(low - least, most - high)
             way = high - low + beyond if beyond > ROUNDING * (high - low) else most - least
             unit, factor = place_unit(spec, column)
+            taken.append(("travel", unit, factor * way, factor * (high - low)))
+        for quantity, unit, takes, allowed in taken:
             yield {
-                "place": spec.limits.place(column, "travel"),
-                "quantity": "travel",
+                "place": spec.limits.place(column, quantity),
+                "quantity": quantity,
                 "axis": name,
                 "unit": unit,
-                "takes": factor * way,
-                "allowed": factor * (high - low),
+                "takes": takes,
+                "allowed": allowed,
             }
 
 
@@ -162,18 +151,13 @@ def _verdict(planned: Plan) -> Part:
 
 def _failure(question: Question, error: Exception) -> Iterator[Part]:
     """Say why there is no motion, what would help, and keep the knobs usable."""
-    match error:
-        case SpecError():
-            answer, sentences = "faulty", error.sentences
-            yield {"part": "faults", "faults": [fault(sentence) for sentence in sentences]}
-            if question.state.edits:
-                return
-        case NoMotion():
-            answer, sentences = "none", error.sentences
-        case GenProfileError():
-            answer, sentences = "unanswered", error.sentences
-        case _:
-            answer, sentences = "none", (Status.GIVEN_UP.value,)
+    sentences = error.sentences if isinstance(error, GenProfileError) else (Status.GIVEN_UP.value,)
+    answer = "none" if isinstance(error, NoMotion | OutOfWork) else "unanswered"
+    if isinstance(error, SpecError):
+        answer = "faulty"
+        yield {"part": "faults", "faults": [fault(sentence) for sentence in sentences]}
+        if question.state.edits:
+            return
     suggestions = error.suggestions if isinstance(error, NoMotion) else ()
     yield failure(answer, sentences, [one.values for one in suggestions])
 

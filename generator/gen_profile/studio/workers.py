@@ -222,9 +222,9 @@ def _answer(connection: Connection, job: Job) -> None:
     connection.send(Message(number=job.number, kind=job.kind, name=BEGUN))
     for part in _parts(job):
         file, document = part.get("file"), {**part, "of": job.kind, "serial": job.number}
-        text = json.dumps(
-            plain(document if file is None else {**document, "file": None}), separators=(",", ":")
-        )
+        if file is not None:
+            document["file"] = None
+        text = json.dumps(plain(document), separators=(",", ":"))
         connection.send(Message(number=job.number, kind=job.kind, name=part["part"], text=text, file=file))
         if connection.poll(FRAME if part["part"] == "curves" else 0.0):
             return

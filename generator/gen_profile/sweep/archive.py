@@ -73,15 +73,12 @@ class Archive:
         ]
         with self._connection:
             for name in [name for name in row if name not in self._columns]:
-                self._connection.execute(
-                    f"ALTER TABLE cases ADD COLUMN {_quoted(name)} {TYPES.get(type(row[name]), '')}"
-                )
+                column = f"{_quoted(name)} {TYPES.get(type(row[name]), '')}"
+                self._connection.execute(f"ALTER TABLE cases ADD COLUMN {column}")
                 self._columns.append(name)
-            places = ", ".join(map(_quoted, row))
-            self._connection.execute(
-                f"INSERT OR REPLACE INTO cases ({places}) VALUES ({', '.join('?' * len(row))})",
-                tuple(row.values()),
-            )
+            places, marks = ", ".join(map(_quoted, row)), ", ".join("?" * len(row))
+            insertion = f"INSERT OR REPLACE INTO cases ({places}) VALUES ({marks})"
+            self._connection.execute(insertion, tuple(row.values()))
             self._connection.executemany("INSERT OR REPLACE INTO sqlar VALUES (?, ?, ?, ?, ?)", files)
 
     def rows(self, columns: Sequence[str], cases: Sequence[int] | None) -> list[tuple[Any, ...]]:

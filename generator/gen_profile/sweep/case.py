@@ -133,9 +133,8 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcom
 
 def failed(case: int, values: Mapping[str, Any], status: str, reason: str) -> CaseOutcome:
     """Record a case of which nothing came."""
-    return CaseOutcome(
-        record={"case": case, "values": dict(values), "status": status, "reason": reason}, files={}
-    )
+    record = {"case": case, "values": dict(values), "status": status, "reason": reason}
+    return CaseOutcome(record=record, files={})
 
 
 def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def parse_grid(texts: Sequence[str]) -> Grid:
     for key in keys:
         if keys.count(key) > 1:
             raise SpecError(f"vary {key}: a key is varied once.")
-    return _grid(axes, "vary")
+    return _grid(axes)
 
 
 def grid_of_values(vary: Mapping[str, Sequence[Any]]) -> Grid:
@@ -98,12 +98,12 @@ def grid_of_values(vary: Mapping[str, Sequence[Any]]) -> Grid:
             raise SpecError(f"vary {key}: there is no value.")
     if not vary:
         raise SpecError("vary: name a key and its values, such as {'move.distance': [0.1, 0.2]}.")
-    return _grid(tuple(_axis(f"vary {key}", key, values) for key, values in vary.items()), "vary")
+    return _grid(tuple(_axis(f"vary {key}", key, values) for key, values in vary.items()))
 
 
-def _grid(axes: tuple[GridAxis, ...], where: str) -> Grid:
+def _grid(axes: tuple[GridAxis, ...]) -> Grid:
     if math.prod(len(axis.values) for axis in axes) > MOST_CASES:
-        raise SpecError(f"{where}: more than {MOST_CASES} combinations; vary less, or in several sweeps.")
+        raise SpecError(f"vary: more than {MOST_CASES} combinations; vary less, or in several sweeps.")
     return Grid(axes=axes)
 
 

@@ -50,15 +50,9 @@ class Library:
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        return {
-            "path": str(self.path),
-            "index": str(self.index),
-            "format": self.format,
-            "files": [str(path) for path in self.files],
-            "block": self.block,
-            "bytes": self.bytes,
-            "profiles": list(self.profiles),
-        }
+        return attrs.asdict(
+            self, value_serializer=lambda _, __, one: str(one) if isinstance(one, Path) else one
+        )
 
 
 def write_library(folder: Path | str, path: Path | str, progress: Progress = no_progress) -> Library:
@@ -124,7 +118,8 @@ def _gathered(
         raise SpecError(
             f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
         )
-    target = _target(folder, passed[0], name)
+    with case_folder(folder, passed[0]) as case:
+        target = attrs.evolve(target_of(case_spec(folder, passed[0], case)), name=name)
     profiles, specs, entries = [], list[Mapping[str, Any]](), []
     for number, row in enumerate(passed):
         progress("reading profiles", number, len(passed))
@@ -145,12 +140,6 @@ def _gathered(
             }
         )
     return profiles, specs, entries, target
-
-
-def _target(folder: Path, row: Mapping[str, Any], name: str) -> Target:
-    """Give what the profiles were made for, and the library's own name."""
-    with case_folder(folder, row) as case:
-        return attrs.evolve(target_of(case_spec(folder, row, case)), name=name)
 
 
 def _block_of(row: dict[str, Any]) -> dict[str, Any]:

@@ -165,9 +165,8 @@ def lookup(
 def _wanted(grid: Grid, asked: Mapping[str, str]) -> dict[str, Any]:
     """Read what was asked for, as the table's cells hold it."""
     axes = {axis.key: axis for axis in grid.axes}
-    faults = [
-        f"{key}: the sweep did not vary this{suggestion(key, axes)}" for key in asked if key not in axes
-    ]
+    unknown = [key for key in asked if key not in axes]
+    faults = [f"{key}: the sweep did not vary this{suggestion(key, axes)}" for key in unknown]
     wanted = {}
     for key, axis in axes.items():
         try:

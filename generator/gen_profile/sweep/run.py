@@ -156,18 +156,13 @@ def sweep(
         unfinished = [case for case in range(len(grid)) if not kept.is_finished(case)]
         if unfinished:
             _work(store, kept, unfinished, scheduler=scheduler, workers=workers, progress=progress)
-        table = kept.gather()
+        table = store.gather()
     for row in swept_table(store.folder, grid, ["case", "status", "reason"]).to_pylist():
         statuses[row["status"]] += 1
         if row["status"] != PASSED:
             reasons.setdefault(row["status"], f"case {row['case']}: {row['reason']}")
-    return Sweep(
-        store=store,
-        statuses=dict(statuses),
-        reasons=reasons,
-        kept=len(grid) - len(unfinished),
-        table=table,
-    )
+    before = len(grid) - len(unfinished)
+    return Sweep(store=store, statuses=dict(statuses), reasons=reasons, kept=before, table=table)
 
 
 def _work(
@@ -190,7 +185,7 @@ def _work(
     def keep(outcomes: Sequence[CaseOutcome]) -> None:
         nonlocal done, failures
         for outcome in outcomes:
-            kept.keep(outcome.record["case"], outcome)
+            kept.keep(outcome)
             done, failures = done + 1, failures + (not outcome.passed)
             progress(STAGE, done, total, f"{failures} failed" if failures else "")
 
@@ -284,6 +279,5 @@ def run_sweep(
     spec = as_spec(spec)
     grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
-    return sweep(
-        prepare(text, (), grid, as_names(formats), Path(folder)), scheduler=scheduler, workers=workers
-    )
+    store = prepare(text, (), grid, as_names(formats), Path(folder))
+    return sweep(store, scheduler=scheduler, workers=workers)

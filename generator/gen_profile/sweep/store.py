@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol
+from typing import Any
 
 import attrs
 import pyarrow as pa
@@ -52,7 +52,7 @@ LOCK = ".lock"
 
 @attrs.frozen(kw_only=True)
 class Store:
-    """What is swept, and its folder; as what is finished there, see `Keeper`.
+    """What is swept, and its folder, with what is finished there.
 
     Attributes
     ----------
@@ -80,21 +80,19 @@ class Store:
         """Whether a case's record is there, and all files are as it tells: a power cut may leave a part."""
         record = self._record(case)
         try:
-            return record is not None and _is_whole(
-                record.get("artefacts", []),
-                {file.name: read_bounded(file) for file in self.case_folder(case).iterdir()},
-            )
+            files = {file.name: read_bounded(file) for file in self.case_folder(case).iterdir()}
+            return record is not None and _is_whole(record.get("artefacts", []), files)
         except OSError:
             return False
 
-    def keep(self, case: int, outcome: CaseOutcome) -> None:
+    def keep(self, outcome: CaseOutcome) -> None:
         """Write a finished case.
 
         Raises
         ------
         OutputError
         """
-        with staged(self.case_folder(case)) as staging:
+        with staged(self.case_folder(outcome.record["case"])) as staging:
             for name, content in outcome.files.items():
                 staging.write(name, content)
             staging.write(RECORD, _json(outcome.record))
@@ -115,13 +113,15 @@ class Store:
             yield record
 
     def gather(self) -> Path:
-        """Write the table of all cases.
+        """Write the table of all cases, which one file is already; its path.
 
         Raises
         ------
         OutputError
             One is not finished, or the table cannot be written.
         """
+        if is_archive(self.folder):
+            return self.folder
         return write_table(self.folder, self.grid, self.records())
 
     def _record(self, case: int) -> dict[str, Any] | None:
@@ -131,7 +131,7 @@ class Store:
         except (OSError, ValueError):
             return None
         own = {"case": case, "values": self.grid[case]}
-        if not isinstance(record, dict) or any(record.get(key) != value for key, value in own.items()):
+        if not isinstance(record, dict) or not own.items() <= record.items():
             return None
         whole: dict[str, Any] = {"artefacts": [], "figures": {}, "check": {}, "solver": {}} | record
         sound = all(isinstance(whole.get(key), kind) for key, kind in RECORD_TYPES.items())
@@ -154,27 +154,14 @@ class Store:
         }
 
 
-class Keeper(Protocol):
-    """Where finished cases are kept."""
+class ArchiveKeeper:
+    """Finished cases in one file, as `Store` keeps them in a folder."""
+
+    def __init__(self, grid: Grid, archive: Archive) -> None:
+        self._grid, self._archive, self._finished = grid, archive, archive.finished()
 
     def is_finished(self, case: int) -> bool:
         """Whether a case is there, whole."""
-
-    def keep(self, case: int, outcome: CaseOutcome) -> None:
-        """Write a finished case."""
-
-    def gather(self) -> Path:
-        """Make the table of all cases, which must be finished; its file."""
-
-
-class _ArchiveKeeper:
-    """Finished cases in one file."""
-
-    def __init__(self, store: Store, archive: Archive) -> None:
-        self._store, self._archive = store, archive
-        self._finished = archive.finished()
-
-    def is_finished(self, case: int) -> bool:
         if case not in self._finished:
             return False
         ((artefacts,),) = self._archive.rows(["artefacts"], [case])
@@ -184,12 +171,13 @@ class _ArchiveKeeper:
             return False
         return _is_whole(listed, self._archive.files(str(case_path(case))))
 
-    def keep(self, case: int, outcome: CaseOutcome) -> None:
-        self._archive.keep(self._store.grid, outcome)
-        self._finished.add(case)
+    def keep(self, outcome: CaseOutcome) -> None:
+        """Write a finished case."""
+        self._archive.keep(self._grid, outcome)
+        self._finished.add(outcome.record["case"])
 
-    def gather(self) -> Path:
-        return self._store.folder
+
+Keeper = Store | ArchiveKeeper
 
 
 def _is_whole(artefacts: Sequence[Mapping[str, str]], files: Mapping[str, bytes]) -> bool:
@@ -217,7 +205,7 @@ def opened(store: Store) -> Iterator[Keeper]:
             if archive.description() is None:
                 archive.describe(_json(asked).decode("utf-8"))
             _require_same(store.folder, asked, archive.description() or "")
-            yield _ArchiveKeeper(store, archive)
+            yield ArchiveKeeper(store.grid, archive)
         return
     with _locked(store.folder):
         if not (store.folder / DESCRIPTION).exists():
@@ -240,7 +228,7 @@ def _locked(folder: Path) -> Iterator[None]:
     lock = FileLock(folder / LOCK)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock.acquire(blocking=False)
+        held = lock.acquire(blocking=False)
     except Timeout as error:
         raise OutputError(f"Another sweep is at work in {folder}; wait for its end.") from error
     except (OSError, NotImplementedError) as error:  # the latter of file systems without locks
@@ -248,10 +236,8 @@ def _locked(folder: Path) -> Iterator[None]:
             f"Cannot write to the folder {folder}: {getattr(error, 'strerror', '') or error}; "
             "choose another one."
         ) from error
-    try:
+    with held:
         yield
-    finally:
-        lock.release()
 
 
 def grid_of(path: Path) -> Grid:
@@ -315,15 +301,13 @@ def swept_table(
             raise OutputError(f"{path}: finish the sweep first (the same gen-profile sweep goes on).")
         names = archive.columns() if columns is None else list(columns)
         rows = archive.rows(names, cases)
+    read = [dict(zip(names, row, strict=True)) for row in rows]
     try:
-        decoded = [_decoded(dict(zip(names, row, strict=True))) for row in rows]
+        for row in read if "artefacts" in names else ():
+            row["artefacts"] = parse_json(row["artefacts"])
     except ValueError as error:
         raise OutputError(f"{path}: damaged; sweep again.") from error
-    return columns_of(decoded, names)
-
-
-def _decoded(row: dict[str, Any]) -> dict[str, Any]:
-    return row | {"artefacts": parse_json(row["artefacts"])} if "artefacts" in row else row
+    return columns_of(read, names)
 
 
 def case_files(path: Path, row: Mapping[str, Any]) -> dict[str, bytes]:

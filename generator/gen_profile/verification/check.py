@@ -1,7 +1,10 @@
 """Judging an artefact that lies on disk, whatever wrote it, as planned or smaller, mirrored or elsewhere."""
 
+import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from io import StringIO
+from itertools import chain
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -13,7 +16,7 @@ from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
-from gen_profile.motion.profile import Array, SampledProfile, columns_of
+from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec, spec_from_dict
@@ -22,50 +25,28 @@ from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
+from gen_profile.verification.setpoint_path import lag_of, path_taken
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
 
-@attrs.frozen(kw_only=True)
-class MotionVariant:
-    """What is asked for, by axis.
+def varied(
+    spec: Spec, setpoints: SampledProfile, scale: Sequence[str], mirror: Sequence[str], offset: Sequence[str]
+) -> tuple[Spec, SampledProfile, str | None]:
+    """Change a motion, and the move that it is judged by, and say how in words; None where nothing is asked.
 
-    Attributes
+    Parameters
     ----------
-    scale : mapping of str to float
-        Factors of the distance, 0 to 1.
-    mirror : tuple of str
+    spec : Spec
+    setpoints : SampledProfile
+    scale : sequence of str
+        Factors of the distance, 0 to 1, as ``AXIS=FACTOR``; a machine of one axis needs no name.
+    mirror : sequence of str
         Axes that go the other way.
-    offset : mapping of str to float
-        Where they begin, in m (or rad) from the start as planned.
-    """
-
-    scale: Mapping[str, float] = attrs.field(factory=dict)
-    mirror: tuple[str, ...] = ()
-    offset: Mapping[str, float] = attrs.field(factory=dict)
-
-    def gain(self, axes: Sequence[str]) -> Array:
-        """Signed factor of every axis's distance."""
-        return np.array([(-1.0 if name in self.mirror else 1.0) * self.scale.get(name, 1.0) for name in axes])
-
-    def shift(self, axes: Sequence[str]) -> Array:
-        """Offset of every axis."""
-        return np.array([self.offset.get(name, 0.0) for name in axes])
-
-    def described(self) -> str | None:
-        """Describe it in words, or not at all where the motion is as planned."""
-        words = [f"{name} {value:g} times as far" for name, value in self.scale.items()]
-        words += [f"{name} the other way" for name in self.mirror]
-        words += [f"{name} begins {value:+g} from its start" for name, value in self.offset.items()]
-        return ", ".join(words) or None
-
-
-def parse_variant(
-    spec: Spec, scale: Sequence[str], mirror: Sequence[str], offset: Sequence[str]
-) -> MotionVariant:
-    """Read ``AXIS=VALUE``; a machine of one axis needs no name.
+    offset : sequence of str
+        Where they begin, in m (or rad) from the start as planned, as ``AXIS=DISTANCE``.
 
     Raises
     ------
@@ -76,18 +57,16 @@ def parse_variant(
     for name, value in factors.items():
         if not 0.0 <= value <= 1.0:
             raise SpecError(f"scale {name}={value:g}: a playback block takes 0 to 1.")
-    return MotionVariant(
-        scale=factors,
-        mirror=tuple(_axis("mirror", name, axes) for name in mirror),
-        offset=dict(_entry("offset", text, axes) for text in offset),
-    )
-
-
-def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tuple[Spec, SampledProfile]:
-    """Change a motion, and the move that it is judged by."""
-    gain, shift = variant.gain(list(spec.axis)), variant.shift(list(spec.axis))
-    start = np.array(spec.move.start)
-
+    mirrored = [_axis("mirror", name, axes) for name in mirror]
+    offsets = dict(_entry("offset", text, axes) for text in offset)
+    words = [f"{name} {value:g} times as far" for name, value in factors.items()]
+    words += [f"{name} the other way" for name in mirrored]
+    words += [f"{name} begins {value:+g} from its start" for name, value in offsets.items()]
+    if not words:
+        return spec, setpoints, None
+    start, signs = np.array(spec.move.start), dict.fromkeys(mirrored, -1.0)
+    gain = np.array([signs.get(name, 1.0) * factors.get(name, 1.0) for name in axes])
+    shift = np.array([offsets.get(name, 0.0) for name in axes])
     move = attrs.evolve(
         spec.move,
         start=tuple((start + shift).tolist()),
@@ -96,7 +75,7 @@ def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tup
     )
     columns: dict[str, Any] = {name: values * gain for name, values in columns_of(setpoints).items()}
     columns["position"] = start + shift + gain * (setpoints.position - start)
-    return attrs.evolve(spec, move=move), attrs.evolve(setpoints, **columns)
+    return attrs.evolve(spec, move=move), attrs.evolve(setpoints, **columns), ", ".join(words)
 
 
 def _entry(option: str, text: str, axes: Sequence[str]) -> tuple[str, float]:
@@ -188,7 +167,7 @@ def check_artefact(
     strict : bool
         Whether faults in the timing of setpoints count as well.
     scale, mirror, offset : sequences of str, or str
-        A variant to judge, see `gen_profile.verification.check.parse_variant`.
+        A variant to judge, see `gen_profile.verification.check.varied`.
     progress : callable
         Told of a compilation, and how many scenarios beyond the machines are done, and of how many.
 
@@ -211,18 +190,44 @@ def check_artefact(
     content, format_ = read_artefact(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
-    variant = parse_variant(spec, *map(as_names, (scale, mirror, offset)))
     agreement = provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
-    judged = varied(spec, setpoints, variant) if variant.described() else (spec, setpoints)
-    rows, searched = _rows(*judged, row, progress)
-    check = _verdict(*judged, rows, progress)
+    asked, played, variant = varied(spec, setpoints, *map(as_names, (scale, mirror, offset)))
+    rows, searched = _rows(asked, played, row, progress)
+    check = _verdict(asked, played, rows, progress)
     faults = (*check.faults, *alterations(path, agreement))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
-    return Judgement(
-        path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant.described()
-    )
+    return Judgement(path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant)
+
+
+def scenario_table(judgement: Judgement) -> str:
+    """Write a row per scenario as CSV, numbers as exactly as they were calculated.
+
+    Columns are the scenario's number, group and name; the machine's parameters (``plant.L1`` …) and the path
+    of its setpoints (``path.lag`` …), in the spec's units; the residual sway of every load in m, the bound of
+    its error in m, and whether the limits are kept: ``passed`` or ``failed``.
+    """
+    spec, check = judgement.spec, judgement.check
+    rows: list[dict[str, object]] = []
+    for finding in chain(*check.groups.values()):
+        scenario = finding.scenario
+        path = attrs.asdict(path_taken(spec, scenario)) | {"lag": lag_of(spec, scenario)}
+        rows.append(
+            {
+                **{"row": scenario.row, "group": scenario.group, "name": scenario.name},
+                **{f"plant.{name}": scenario.parameters[name] for name in spec.plant.parameters},
+                **{f"path.{name}": value for name, value in path.items()},
+                **{f"{load}_m": finding.residual[load] for load in check.limit},
+                "error_bound_m": check.error_bound,
+                "verdict": "passed" if check.keeps_limit(finding) else "failed",
+            }
+        )
+    text = StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
 
 
 def replayed(path: Path, spec: Spec) -> SampledProfile:
@@ -256,13 +261,13 @@ def _rows(
     rows = (*machines, *further_scenarios(spec, machines))
     if row is not None and 0 <= row < len(rows):
         return (rows[row],), 0
-    worst = worst_machines(spec, setpoints, rows, progress)
-    rows = (*rows, *worst.machines)
+    worst, tried = worst_machines(spec, setpoints, rows, progress)
+    rows = (*rows, *worst)
     if row is None:
-        return rows, worst.tried
+        return rows, tried
     if not 0 <= row < len(rows):
         raise SpecError(f"scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}.")
-    return (rows[row],), worst.tried
+    return (rows[row],), tried
 
 
 def _verdict(
@@ -285,7 +290,9 @@ def _verdict(
     spacing = sample_spacing(spec, setpoints)
     followed = _of_even_cycles(setpoints, spec)
     responses = cosimulate(spec, followed, machines, output_step=spacing, progress=progress)
-    expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing, by_fmpy=False)
+    # every second setpoint, the first and the last among them
+    coarser = attrs.evolve(followed, cycle_time=2.0 * followed.cycle_time, position=followed.position[::2])
+    expected = cosimulate(spec, coarser, machines, output_step=spacing, by_fmpy=False)
     check = judge(spec, setpoints, machines, responses, expected, followed=followed)
     check = attrs.evolve(check, error_bound=check.error_bound + resolution)
     if len(rows) == len(further):
@@ -300,15 +307,6 @@ def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:
         onward = position[-1:] + setpoints.cycle_time * np.array(spec.move.final_velocity)
         position = np.concatenate([position, onward])
     return SampledProfile(cycle_time=setpoints.cycle_time, position=position, resolution=setpoints.resolution)
-
-
-def _every_other(setpoints: SampledProfile) -> SampledProfile:
-    """Leave out every second setpoint, but neither the first nor the last."""
-    return SampledProfile(
-        cycle_time=2.0 * setpoints.cycle_time,
-        position=setpoints.position[::2],
-        resolution=setpoints.resolution,
-    )
 
 
 def spec_and_manifest(

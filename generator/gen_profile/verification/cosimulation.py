@@ -117,14 +117,12 @@ def judge(
     if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
         moving = len(setpoints.times)
         between = max(between, *(above_samples(response.sway[:moving]) for response in responses))
+    pairs = zip(machines, responses, strict=True)
     return Check(
         limit=dict(spec.check.residual_sway),
         error_bound=error + between + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
-        findings=tuple(
-            _finding(spec, machine, response, arrival_time)
-            for machine, response in zip(machines, responses, strict=True)
-        ),
+        findings=tuple(_finding(spec, machine, response, arrival_time) for machine, response in pairs),
         sway_limit=spec.limits.sway,
         wind=in_wind(spec, machines),
         directions=spec.machine().directions,

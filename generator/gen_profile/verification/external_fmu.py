@@ -50,18 +50,13 @@ def judge_external(
     CosimulationError
         The FMU cannot be run to the end.
     """
-    findings: list[Finding] = []
-    error = 0.0
     together = [list(rows) for _, rows in groupby(machines, _driven_alike)]
-    for rows in together:
-        own_findings, apart = _judged(spec, foreign, setpoints, rows)
-        findings += own_findings
-        error = max(error, apart)
+    judged = [_judged(spec, foreign, setpoints, rows) for rows in together]
     return Check(
         limit={load: spec.check.residual_sway[load] for load in foreign.sway},
-        error_bound=error + ERROR_FLOOR,
+        error_bound=max(apart for _, apart in judged) + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
-        findings=tuple(findings),
+        findings=tuple(finding for findings, _ in judged for finding in findings),
         faults=implausibilities(spec, setpoints),
         plausibility_warnings=plausibility_warnings(spec),
     )

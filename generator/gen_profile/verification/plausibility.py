@@ -194,17 +194,8 @@ def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
                     "The setpoints ask {name} for {found:.4g} {unit} at {time:.6g} s, and {place} "
                     "allows {allowed:.4g} {unit}."
                 )
-                yield (
-                    Phrase(
-                        template,
-                        name=axis.name,
-                        found=demand,
-                        unit=unit,
-                        time=times[worst],
-                        place=spec.limits.place(column, name),
-                        allowed=allowed,
-                    )
-                )
+                place, values = spec.limits.place(column, name), {"found": demand, "allowed": allowed}
+                yield Phrase(template, name=axis.name, unit=unit, time=times[worst], place=place, **values)
 
 
 def _differences(spec: Spec, setpoints: SampledProfile, order: int) -> Array:

@@ -121,9 +121,7 @@ def _held(times: Array, position: Array, cycle: float) -> tuple[Array, Array]:
     leap = LEAP * cycle
     points = np.stack([times[..., 1:], times[..., 1:] + leap], axis=-1)
     stood = np.stack([position[..., :-1, :], position[..., 1:, :]], axis=-2)
-    return (
-        np.concatenate([times[..., :1], points.reshape(*times.shape[:-1], -1)], axis=-1),
-        np.concatenate(
-            [position[..., :1, :], stood.reshape(*position.shape[:-2], -1, position.shape[-1])], axis=-2
-        ),
-    )
+    points = points.reshape(*times.shape[:-1], -1)
+    stood = stood.reshape(*position.shape[:-2], -1, position.shape[-1])
+    held = np.concatenate([position[..., :1, :], stood], axis=-2)
+    return np.concatenate([times[..., :1], points], axis=-1), held

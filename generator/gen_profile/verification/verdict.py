@@ -131,18 +131,13 @@ class Check(Drawable, Tabled, Examination):
     @property
     def groups(self) -> dict[str, tuple[Finding, ...]]:
         """Findings by group, in the order of `GROUPS`."""
-        by_name = {
-            name: tuple(finding for finding in self.findings if finding.scenario.group == name)
-            for name in GROUPS
-        }
+        by_name = {name: tuple(one for one in self.findings if one.scenario.group == name) for name in GROUPS}
         return {name: findings for name, findings in by_name.items() if findings}
 
     @property
     def judged(self) -> tuple[Finding, ...]:
         """Findings that the verdict rests on."""
-        counted = tuple(
-            finding for finding in self.findings if self.strict or finding.scenario.group != TIMING
-        )
+        counted = tuple(one for one in self.findings if self.strict or one.scenario.group != TIMING)
         return counted or self.findings
 
     def keeps_limit(self, finding: Finding) -> bool:
@@ -262,9 +257,12 @@ class Check(Drawable, Tabled, Examination):
             kept += [first, *[finding for finding in rest if self._share(finding) >= least]]
         return tuple(kept)
 
+    def fraction_after(self, finding: Finding) -> float:
+        """Greatest share that any load takes up of its limit of residual sway, the error bound included."""
+        return max(self._share_after(finding, load) for load in self.limit)
+
     def _share(self, finding: Finding) -> float:
-        after = max(self._share_after(finding, load) for load in self.limit)
-        return max(after, self._share_on_the_way(finding))
+        return max(self.fraction_after(finding), self._share_on_the_way(finding))
 
     def _end_load(self, finding: Finding) -> float:
         return max(finding.residual[load] for load in list(self.limit)[-self.directions :])
@@ -272,14 +270,13 @@ class Check(Drawable, Tabled, Examination):
     def _group(self, name: str, findings: Sequence[Finding]) -> dict[str, Any]:
         load, worst = self.worst_of(findings)
         quantiles = np.quantile([self._end_load(finding) for finding in findings], QUANTILES)
+        levels = (f"{quantile:g}" for quantile in QUANTILES)
         return {
             "group": name,
             "what": GROUPS[name],
             "rows": len(findings),
             "passed": all(map(self.keeps_limit, findings)),
             "counts": self.strict or name != TIMING,
-            "quantiles_m": {
-                f"{quantile:g}": float(q) for quantile, q in zip(QUANTILES, quantiles, strict=True)
-            },
+            "quantiles_m": dict(zip(levels, quantiles.tolist(), strict=True)),
             "worst": {"load": load, "row": worst.scenario.row, "residual_peak_m": worst.residual[load]},
         }

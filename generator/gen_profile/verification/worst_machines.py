@@ -27,22 +27,6 @@ SAME = 1e-3  # of its range, by which two machines must differ in some parameter
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class RangeSearch:
-    """What a search came to.
-
-    Attributes
-    ----------
-    machines : tuple of Scenario
-        The worst ones that are not among those that were to be tried anyway.
-    tried : int
-        Number of machines looked at.
-    """
-
-    machines: tuple[Scenario, ...] = ()
-    tried: int = 0
-
-
-@attrs.frozen(kw_only=True, eq=False)
 class _Way:
     """Machines in ranges of their parameters, and how the drives follow; their lag may have a range, too."""
 
@@ -79,7 +63,7 @@ def worst_machines(
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
     progress: Progress = no_progress,
-) -> RangeSearch:
+) -> tuple[tuple[Scenario, ...], int]:
     """Search the ranges of a check, and of the drives' lag, for the machines that setpoints suit least.
 
     Parameters
@@ -92,6 +76,13 @@ def worst_machines(
     progress : callable
         Told of a compilation, which takes seconds.
 
+    Returns
+    -------
+    machines : tuple of Scenario
+        The worst ones that are not among the others.
+    tried : int
+        Number of machines looked at.
+
     Raises
     ------
     SpecError
@@ -100,7 +91,7 @@ def worst_machines(
     """
     ways = list(_ways(spec, float(setpoints.times[-1])))
     if not ways:
-        return RangeSearch()
+        return (), 0
     machines: list[Scenario] = []
     tried = 0
     with many_machines(spec.machine(), progress) as runs:
@@ -111,7 +102,7 @@ def worst_machines(
             matching = [row for row in rows if (follows_exactly(row) if exact else row.group == way.group)]
             machines += [way.scenario(place) for place in _new(places, [way.place(row) for row in matching])]
     numbered = (attrs.evolve(row, row=len(rows) + index) for index, row in enumerate(machines))
-    return RangeSearch(machines=tuple(numbered), tried=tried)
+    return tuple(numbered), tried
 
 
 def _ways(spec: Spec, duration: float) -> Iterator[_Way]:
@@ -139,7 +130,8 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
     spec, box = way.spec, way.box
     since, sway = standstill(spec, setpoints), spec.limits.sway
     begun = start(box.phases, len(box.ranges))
-    step = COARSE / _fastest(box, begun.places)
+    rates = eigenvalues_at(box.plant, box.machines(begun.places), box.ends)
+    step = COARSE / max(float(np.abs(at_end).max()) for at_end in rates)
     feed = _coarse(way, setpoints, step)
     feed = followed_up(feed, watched(spec, setpoints, COARSE), spec.move.final_velocity)
     limits = np.array(list(spec.check.residual_sway.values()))
@@ -159,12 +151,6 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
         return np.stack([*figures, peaks[:, -1] / sway] if sway is not None else figures, axis=1)
 
     return worst_places(shares, begun, KEPT)
-
-
-def _fastest(box: Box, places: Array) -> float:
-    """Greatest rate in 1/s at which any of some machines changes."""
-    machines = box.machines(places)
-    return max(float(np.abs(rates).max()) for rates in eigenvalues_at(box.plant, machines, box.ends))
 
 
 def _coarse(way: _Way, setpoints: SampledProfile, step: float) -> Feed:

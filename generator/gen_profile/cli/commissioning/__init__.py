@@ -1,5 +1,3 @@
 """Commands on site: what is measured there, and what follows from it."""
 
-from gen_profile.cli.commissioning import commission, identify, log_swing
-
-__all__ = ["commission", "identify", "log_swing"]
+from gen_profile.cli.commissioning import commission, identify, log_swing  # noqa: F401  # each adds its commands

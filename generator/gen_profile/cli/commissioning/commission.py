@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext, redirect_stdout
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,15 +13,21 @@ from gen_profile.cli.commands import cli, design
 from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
-from gen_profile.cli.options import PathType, SpecChoice, complete_presets, output_options, require_formats
-from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.options import (
+    PathType,
+    SpecChoice,
+    output_options,
+    preset_option,
+    repeatable,
+    require_formats,
+)
+from gen_profile.cli.outcome import as_json, print_outcome
 from gen_profile.cli.report import report
 from gen_profile.errors import GenProfileError, OutputError
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from gen_profile.spec.model import Spec
 
@@ -45,13 +52,8 @@ Words = tuple[str, ...]
 
 @cli.command(epilog="Example: gen-profile commission crane.toml --export plc --to opc.tcp://10.0.0.5:4840")
 @click.argument("path", metavar="SPEC.toml", type=PathType())
-@click.option(
-    "--preset",
-    metavar="NAME",
-    shell_complete=complete_presets,
-    help="What a spec that is not there begins as.",
-)
-@click.option("--set", "overrides", metavar="KEY=VALUE", multiple=True, help="A key of it. Repeatable.")
+@preset_option("What a spec that is not there begins as.")
+@repeatable("--set", "KEY=VALUE", "A key of it.", into="overrides")
 @click.option(
     "--swing", metavar="CSV|URL", help="Log of a free swing, or a phone's address, as for log-swing."
 )
@@ -63,13 +65,13 @@ Words = tuple[str, ...]
     default=60.0,
     help="To log the phone for; 60 s.",
 )
-@click.option("--export", "formats", metavar="FORMAT", multiple=True, help="Format to write. Repeatable.")
+@repeatable("--export", "FORMAT", "Format to write.", into="formats")
 @click.option(
     "--to", "url", metavar="URL", help="Controller to deploy to, as for deploy; an empty text for none."
 )
 @click.option("--yes", is_flag=True, help="Ask nothing: what no option answers stays as it is.")
 @output_options
-def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
+def commission(path: Path, *, yes: bool, **options: Any) -> None:
     """Go from a tape measure to a controller, step by step.
 
     Measure, log a swing, identify, design, prove, report, deploy, and record it. What no option answers is
@@ -78,7 +80,7 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
     require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
     run = _Guide(click.get_current_context(), options, yes)
     require_formats(options["formats"])
-    with redirect_stdout(sys.stderr) if as_json else nullcontext():
+    with redirect_stdout(sys.stderr) if as_json() else nullcontext():
         _announce("1. The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
         _announce("2. A swing, which tells where the rope's pendulum really ends")
@@ -96,9 +98,8 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
         page = path.with_suffix(".html")
         run.call(report, spec_path=files[0], path=page, no_compare=True)
         record = None
-        if url and (
-            yes or click.confirm(f"Does the axis stand still, and may {files[0]} be put to use?", err=True)
-        ):
+        question = f"Does the axis stand still, and may {files[0]} be put to use?"
+        if url and (yes or click.confirm(question, err=True)):
             _announce("5. Into the controller")
             run.call(deploy, artefact=files[0], url=url)
             record = files[0].parent / "deployments.json"
@@ -109,7 +110,7 @@ def commission(path: Path, *, as_json: bool, yes: bool, **options: Any) -> None:
         "record": record and str(record),
     }
     written = ", ".join(str(one) for one in (path, *files, page, record) if one)
-    print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.", as_json)
+    print_outcome(document, f"Done: {written}. Each later run tells more: gen-profile learn.")
 
 
 commission.params += [one for other, names in TAKEN.items() for one in other.params if one.name in names]
@@ -144,14 +145,11 @@ class _Guide:
             return given, readings
         self._preset = self.answer("preset", "Most like which of gen-profile presets", "bay-crane")
         spec = SpecChoice(None, self._preset, given).spec()
-        asked: dict[str, tuple[str, object]] = {
-            f"plant.{q.name}": (
-                f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)",
-                spec.plant.parameters[q.name],
-            )
-            for q in spec.machine().parameters
-            if q.name != "g" and not any(one.startswith(f"{q.name}=") for one in readings)
-        }
+        asked: dict[str, tuple[str, object]] = {}
+        for q in spec.machine().parameters:
+            if q.name != "g" and not any(one.startswith(f"{q.name}=") for one in readings):
+                question = f"{q.name}, {q.description}, in {q.unit} (or as 6.2±0.1)"
+                asked[f"plant.{q.name}"] = (question, spec.plant.parameters[q.name])
         if len(spec.machine().actuated) == 1:
             asked |= {key: (question, value(spec)) for key, (question, value) in ASKED.items()}
         for key, (question, value) in asked.items():
@@ -180,11 +178,8 @@ class _Guide:
 
     def logged(self, path: Path) -> tuple[Path | None, dict[str, str]]:
         """Give the log of a swing, which a phone may write now, and what it is a log of."""
-        from pathlib import Path
-
-        swing = self.answer(
-            "swing", "Log of a free swing: a file, or a phone's address; nothing for none", ""
-        )
+        question = "Log of a free swing: a file, or a phone's address; nothing for none"
+        swing = self.answer("swing", question, "")
         if not swing.startswith("http:"):
             if swing and not Path(swing).is_file():
                 raise OutputError(f"There is no log {swing}; nothing was written.")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,21 +12,20 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import (
     InputFile,
-    OutputFile,
     PathType,
     SpecChoice,
     output_options,
     plot_option,
+    repeatable,
     require_formats,
     spec_options,
+    spec_output_option,
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.identification.measurements import SwingLog
     from gen_profile.spec.model import Spec
 
@@ -60,13 +60,9 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
         if not comma:
             raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
 
-        def read(path: Path, spec: Spec, after: float = 0.0) -> SwingLog:
-            from gen_profile.identification.identify import read_swing
+        from gen_profile.identification.identify import read_swing
 
-            return read_swing(
-                path, spec, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit, after=after
-            )
-
+        read = partial(read_swing, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit)
         return command(read=read, **options)
 
     return reading
@@ -74,19 +70,17 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @cli.command(epilog="Example: gen-profile identify crane.toml --measured L1=6.2±0.1 --period 51.3±0.3/10")
 @spec_options
-@click.option(
+@repeatable(
     "--measured",
-    "readings",
-    metavar="NAME=VALUE±U",
-    multiple=True,
-    help="A parameter read off a tape or scale, with its standard deviation (+- will do for ±). Repeatable.",
+    "NAME=VALUE±U",
+    "A parameter read off a tape or scale, with its standard deviation (+- will do for ±).",
+    into="readings",
 )
-@click.option(
+@repeatable(
     "--period",
-    "periods",
-    metavar="[MODE:]S±U[/N]",
-    multiple=True,
-    help="N small swings by stopwatch, of the slowest mode (1) by default. Repeatable.",
+    "[MODE:]S±U[/N]",
+    "N small swings by stopwatch, of the slowest mode (1) by default.",
+    into="periods",
 )
 @click.option(
     "--swing",
@@ -103,21 +97,11 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     default=0.0,
     help="Leave out what the log holds before this time; of dates, so long after the first.",
 )
-@click.option(
-    "--free",
-    metavar="NAME",
-    multiple=True,
-    help="Identify a parameter that was not read directly. Repeatable.",
-)
+@repeatable("--free", "NAME", "Identify a parameter that was not read directly.")
 @click.option(
     "--at", metavar="POSITION,…", help="Where the axes stood, in m or rad; at the move's target by default."
 )
-@click.option(
-    "--out",
-    type=OutputFile(replaces="spec_path"),
-    default="identified.toml",
-    help="Spec to write; ./identified.toml by default.",
-)
+@spec_output_option("identified.toml")
 @plot_option
 @output_options
 def identify(
@@ -132,29 +116,35 @@ def identify(
     at: str | None,
     out: Path,
     picture: Path | None,
-    as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
     from gen_profile.cli import words
     from gen_profile.identification.identify import identify as run
     from gen_profile.identification.identify import write_spec
     from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
-    from gen_profile.spec.reading import parse_spec
-    from gen_profile.spec.text import changed_text
 
-    text, source, folder = chosen.text()
-    spec = parse_spec(text, chosen.overrides, source, folder)
+    spec, rewritten = _to_change(chosen)
     if picture is not None and log is None:
         raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
     measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
     with progress() as tell:
         if log is not None:
             tell("reading the log")
-            measurements.append(read(log, spec, after))
+            measurements.append(read(log, spec, after=after))
         identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
         draw(identified, picture, tell)
-        write_spec(identified.spec, out, changed_text(text, chosen.overrides, spec, identified.spec, folder))
-    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out), as_json)
+        write_spec(identified.spec, out, rewritten(identified.spec))
+    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out))
+
+
+def _to_change(chosen: SpecChoice) -> tuple[Spec, Callable[[Spec], str]]:
+    """Read a spec, and give what writes another one into its text."""
+    from gen_profile.spec.reading import parse_spec
+    from gen_profile.spec.text import changed_text
+
+    text, source, folder = chosen.text()
+    spec = parse_spec(text, chosen.overrides, source, folder)
+    return spec, lambda other: changed_text(text, chosen.overrides, spec, other, folder)
 
 
 def _positions(text: str) -> list[float]:
@@ -175,25 +165,16 @@ def _positions(text: str) -> list[float]:
     type=InputFile(),
     help="The file whose setpoints the axes followed in these runs.",
 )
-@click.option(
-    "--seen",
-    metavar="LOAD=M±M",
-    multiple=True,
-    help="Greatest sway in m after a run as it was seen, within a bound (+- will do for ±). Repeatable.",
+@repeatable(
+    "--seen", "LOAD=M±M", "Greatest sway in m after a run as it was seen, within a bound (+- will do for ±)."
 )
 @log_options
-@click.option(
-    "--out",
-    type=OutputFile(replaces="spec_path"),
-    default="learned.toml",
-    help="Spec to write; ./learned.toml by default.",
-)
-@click.option(
+@spec_output_option("learned.toml")
+@repeatable(
     "--export",
-    "formats",
-    metavar="FORMAT",
-    multiple=True,
-    help="Design for the ranges that are left, check, and write in this format. Repeatable.",
+    "FORMAT",
+    "Design for the ranges that are left, check, and write in this format.",
+    into="formats",
 )
 @click.option(
     "--folder",
@@ -213,7 +194,6 @@ def learn(
     out: Path,
     formats: tuple[str, ...],
     folder: Path,
-    as_json: bool,
 ) -> None:
     """Narrow a spec's ranges by what runs of a motion showed.
 
@@ -224,23 +204,20 @@ def learn(
     from gen_profile.identification.identify import write_spec
     from gen_profile.identification.learning import learn as run
     from gen_profile.identification.measurements import parse_reading
-    from gen_profile.spec.reading import parse_spec
-    from gen_profile.spec.text import changed_text
     from gen_profile.verification.check import replayed
 
-    text, source, place = chosen.text()
-    spec = parse_spec(text, chosen.overrides, source, place)
+    spec, rewritten = _to_change(chosen)
     require_formats(formats)
     sights = [parse_reading(one, "seen") for one in seen]
     with progress() as tell:
         tell("reading the runs")
         setpoints = replayed(played, spec)
         learned = run(spec, setpoints, [*(read(log, spec) for log in logs), *sights], tell)
-        write_spec(learned.spec, out, changed_text(text, chosen.overrides, spec, learned.spec, place))
+        write_spec(learned.spec, out, rewritten(learned.spec))
         made = design(learned.spec, formats, folder, progress=tell) if formats else None
     document = {**learned.to_dict(), "path": str(out), "design": None if made is None else made.to_dict()}
     text = words.learning(learned, out)
-    print_outcome(document, text if made is None else f"{text}\n{words.design(made)}", as_json)
+    print_outcome(document, text if made is None else f"{text}\n{words.design(made)}")
     if made is not None:
         warn(made.check)
         if not made.passed and made.check is not None:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, client_options
-from gen_profile.cli.options import Count, OutputFile, output_options
+from gen_profile.cli.options import Count, OutputFile, bitrate_option, output_options
 from gen_profile.cli.outcome import print_outcome, print_warnings
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.identification.encoder import Encoder
     from gen_profile.motion.profile import Array
 
@@ -41,12 +40,7 @@ DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and colu
 @click.option(
     "--counts", type=Count(1, 2**32), help="Of a turn of the encoder; it is asked for them by default."
 )
-@click.option(
-    "--bitrate",
-    type=Count(10_000, 1_000_000),
-    default=500_000,
-    help="Of the CAN channel in bit/s, where no system sets it; 500000 by default.",
-)
+@bitrate_option("CAN channel")
 @click.option(
     "--unit", default="rad", metavar="UNIT", help="Of its values, for the column's name; rad by default."
 )
@@ -61,7 +55,6 @@ def log_swing(
     counts: int | None,
     bitrate: int,
     unit: str,
-    as_json: bool,
     **security: Any,
 ) -> None:
     """Log how a load swings, for identify and learn, until Ctrl-C.
@@ -99,7 +92,7 @@ def log_swing(
     deliver(out, "\n".join([",".join(("Time (s)", *columns)), *lines, ""]).encode("utf-8"))
     lasts = float(table[-1, 0])
     document = {"path": str(out), "samples": len(table), "lasts_s": lasts, "columns": list(columns)}
-    print_outcome(document, f"{len(table)} samples in {lasts:.1f} s: {out}", as_json)
+    print_outcome(document, f"{len(table)} samples in {lasts:.1f} s: {out}")
 
 
 def _encoder(source: str, node: str | None, counts: int | None, bitrate: int) -> Encoder:

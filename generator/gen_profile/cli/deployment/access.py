@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import click
 
-from gen_profile.cli.options import Count, PathType
+from gen_profile.cli.options import Count, PathType, with_options
 from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
 
@@ -25,65 +25,57 @@ _S7 = re.compile(r"s7://([^\s/@:]+)(?::(\d{1,5}))?/([0-7])/(\d{1,2})", re.ASCII)
 _ADS = re.compile(r"ads://(?:([^\s/@]+)/)?((?:\d{1,3}\.){5}\d{1,3}):(\d{1,5})", re.ASCII)
 MOST_PORT, MOST_SLOT, MOST_BLOCKS, MOST_BYTE = 65535, 31, 65535, 255
 PASSWORD = "GEN_PROFILE_PASSWORD"  # of the environment: command lines are seen by all
+# what speaks a protocol: a package, the extra that brings it, and its modules
+PACKAGES = {
+    "OPC UA": ("asyncua", "opcua", "asyncua", "cryptography"),
+    "S7": ("python-snap7", "s7", "snap7"),
+    "ADS": ("pyads", "ads", "pyads"),
+}
 
 
-def access_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Take a user, and the certificate of this side."""
-    for decorate in (
-        click.option(
-            "--user", default="", metavar="NAME", help=f"User there; password in {PASSWORD}, or asked."
-        ),
-        click.option(
-            "--certificate",
-            type=PathType(),
-            metavar="FILE",
-            help="PEM file with the certificate and key of this side; made if it is not there.",
-        ),
-    ):
-        command = decorate(command)
-    return command
-
-
-def client_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Take what a server is trusted by, and how it is spoken to."""
-    fingerprint = click.option(
+# a user, and the certificate of this side
+access_options = with_options(
+    click.option(
+        "--certificate",
+        type=PathType(),
+        metavar="FILE",
+        help="PEM file with the certificate and key of this side; made if it is not there.",
+    ),
+    click.option("--user", default="", metavar="NAME", help=f"User there; password in {PASSWORD}, or asked."),
+)
+# what a server is trusted by, and how it is spoken to
+client_options = with_options(
+    click.option(
         "--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared."
-    )
-    security = click.option(
+    ),
+    access_options,
+    click.option(
         "--security",
         type=click.Choice(["sign-and-encrypt", "sign", "none"]),
         default="sign-and-encrypt",
         help="Of the connection; sign-and-encrypt by default.",
-    )
-    return fingerprint(access_options(security(command)))
+    ),
+)
 
 
-def controller_options(*, required: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def controller_options(*, required: bool) -> Callable[[Any], Any]:
     """Take which controller, which block in it, and how it is reached, as `Access` has them."""
-
-    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
-        for option in (
-            click.option(
-                "--instance", default="", metavar="PATH", help="Which block, where the server shows several."
-            ),
-            click.option(
-                "--db",
-                "data_block",
-                type=Count(1, MOST_BLOCKS),
-                help="Data block of the block's arrays, for S7.",
-            ),
-            click.option(
-                "--to",
-                "url",
-                metavar="URL",
-                required=required,
-                help="Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
-            ),
-        ):
-            command = option(command)
-        return command
-
-    return lambda command: decorate(client_options(command))
+    return with_options(
+        click.option(
+            "--to",
+            "url",
+            metavar="URL",
+            required=required,
+            help="Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
+        ),
+        click.option(
+            "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
+        ),
+        click.option(
+            "--instance", default="", metavar="PATH", help="Which block, where the server shows several."
+        ),
+        client_options,
+    )
 
 
 @attrs.frozen(kw_only=True)
@@ -116,14 +108,9 @@ class Access:
         if self.url.startswith("ads:"):
             from gen_profile.deployment.ads import AdsAccess, AdsLink
 
-            host, net_id, ams_port = _matched(_ADS, self.url)
-            ads = AdsAccess(
-                url=self.url,
-                host=host or ".".join(net_id.split(".")[:4]),
-                net_id=net_id,
-                port=int(ams_port),
-                instance=self.instance,
-            )
+            host, net_id, ams_port = _groups(_ADS, self.url)
+            host, port = host or ".".join(net_id.split(".")[:4]), int(ams_port)
+            ads = AdsAccess(url=self.url, host=host, net_id=net_id, port=port, instance=self.instance)
             return AdsLink(ads, table)
         if self.data_block is None:
             from gen_profile.deployment.opcua import OpcUaLink
@@ -131,8 +118,8 @@ class Access:
             return OpcUaLink(self.opcua())
         from gen_profile.deployment.s7 import TCP_PORT, S7Access, S7Link
 
-        host, port, rack, slot = _matched(_S7, self.url)
-        place = {"port": int(port or TCP_PORT), "rack": int(rack), "slot": int(slot)}
+        host, tcp, rack, slot = _groups(_S7, self.url)
+        place = {"port": int(tcp or TCP_PORT), "rack": int(rack), "slot": int(slot)}
         return S7Link(S7Access(url=self.url, host=host, block=self.data_block, **place), table)
 
     def opcua(self) -> OpcUaAccess:
@@ -154,7 +141,7 @@ class Access:
         self._require_no_security("S7")
         if self.instance:
             raise SpecError("--instance: means nothing with S7, where --db names the block; leave it out.")
-        require_s7()
+        require_protocol("S7")
 
     def _require_ads(self) -> None:
         match = _ADS.fullmatch(self.url)
@@ -166,7 +153,7 @@ class Access:
         if self.data_block is not None:
             raise SpecError("--db: is for S7; leave it out, since ADS finds the block by its name.")
         self._require_no_security("ADS")
-        require_ads()
+        require_protocol("ADS")
 
     def _require_no_security(self, protocol: str) -> None:
         if self.security != "none":
@@ -199,27 +186,18 @@ class Access:
             )
         if self.security != "sign-and-encrypt" and self.user:
             raise SpecError(f"--user: its password would not be encrypted with --security {self.security}.")
-        require_opcua()
+        require_protocol("OPC UA")
 
 
-def _matched(pattern: re.Pattern[str], text: str) -> tuple[str, ...]:
+def _groups(pattern: re.Pattern[str], text: str) -> tuple[str, ...]:
     match = pattern.fullmatch(text)
     return () if match is None else match.groups()
 
 
-def require_opcua() -> None:
-    """Refuse to begin without the packages."""
-    require_installed("OPC UA needs the package asyncua", "opcua", "asyncua", "cryptography")
-
-
-def require_s7() -> None:
-    """Refuse to begin without the package."""
-    require_installed("S7 needs the package python-snap7", "s7", "snap7")
-
-
-def require_ads() -> None:
-    """Refuse to begin without the package."""
-    require_installed("ADS needs the package pyads", "ads", "pyads")
+def require_protocol(name: str) -> None:
+    """Refuse to begin without the packages that speak it."""
+    package, extra, *modules = PACKAGES[name]
+    require_installed(f"{name} needs the package {package}", extra, *modules)
 
 
 def password(user: str) -> str:

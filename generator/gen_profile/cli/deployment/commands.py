@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack, closing
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,19 +17,16 @@ from gen_profile.cli.deployment.access import (
     access_options,
     controller_options,
     password,
-    require_ads,
-    require_opcua,
-    require_s7,
+    require_protocol,
 )
-from gen_profile.cli.options import Count, InputFile, OutputFile, PathType, output_options
+from gen_profile.cli.options import Count, OutputFile, PathType, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
-from gen_profile.cli.signing import require_signature, signed_by_option, signing_key
+from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
 from gen_profile.errors import SpecError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from gen_profile.artefacts.signature import Key
     from gen_profile.deployment.mailbox import ControllerLink
@@ -52,12 +50,7 @@ if TYPE_CHECKING:
 )
 @click.option("--rollback", is_flag=True, help="Go back to this table, which the idle buffer holds.")
 @click.option("--by", default="", metavar="NAME", help="Who deploys, for the record; the user by default.")
-@click.option(
-    "--sign",
-    "key_path",
-    type=InputFile(),
-    help="Sign the record with this secret key, made by minisign -GW.",
-)
+@signing_option("record")
 @signed_by_option
 @output_options
 def deploy(
@@ -71,7 +64,6 @@ def deploy(
     by: str,
     key_path: Path | None,
     public_path: Path | None,
-    as_json: bool,
     **options: Any,
 ) -> None:
     """Put a playback block's table, a library's, or a planner's numbers into a controller.
@@ -90,12 +82,12 @@ def deploy(
     key = signing_key(key_path)
     require_signature(artefact, public_path)
     if watch:
-        _watch(artefact, access, seconds, log, as_json)
+        _watch(artefact, access, seconds, log)
     elif verify:
-        _verify(artefact, access, as_json)
+        _verify(artefact, access)
     else:
         document = _deploy(artefact, access, by or _user(), rollback=rollback)
-        print_outcome(document, _words(artefact, document), as_json)
+        print_outcome(document, _words(artefact, document))
         if key is not None:
             _sign(artefact, document, key)
 
@@ -119,7 +111,7 @@ def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[
             return append_record(artefact.parent, done.to_dict(), link.server, by)
 
 
-def _verify(artefact: Path, access: Access, as_json: bool) -> None:
+def _verify(artefact: Path, access: Access) -> None:
     """Tell whether the controller uses the table."""
     from gen_profile.deployment.record import recorded
 
@@ -127,7 +119,7 @@ def _verify(artefact: Path, access: Access, as_json: bool) -> None:
         table, link = verified(artefact, access, stack, tell)
         entry = recorded(artefact.parent, table.hashes["table_sha256"], link.server)
         document = {"action": "verified", "controller": link.server, **table.hashes, "record": entry}
-    print_outcome(document, _words(artefact, document), as_json)
+    print_outcome(document, _words(artefact, document))
 
 
 def verified(
@@ -147,7 +139,7 @@ def verified(
     return table, link
 
 
-def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None, as_json: bool) -> None:
+def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None) -> None:
     """Hold what the block issues to what was proved, and end with what differs."""
     from gen_profile.cli.deployment.watching import reporting, words
     from gen_profile.deployment.watching.watch import watch
@@ -160,7 +152,7 @@ def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | No
         with reporting(table, log) as report:
             watched = watch(table, link, report, seconds=seconds)
     document = {"action": "watched", "controller": link.server, **table.hashes, **watched.to_dict()}
-    print_outcome(document, words(watched, table), as_json)
+    print_outcome(document, words(watched, table))
     if watched.fault is not None:
         click.echo(f"Error: {watched.fault}", err=True)
         raise SystemExit(watched.fault.exit_code)
@@ -213,7 +205,7 @@ def _user() -> str:
 )
 @click.option("--ads", is_flag=True, help="Speak ADS in place of OPC UA, with the block as MAIN.fbMotion.")
 @output_options
-def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool, **options: Any) -> None:
+def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, **options: Any) -> None:
     """Simulate a controller that runs a playback block, behind an OPC UA, ADS or S7 server."""
     given = options["user"] or options["certificate"] is not None
     if options["no_security"] and given:
@@ -233,7 +225,7 @@ def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, as_json: bool,
         name, shown = controller.instance, controller.fingerprint
         document = {"address": address, "instance": name, "fingerprint": shown}
         certified = f"\nSHA-256 of its certificate: {shown}" if shown else ""
-        print_outcome(document, f"{name} runs behind {address}{certified}\nCtrl-C ends it.", as_json)
+        print_outcome(document, f"{name} runs behind {address}{certified}\nCtrl-C ends it.")
 
     try:
         with progress() as tell:
@@ -248,17 +240,15 @@ def _simulated(
     data_block: int | None, *, ads: bool, port: int, certificate: Path | None, user: str, no_security: bool
 ) -> Callable[[BlockTable], SimulatedController]:
     """Choose the controller that is made of a table."""
+    require_protocol("ADS" if ads else "OPC UA" if data_block is None else "S7")
     if ads:
-        require_ads()
         from gen_profile.deployment.ads_sim import SimulatedAdsController
 
         return partial(SimulatedAdsController, port=port)
     if data_block is not None:
-        require_s7()
         from gen_profile.deployment.s7_sim import SimulatedS7Controller
 
         return partial(SimulatedS7Controller, number=data_block, port=port)
-    require_opcua()
     from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 
     options = PlcSimOptions(

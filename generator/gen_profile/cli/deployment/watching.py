@@ -171,9 +171,8 @@ def picture(table: BlockTable) -> Callable[[BlockState, float, int], Group]:
         for column, (name, unit) in enumerate(table.axes):
             figures = [f"{value[column]:.6g}" for value in state.setpoints]
             parts.append(Text(f"{name}: {figures[0]} {unit}, {figures[1]} {unit}/s, {figures[2]} {unit}/s²"))
-            parts += curves(
-                run.planned[0, :, column], run.seen[0, :, column], max(10, width - MARGIN), HEIGHT
-            )
+            planned, seen = run.planned[0, :, column], run.seen[0, :, column]
+            parts += curves(planned, seen, max(10, width - MARGIN), HEIGHT)
         return Group(*parts)
 
     return draw
@@ -185,9 +184,8 @@ def _head(figures: dict[str, Any]) -> str:
         head = f", {figures['time']:.2f} of {figures['duration']:.2f} s, rate {figures['rate']:.3g}"
         return f"{head}, timing changed" if figures["changed"] else head
     commanded = ", ".join(f"{value:.6g}" for value in figures["commanded"])
-    head = {TO_POSITION: f", to {commanded}", AT_VELOCITY: f", stick at {commanded}"}.get(
-        figures["command"], ""
-    )
+    words = {TO_POSITION: f", to {commanded}", AT_VELOCITY: f", stick at {commanded}"}
+    head = words.get(figures["command"], "")
     if figures["to_go"] > 0.0:
         head += f", {figures['to_go']:.1f} s to go"
     return head + (f"; the load may sway, because {why}" if (why := LOST.get(figures["promise"])) else "")

@@ -5,39 +5,40 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    SpecChoice,
+    output_options,
+    repeatable,
+    spec_options,
+    with_options,
+)
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
-from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words, units
+from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words
 from gen_profile.errors import OutputError, StreamAborted
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gen_profile.streaming.outcome import Source, StreamOutcome
 
 FEW_ROWS, CELL = 10_000, 16  # of a log of unknown length, and bytes of a number in it
 _MISSES = ("extrapolate", "hold", "stop")
 
 
-def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for decorate in (
-        click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
-        click.option(
-            "--interface",
-            metavar="NAME",
-            help="Interface as python-can names it: socketcan, pcan, slcan …",
-        ),
-    ):
-        command = decorate(command)
-    return command
+_bus_options = with_options(
+    click.option(
+        "--interface", metavar="NAME", help="Interface as python-can names it: socketcan, pcan, slcan …"
+    ),
+    click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
+)
 
 
 @cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
@@ -48,12 +49,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
 @click.option("--to-start", is_flag=True, help="Move slowly to the motion's start from anywhere, and end.")
-@click.option(
-    "--jog",
-    metavar="AXIS=DISTANCE",
-    multiple=True,
-    help="Move slowly by a distance in m (or rad) from anywhere, and end. Repeatable.",
-)
+@repeatable("--jog", "AXIS=DISTANCE", "Move slowly by a distance in m (or rad) from anywhere, and end.")
 @click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
 @click.option(
     "--self-test",
@@ -75,7 +71,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
     help="Write planned and actual positions side by side.",
 )
 @output_options
-def stream(table: Path | None, as_json: bool, **options: Any) -> None:
+def stream(table: Path | None, **options: Any) -> None:
     """Stream setpoints to CiA 402 drives, and stop them safely.
 
     Takes the log that --export can wrote, with its manifest beside it, a spec, which is designed and checked
@@ -93,12 +89,12 @@ def stream(table: Path | None, as_json: bool, **options: Any) -> None:
         if request.moves_slowly:
             slow = request.slow_motion(source, tell)
             if slow is None:
-                print_outcome(*at_start(source), as_json)
+                print_outcome(*at_start(source))
                 return
             source = slow
         if request.dry_run:
             plan = run.summary(source)
-            print_outcome(plan, plan_words(plan, units(source)), as_json)
+            print_outcome(plan, plan_words(plan, [axis.unit for axis in source.axes]))
             return
         port = request.port(source.spec.can)
         if table is not None:
@@ -114,7 +110,7 @@ def stream(table: Path | None, as_json: bool, **options: Any) -> None:
             tell=tell_phase,
             book=book,
         )
-    _conclude(outcome, table, as_json)
+    _conclude(outcome, table)
 
 
 @cli.command(
@@ -135,7 +131,6 @@ def drive_sim(
     miss: str,
     own_mapping: bool,
     eds: Path | None,
-    as_json: bool,
 ) -> None:
     """Simulate CiA 402 drives that move the machine's FMU.
 
@@ -176,7 +171,7 @@ def drive_sim(
     }
     axes = spec.machine().actuated
     at = [f"{axis.name} at {number(place)} {axis.unit}" for axis, place in zip(axes, places, strict=True)]
-    print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}", as_json)
+    print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}")
 
 
 for parameter in stream.params:
@@ -202,13 +197,14 @@ def _require_room(table: Path, source: Source) -> None:
         raise OutputError(f"--log {table}: its disk has no room for it ({free} bytes); choose another place.")
 
 
-def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None:
+def _conclude(outcome: StreamOutcome, table: Path | None) -> None:
     """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
     import attrs
 
     from gen_profile.artefacts.writing import deliver
 
-    code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [_aborted(outcome)])
+    aborted = f"Stream aborted: {outcome.record.reason}"
+    code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [aborted])
     unwritten: dict[str, Any] | None = None
     if table is not None:
         try:
@@ -219,19 +215,17 @@ def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None
             code, complaints = code or OutputError.exit_code, [*complaints, f"Error: {sentences}"]
             unwritten = {"type": type(error).__name__, "message": sentences, "exit_code": code}
     document = {**outcome.to_dict(), "error": unwritten}
-    said = [_refusal(print_outcome, document, outcome_words(outcome), as_json)]
+    said = [_refusal(print_outcome, document, outcome_words(outcome))]
     said += [_refusal(click.echo, complaint, err=True) for complaint in complaints]
     refusals = [refusal for refusal in said if refusal is not None]
     if refusals and not code:
         raise refusals[0]
-    if refusals:
-        _lead_nowhere()
+    if refusals:  # else Python would try again at its end, and end in a code of its own
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for number in (1, 2):
+            os.dup2(nowhere, number)
     if code:
         sys.exit(code)
-
-
-def _aborted(outcome: StreamOutcome) -> str:
-    return f"Stream aborted: {outcome.record.reason}"
 
 
 def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Exception | None:
@@ -241,10 +235,3 @@ def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Excep
     except (OSError, OutputError) as error:
         return error
     return None
-
-
-def _lead_nowhere() -> None:
-    """Give up streams that took nothing: Python would try again at its end, and end in a code of its own."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for number in (1, 2):
-        os.dup2(nowhere, number)

@@ -11,19 +11,17 @@ from typing import TYPE_CHECKING
 import attrs
 
 from gen_profile.cli.options import SpecChoice
-from gen_profile.cli.planner import planned, require_no_others, require_planner, status_line
+from gen_profile.cli.planner import planned, status_line
 from gen_profile.cli.progress import progress
 from gen_profile.cli.streaming.words import lateness_words
 from gen_profile.errors import SpecError
 from gen_profile.progress import Progress, no_progress
 
 if TYPE_CHECKING:
-    from gen_profile.progress import Progress
     from gen_profile.spec.can import CanSpec
     from gen_profile.streaming.outcome import Source
     from gen_profile_exporters.can.host.port import Port
     from gen_profile_exporters.can.streaming.record import Book
-    from gen_profile_exporters.exporter import Target
 
 VIRTUAL = ("virtual", "gen-profile")
 
@@ -66,16 +64,24 @@ class StreamRequest:
                 "--live terminal: standard error is no terminal to draw on; "
                 "leave it out, or use --live browser."
             )
-        if self.block is None:
-            require_planner(self.commands_path, self.live_parameters)
-        else:
-            specs = {
+        wrong = "commands a planner block; name it by --planner"
+        given: dict[str, object] = {
+            "--commands": self.commands_path,
+            "--live-parameter": self.live_parameters,
+        }
+        if self.block is not None:
+            wrong = "not with --planner; leave one of them out"
+            given = {
                 "A spec or log": self.chosen.path,
                 "--preset": self.chosen.preset,
                 "--set, --mode or --node": self._changed().overrides,
+                "--to-start": self.to_start,
+                "--jog": self.jog,
+                "--live": self.live,
             }
-            slow = {"--to-start": self.to_start, "--jog": self.jog, "--live": self.live}
-            require_no_others({**specs, **slow})
+        for option, value in given.items():
+            if value:
+                raise SpecError(f"{option}: {wrong}.")
 
     def source(self, tell: Progress) -> Source:
         """Take an artefact or a planner block, or design a motion for a spec, once there is a bus for it.
@@ -85,16 +91,13 @@ class StreamRequest:
         GenProfileError
         """
         from gen_profile.streaming.stream import designed, require_rest, verified
+        from gen_profile_exporters.can.streaming import joint_bus
         from gen_profile_exporters.exporter import target_of
 
         path, changed = self.chosen.path, self._changed()
         if self.block is not None:
-            return planned(
-                self.block,
-                self.commands_path,
-                self.live_parameters,
-                accept_unverified=self.accept_unverified,
-            )
+            commands, unverified = self.commands_path, self.accept_unverified
+            return planned(self.block, commands, self.live_parameters, accept_unverified=unverified)
         if path is not None and path.suffix.lower() != ".toml":
             if changed.preset is not None or changed.overrides:
                 raise SpecError(
@@ -106,7 +109,8 @@ class StreamRequest:
         if spec.can.nodes and any(override.startswith("can.node=") for override in changed.overrides):
             raise SpecError("--node: the spec states every node in can.nodes; change these.")
         require_rest(spec)
-        self._require_bus(target_of(spec))
+        if not self.dry_run:  # else there must be a bus
+            joint_bus.opened(self.port(spec.can), target_of(spec)).shutdown()
         return designed(spec, tell)
 
     def slow_motion(self, source: Source, tell: Progress) -> Source | None:
@@ -171,12 +175,6 @@ class StreamRequest:
 
     def _changed(self) -> SpecChoice:
         return self.chosen.changed({"can.mode": self.mode, "can.node": self.node})
-
-    def _require_bus(self, target: Target) -> None:
-        from gen_profile_exporters.can.streaming import joint_bus
-
-        if not self.dry_run:
-            joint_bus.opened(self.port(target.can), target).shutdown()
 
 
 def chosen_port(interface: str | None, channel: str | None, can: CanSpec, *, simulated: bool) -> Port:

@@ -10,11 +10,6 @@ if TYPE_CHECKING:
     from gen_profile_exporters.can.host.lateness import Lateness
 
 
-def units(source: Source) -> list[str]:
-    """Name the unit of each axis."""
-    return [axis.unit for axis in source.axes]
-
-
 def plan_words(plan: dict[str, Any], units: Sequence[str]) -> str:
     """Say what would be streamed, and what each drive would be set to."""
     axes = [
@@ -60,7 +55,7 @@ def outcome_words(outcome: StreamOutcome) -> str:
     lines += document["notes"]
     drive = document["drive"]
     if drive is not None:
-        unit = " or ".join(f"m{unit}" for unit in dict.fromkeys(units(outcome.source)))
+        unit = " or ".join(f"m{unit}" for unit in dict.fromkeys(axis.unit for axis in outcome.source.axes))
         lines.append(
             f"axis: {number(1e3 * drive['position_error_m'])} {unit} off the target, at most "
             f"{number(1e3 * drive['following_error_max_m'])} {unit} off the plan on the way"
