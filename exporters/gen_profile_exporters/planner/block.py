@@ -102,7 +102,7 @@ class PlannerConstants:
     sway_limit : float
         m, that the loads may sway after a motion.
     tolerated_sway : float
-        m, sway up to which nothing is done about it.
+        m, sway up to which nothing is done about it at rest; on the way, half of it.
     events : bool
         Whether the last events are outputs.
     zones : bool
