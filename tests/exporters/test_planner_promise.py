@@ -117,3 +117,13 @@ def test_a_rope_that_changes_while_a_stick_holds_the_axis_at_its_end_keeps_the_p
     assert out["fVelocity"].min() < -0.4
     assert out["nPromise"][-1] == 0
     assert left(out["fVelocity"][begin:], 3.5, 1000.0) < 1e-9
+
+
+def test_a_stop_on_a_rope_that_stands_takes_as_long_as_planned_where_it_might_change():
+    """What it leaves was reckoned from where the load was a cycle before, and was calmed for 8 s."""
+    text = planner_block(
+        preset_spec("bay-crane", ["planner.live_rate={L1=0.2}", "check.residual_sway=0.01"])
+    ).text
+    driver = standing(text, 6.0, 2000.0, 5.0).hold(12.0, bExecute=1, fTarget=35.0).hold(2.0, bStop=1)
+    driver.hold(driver.parts[-1]["fTimeToGo"][-1] + 2 * CYCLE)
+    assert not driver.parts[-1]["bBusy"][-1]

@@ -101,7 +101,7 @@ def test_what_a_far_end_of_a_long_motion_will_leave_is_not_calmed_before(hoistin
     with ClosedLoop(spec, text, Histories.of(spec)) as loop:
         run = loop.run(history)
     assert run.stands > 0
-    assert run.residual.max() < 0.003
+    assert run.residual.max() < 0.006
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ as elsewhere; what stands between ``@where_followed`` and ``@end`` is left out w
 on the way, and likewise what is for zones and events where there are none.
 
 - ``interface.st``: header and declarations.
-- ``inputs.st``, ``slots.st``, ``outputs.st``: what runs in every cycle; between them the committed future,
-  which is a velocity for every slot.
+- ``inputs.st``, ``slots.st``, ``setpoints.st``, ``outputs.st``: what runs in every cycle; between them the
+  committed future, which is a velocity for every slot.
 - ``pulses.st`` adds pulses to it where a slot begins. Of each as much is admitted as keeps every limit over
   the whole committed time. Where full speed is too much for one pulse, they grow and decline from slot to
   slot; ``shape.st`` tells what that adds to the decline that is committed already.
@@ -102,7 +102,7 @@ class PlannerConstants:
     sway_limit : float
         m, that the loads may sway after a motion.
     tolerated_sway : float
-        m, sway up to which nothing is done about it.
+        m, sway up to which nothing is done about it at rest; on the way, half of it.
     events : bool
         Whether the last events are outputs.
     zones : bool
