@@ -22,7 +22,7 @@ from gen_profile.solvers.direct.bezier import power_basis
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
 from gen_profile.solvers.direct.refinement import bisected, switching
-from gen_profile.solvers.direct.set_up import DirectOptions, Setup, on_mesh, set_up
+from gen_profile.solvers.direct.set_up import USUAL, DirectOptions, Setup, on_mesh, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.solvers.solution import HORIZONTAL, LATER, LONGER, WIDER, Optimum, Solution, Status
@@ -96,13 +96,11 @@ class Goal:
             if self.widened:
                 program.at_most(-linear[None], np.zeros(1))
             quadratic = self.effort_price * setup.effort_form
-            quadratic.resize(program.variables, program.variables)
-            return quadratic, linear
-        scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
-        expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
-        quadratic = expanded.copy()
+        else:
+            scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
+            expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
+            quadratic, linear[: len(slope)] = expanded.copy(), slope
         quadratic.resize(program.variables, program.variables)
-        linear[: len(slope)] = slope
         return quadratic, linear
 
     def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
@@ -156,7 +154,7 @@ def solve(
     near: ProgramSequence | None = None,
     *,
     coarse: bool = False,
-    options: DirectOptions | None = None,
+    options: DirectOptions = USUAL,
 ) -> Solution:
     """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
 
@@ -167,7 +165,7 @@ def solve(
         A motion to begin at, on its mesh, in place of standing still.
     coarse : bool
         On the first mesh only, which tells as well whether there is a motion.
-    options : DirectOptions, optional
+    options : DirectOptions
 
     Returns
     -------
