@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -57,10 +58,7 @@ def approximate(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
 
 def _grid(terms: Sequence[int]) -> Array:
     """List Chebyshev's nodes of all ranges, shape (places, ranges)."""
-    ones = [chebyshev.nodes(count).mid for count in terms]
-    return (
-        np.stack([g.ravel() for g in np.meshgrid(*ones, indexing="ij")], axis=1) if ones else np.zeros((1, 0))
-    )
+    return np.array(list(product(*(chebyshev.nodes(count).mid for count in terms))))
 
 
 def rounded(coefficients: Array) -> Array:

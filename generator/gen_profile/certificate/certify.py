@@ -1,9 +1,7 @@
 """Proving a bound of every machine's sway: boxes are halved until it is close, or there are too many."""
 
 from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
 from functools import partial
-from math import prod
 
 import attrs
 import numpy as np
@@ -11,7 +9,7 @@ import numpy as np
 from gen_profile.certificate import approximation
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.axis_motion import fitted
-from gen_profile.certificate.boxes import DyadicBox, halves, shares
+from gen_profile.certificate.boxes import DyadicBox, halves, shares, volume
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.packing import Motions
 from gen_profile.certificate.sway_limits import limits_of
@@ -253,7 +251,6 @@ def _prove(
 def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array) -> Attempt:
     """Keep the boxes with a bound."""
     proved = {box: proof for box, proof in done.items() if np.isfinite(proof.bound).all()}
-    volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in proved), Fraction(0))
     return Attempt(
         theorem=theorem,
         boxes=tuple(proved),
@@ -261,7 +258,7 @@ def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array
         scales=np.array([proof.scales for proof in proved.values()]),
         bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(largest_met)),
         largest_met=largest_met,
-        fraction=float(volume),
+        fraction=float(volume(proved)),
     )
 
 
@@ -284,11 +281,10 @@ def _prepared(
     """
     plant, ranges, watch = spec.machine(), ranges_of(spec), observation_time(spec)
     track = followed(spec, setpoints)
-    ends = zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True)
     box = Box(
         plant=plant,
         nominal=spec.plant.parameters,
-        ranges=dict(zip(ranges.names, ends, strict=True)),
+        ranges=ranges.ends,
         ends=(spec.move.start, spec.move.target),
         duration=float(track.times[-1]) + watch,
     )
