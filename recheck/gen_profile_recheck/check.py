@@ -238,9 +238,8 @@ class Case:
         """Prove all boxes, each of which needs nothing of the others."""
         proof, setpoints, pieces = self.proof, self.setpoints, list(pairwise(self.proof.knots))
         halves, axes = [(arb(end) - begin) / 2 for begin, end in pieces], []
-        for positions, ends, velocity in zip(
-            setpoints.positions, proof.ends, self.spec["move"]["final_velocity"], strict=True
-        ):
+        speeds = self.spec["move"]["final_velocity"]
+        for positions, ends, velocity in zip(setpoints.positions, proof.ends, speeds, strict=True):
             smooth = [quintic(half, *one) for half, one in zip(halves, ends, strict=True)]
             axes.append(list(axis_pieces(proof.knots, smooth, setpoints.times, positions, velocity)))
         start = [self.spec["move"]["initial"].get(name, 0.0) for name in self.machine.states]

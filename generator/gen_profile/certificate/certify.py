@@ -187,13 +187,16 @@ def _too_wide(box: Box, most: float) -> CertificateError:
 
 def _turns(box: Box, part: DyadicBox) -> Array:
     """Tell how far modes' phases at the end turn along each range of a part at most, in rad."""
-    low, high = map(np.array, shares(part))
-    turns = np.zeros(len(part))
-    for column in range(len(part)):
-        line = np.tile(0.5 * (low + high), (PLACES, 1))
-        line[:, column] = np.linspace(low[column], high[column], PLACES)
-        turns[column] = np.abs(np.diff(box.phases(line), axis=0)).sum(axis=0).max()
-    return turns
+    lines = _lines(*map(np.array, shares(part)))
+    return np.array([np.abs(np.diff(box.phases(line), axis=0)).sum(axis=0).max() for line in lines])
+
+
+def _lines(low: Array, high: Array) -> Array:
+    """List places along every range, in the middle of the others, (ranges, places, ranges)."""
+    lines = np.tile(0.5 * (low + high), (len(low), PLACES, 1))
+    for column, (begin, end) in enumerate(zip(low, high, strict=True)):
+        lines[column, :, column] = np.linspace(begin, end, PLACES)
+    return lines
 
 
 def _wanted(largest_met: Array, limits: Array, options: CertificateOptions) -> Array:
@@ -288,7 +291,8 @@ def _prepared(
         ends=(spec.move.start, spec.move.target),
         duration=float(track.times[-1]) + watch,
     )
-    fastest = float(box.phases(_middles(len(ranges.names))).max())
+    none, whole = np.zeros(len(ranges.names)), np.ones(len(ranges.names))
+    fastest = float(box.phases(np.concatenate([0.5 * whole[None], *_lines(none, whole)])).max())
     longest = options.radians_per_piece * box.duration / fastest
     limits = limits_of(spec)
     near = NEAR * min(limit.allowed for limit in limits)
@@ -309,11 +313,3 @@ def _prepared(
     if 3 * len(boxes) > (most := options.max_nodes / theorem.nodes):  # with the halves of each
         raise _too_wide(box, most)
     return theorem, boxes
-
-
-def _middles(count: int) -> Array:
-    """List places along all ranges, in the middle of the others, (places, ranges)."""
-    lines = np.full((max(count, 1), PLACES, count), 0.5)
-    for column in range(count):
-        lines[column, :, column] = np.linspace(0.0, 1.0, PLACES)
-    return lines.reshape(max(count, 1) * PLACES, count)
