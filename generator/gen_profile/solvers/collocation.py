@@ -129,10 +129,6 @@ class Trajectory:
         powers = local[:, None] ** np.arange(self.scheme.stages + 1)
         return np.asarray(np.einsum("tp,tps->ts", powers, self.coefficients()[interval]))
 
-    def on(self, mesh: Array) -> Trajectory:
-        """Interpolate to another mesh."""
-        return sampled(self, self.scheme, mesh)
-
     def blend(self, other: Trajectory, weight: float) -> Trajectory:
         """``self + weight · (other − self)`` on the same mesh."""
         return attrs.evolve(

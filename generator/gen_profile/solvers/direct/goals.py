@@ -11,7 +11,7 @@ from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.pontryagin import SNAP_TIME
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.direct.bezier import Piece, elevation, gram
+from gen_profile.solvers.direct.bezier import Piece, gram
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
 from gen_profile.solvers.direct.transcription import Iterate, Transcription
@@ -40,12 +40,7 @@ def effort_form(problem: Problem, piece: Piece) -> Array:
         return square(piece.derivative(3)) + (SNAP_TIME / problem.duration) ** 2 * square(piece.derivative(4))
     if problem.effort == "reference":
         # ÿ_ref = ÿ + τ y⃛, and ÿ counts as jerk times duration
-        jerk = piece.derivative(3)
-        rows = (
-            piece.derivative(2)
-            + (problem.tau or 0.0) / problem.duration * elevation(jerk.shape[-2] - 1) @ jerk
-        )
-        return square(rows) * problem.duration**2
+        return square(piece.leading(2, (problem.tau or 0.0) / problem.duration)) * problem.duration**2
     return square(piece.derivative(3))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
-from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.collocation import Trajectory, sampled
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 
@@ -46,7 +46,7 @@ def refine(
                 break
             meshes = [_split(solution.mesh, np.minimum(parts, most)) for most in MOST_PARTS]
         for mesh in meshes:
-            outcome = solve(canonical, solution.on(mesh))
+            outcome = solve(canonical, sampled(solution, solution.scheme, mesh))
             iterations += outcome.iterations
             if outcome.solution is not None:
                 break
