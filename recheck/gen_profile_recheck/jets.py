@@ -7,7 +7,7 @@ part's key stands for ε_k. What multiplies ε₀ in f(x + ε₀ a) is the deriv
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate, cycle, repeat
 from math import factorial
 from operator import mul
@@ -75,14 +75,12 @@ def parts_of(x: Scalar) -> dict[int, Scalar]:
     return x.parts if isinstance(x, Jet) else {0: x}
 
 
-def _expanded(x: Jet, slopes: Iterable[Scalar]) -> Jet:
+def _expanded(x: Jet, slopes: Iterator[Scalar]) -> Jet:
     """Sum up powers of the part with units, each times the next of a function's slopes over a factorial."""
-    rest = Jet({key: value for key, value in x.parts.items() if key})
-    total, power = Jet({}), Jet({0: arb(1)})
-    for slope in slopes:
-        if not power.parts:
-            break
-        total, power = total + power * slope, power * rest
+    rest = power = Jet({key: value for key, value in x.parts.items() if key})
+    total = Jet({0: next(slopes)})
+    while power.parts:
+        total, power = total + power * next(slopes), power * rest
     return total
 
 
