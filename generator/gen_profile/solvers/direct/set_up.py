@@ -121,7 +121,7 @@ class Setup:
 
 
 def set_up(
-    problem: Problem, others: Sequence[Mapping[str, float]] = (), options: DirectOptions = USUAL
+    problem: Problem, others: Sequence[Mapping[str, float]] = (), options: DirectOptions | None = None
 ) -> tuple[Setup, tuple[str, ...]]:
     """Transcribe a problem; also name the parameters whose sensitivities are left out, as others imply them.
 
@@ -130,8 +130,9 @@ def set_up(
     problem : Problem
     others : sequence of mapping of str to float
         Parameters of further machines whose residual sway shall be bounded, with the nominal one's.
-    options : DirectOptions
+    options : DirectOptions, optional
     """
+    options = options or USUAL
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     canonical = canonical_problem(problem, system)
     asked, redundant = independence(canonical)

@@ -22,7 +22,7 @@ from gen_profile.solvers.direct.bezier import power_basis
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
 from gen_profile.solvers.direct.refinement import bisected, switching
-from gen_profile.solvers.direct.set_up import USUAL, DirectOptions, Setup, on_mesh, set_up
+from gen_profile.solvers.direct.set_up import DirectOptions, Setup, on_mesh, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.solvers.solution import HORIZONTAL, LATER, LONGER, WIDER, Optimum, Solution, Status
@@ -169,7 +169,7 @@ def solve(
     near: ProgramSequence | None = None,
     *,
     coarse: bool = False,
-    options: DirectOptions = USUAL,
+    options: DirectOptions | None = None,
 ) -> Solution:
     """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
 
@@ -180,7 +180,7 @@ def solve(
         A motion to begin at, on its mesh, in place of standing still.
     coarse : bool
         On the first mesh only, which tells as well whether there is a motion.
-    options : DirectOptions
+    options : DirectOptions, optional
 
     Returns
     -------
