@@ -10,7 +10,7 @@ derivative of T_k is greater on [−1, 1] than at 1. One such series tells how m
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import product
 from math import log, pi
@@ -40,7 +40,6 @@ class MachineState:
     axes: Sequence[Values]  # position, velocity, acceleration
     k: SimpleNamespace
     places: Values
-    key: Any  # of these places
 
 
 @dataclass(frozen=True)
@@ -132,7 +131,7 @@ def kronecker(matrices: Any) -> arb_mat:
     return arb_mat(result)
 
 
-@dataclass
+@dataclass(frozen=True)
 class MachineBox:
     """Machines whose parameters lie in a part of their ranges.
 
@@ -144,18 +143,15 @@ class MachineBox:
     ranges: Mapping[str, tuple[float, float]]
     parts: Sequence[tuple[int, int]]
     terms: tuple[int, ...]
-    _constants: dict[Any, SimpleNamespace] = field(default_factory=dict)
 
-    def constants(self, places: Sequence[Any], key: Any) -> SimpleNamespace:
+    def constants(self, places: Sequence[Any]) -> SimpleNamespace:
         """Give the machine's constants at places of its parameters."""
-        if key not in self._constants:
-            p: dict[str, Any] = {name: arb(value) for name, value in self.nominal.items()}
-            for (name, (low, high)), (level, index), u in zip(
-                self.ranges.items(), self.parts, places, strict=True
-            ):
-                p[name] = low + (arb(high) - low) * (index + (u + 1) / 2) / 2**level
-            self._constants[key] = self.machine.constants(p)
-        return self._constants[key]
+        p: dict[str, Any] = {name: arb(value) for name, value in self.nominal.items()}
+        for (name, (low, high)), (level, index), u in zip(
+            self.ranges.items(), self.parts, places, strict=True
+        ):
+            p[name] = low + (arb(high) - low) * (index + (u + 1) / 2) / 2**level
+        return self.machine.constants(p)
 
 
 @dataclass
@@ -185,12 +181,12 @@ class MotionPiece:
         columns = [one.transpose().tolist() for one in at]
         axes = self._axes(lambda poly: arb_series(poly.coeffs(), terms + 1))
         for number, places in enumerate(product(*map(nodes, counts))):
-            key, x = (counts, number), [arb_series(column[number], terms + 1) for column in columns]
-            k = self.box.constants(places, key)
+            x = [arb_series(column[number], terms + 1) for column in columns]
+            k = self.box.constants(places)
             lifts = self.box.machine.input_matrix(x[:n], axes[0], k)
             y = x[:n] + carried(x[n:], lifts, axes[1])
             slope = [one.derivative() / self.half for one in y]
-            yield MachineState(x, y, slope, lifts, axes, k, list(places), key)
+            yield MachineState(x, y, slope, lifts, axes, k, list(places))
 
     def around(self, variable: int | None = None, terms: int = 1) -> MachineState:
         """Take all times and parameters: balls, or series of one of them (0 is time) about any place."""
@@ -220,12 +216,12 @@ class MotionPiece:
             lambda poly: arb_series(poly(whole).coeffs(), terms) if variable == 0 else poly(wide(1))
         )
         a, v, dv = axes
-        k = self.box.constants(places, key := (variable, terms))
+        k = self.box.constants(places)
         lifts = self.box.machine.input_matrix(x[:n], a, k)
         speed = self.box.machine.speed(moved(x, slope, INNER), moved(a, v, INNER), moved(v, dv, INNER), k)
         y = x[:n] + [parts_of(one)[0] for one in speed]
         slope = slope[:n] + [along(one, INNER) for one in speed]
-        return MachineState(x, y, slope, lifts, axes, k, places, key)
+        return MachineState(x, y, slope, lifts, axes, k, places)
 
     def enclosed(
         self, function: Callable[[MachineState], Values], fits: Callable[[list[arb]], bool], most: int = 20

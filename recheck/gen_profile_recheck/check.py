@@ -102,13 +102,9 @@ class Case:
         require(spec["plant"].get("type") in MACHINES, "not covered: machines that are not in machines.py")
         require(spec["actuator"] == {"type": "ideal"}, "not covered: drives that lag behind their setpoints")
         machine, limits, initial = MACHINES[spec["plant"]["type"]], spec["limits"], spec["move"]["initial"]
-        tables: list[tuple[Any, Container[str]]] = [
-            (spec, OF_SPEC),
-            (spec["check"], OF_CHECK),
-            (limits, OF_AXIS | {"sway", "axis"}),
-        ]
+        tables: list[tuple[Any, Container[str]]] = [(one, OF_AXIS) for one in limits["axis"].values()]
+        tables += [(spec, OF_SPEC), (spec["check"], OF_CHECK), (limits, OF_AXIS | {"sway", "axis"})]
         tables += [(limits["axis"], machine.axes), (initial, machine.states)]
-        tables += [(one, OF_AXIS) for one in limits["axis"].values()]
         more = [key for table, known in tables for key in table if key not in known]
         require(not more, f"not covered: {', '.join(more)} in the spec")
         self.machine, self.spec, self.document, self.ranges = machine, spec, document, ranges_of(spec)
@@ -217,10 +213,8 @@ class Case:
         )
         volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in parts), Fraction(0))
         apart = (not all(map(_meet, *pair)) for pair in combinations(parts, 2))
-        require(
-            inside and volume == 1 and all(apart),
-            "the boxes are not all machines of the ranges, each of them once",
-        )
+        whole = inside and volume == 1 and all(apart)
+        require(whole, "the boxes are not all machines of the ranges, each of them once")
 
     def claims(self) -> list[SwayClaim]:
         """List the bounds that are claimed, which must be all that the spec asks, and keep its limits."""
@@ -230,12 +224,9 @@ class Case:
         require(fits, "the certificate is about other limits than the spec's, or other loads")
         arrived = self.proof.knots.index(self.setpoints.times[-1])
         claims = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
-        kept, asked, (name, both) = (
-            [bounds[load] <= limits[load] for load in loads],
-            None,
-            self.machine.end_load,
-        )
+        kept, asked = [bounds[load] <= limits[load] for load in loads], None
         if sway is not None:
+            name, both = self.machine.end_load
             asked = {"load": name, "bound_m": way["bound_m"], "limit_m": ALLOWED * sway}
             kept.append(way["bound_m"] <= asked["limit_m"])
             claims.append(SwayClaim(both, 0, way["bound_m"]))
@@ -247,9 +238,8 @@ class Case:
         """Prove all boxes, each of which needs nothing of the others."""
         proof, setpoints, pieces = self.proof, self.setpoints, list(pairwise(self.proof.knots))
         halves, axes = [(arb(end) - begin) / 2 for begin, end in pieces], []
-        for positions, ends, velocity in zip(
-            setpoints.positions, proof.ends, self.spec["move"]["final_velocity"], strict=True
-        ):
+        speeds = self.spec["move"]["final_velocity"]
+        for positions, ends, velocity in zip(setpoints.positions, proof.ends, speeds, strict=True):
             smooth = [quintic(half, *one) for half, one in zip(halves, ends, strict=True)]
             axes.append(list(axis_pieces(proof.knots, smooth, setpoints.times, positions, velocity)))
         start = [self.spec["move"]["initial"].get(name, 0.0) for name in self.machine.states]

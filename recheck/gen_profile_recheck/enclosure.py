@@ -116,9 +116,6 @@ class PieceProof:
             one < MISSED * self.least**2 for one in residual[2 * self.n :]
         )
 
-    def _grows_little(self, residual: Sequence[arb]) -> bool:
-        return all(one * 2 * self.n * self.span < GROWTH for one in residual)
-
     def _step(self, error: arb, source: arb) -> tuple[arb, arb, list[arb]]:
         """Assume that errors keep below something, and prove it: the last, the greatest, of all entries."""
         time = 2 * self.piece.half
@@ -150,7 +147,8 @@ class PieceProof:
             changed = self.scale.times(matrix(s), s)
             return [(changed[i][j] + changed[j][i]) / arb(2) for i in indices for j in indices if j <= i]
 
-        found = iter(self.piece.enclosed(symmetric, self._grows_little, 12))
+        most = GROWTH / (2 * n * self.span)
+        found = iter(self.piece.enclosed(symmetric, lambda rest: all(one < most for one in rest), 12))
         entry = {(i, j): next(found) for i in indices for j in indices if j <= i}
         sides = ([entry[max(i, j), min(i, j)].size for j in indices if j != i] for i in indices)
         greatest = reduce(arb.max, (sum(row, start=entry[i, i].upper) for i, row in enumerate(sides)))

@@ -38,15 +38,8 @@ def _steepest(one: Expansion) -> int:
 
 
 def _half(one: Expansion, axis: int, side: int) -> Expansion:
-    if axis == 0:
-        return Expansion(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
-    return Expansion(one.coefficients * _halving_one(one.counts[1:], axis, side), one.counts, one.rest)
-
-
-@cache
-def _halving_one(counts: tuple[int, ...], axis: int, side: int) -> arb_mat:
-    sides = (side if number == axis else 0 for number in range(1, 1 + len(counts)))
-    return kronecker(map(_halving, counts, sides)).transpose()
+    time, *own = (_halving(count, side * (number == axis)) for number, count in enumerate(one.counts))
+    return Expansion(time * one.coefficients * kronecker(own).transpose(), one.counts, one.rest)
 
 
 @cache

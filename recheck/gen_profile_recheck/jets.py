@@ -7,8 +7,10 @@ part's key stands for ε_k. What multiplies ε₀ in f(x + ε₀ a) is the deriv
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import cycle
+from collections.abc import Callable, Iterator, Sequence
+from itertools import accumulate, cycle, repeat
+from math import factorial
+from operator import mul
 from typing import Any
 
 from flint import arb
@@ -73,40 +75,34 @@ def parts_of(x: Scalar) -> dict[int, Scalar]:
     return x.parts if isinstance(x, Jet) else {0: x}
 
 
-def _powers(x: Jet) -> list[Jet]:
-    """List the powers of the part with units, from the first one to the last that is something."""
+def _expanded(x: Jet, slopes: Iterator[Scalar]) -> Jet:
+    """Sum up powers of the part with units, each times the next of a function's slopes over a factorial."""
     rest = power = Jet({key: value for key, value in x.parts.items() if key})
-    powers = []
+    total = Jet({0: next(slopes)})
     while power.parts:
-        powers.append(power)
-        power = power * rest
-    return powers
+        total, power = total + power * next(slopes), power * rest
+    return total
 
 
 def inverse(x: Scalar) -> Scalar:
     """Give 1/x: of m + n, Σ (−n)^k / m^(k+1)."""
     if not isinstance(x, Jet):
         return 1 / x
-    once = factor = 1 / x.parts[0]
-    total = Jet({0: once})
-    for power in _powers(x):
-        factor = -(factor * once)
-        total = total + power * factor
-    return total
+    once = 1 / x.parts[0]
+    return _expanded(x, accumulate(repeat(-once), mul, initial=once))
 
 
 def sine_cosine(x: Scalar) -> tuple[Scalar, Scalar]:
     """Give sine and cosine, by their series of Taylor."""
+    sine, cosine = parts_of(x)[0].sin_cos()
     if not isinstance(x, Jet):
-        sine, cosine = x.sin_cos()
         return sine, cosine
-    sine, cosine = x.parts[0].sin_cos()
-    found, factor = (Jet({0: sine}), Jet({0: cosine})), arb(1)
-    slopes = cycle([(cosine, -sine), (-sine, -cosine), (-cosine, sine), (sine, cosine)])
-    for order, (power, pair) in enumerate(zip(_powers(x), slopes, strict=False), start=1):
-        factor /= order
-        found = found[0] + power * (pair[0] * factor), found[1] + power * (pair[1] * factor)
-    return found
+    slopes = [sine, cosine, -sine, -cosine]
+    first, second = (
+        _expanded(x, (slope * (arb(1) / factorial(order)) for order, slope in enumerate(cycle(each))))
+        for each in (slopes, slopes[1:] + slopes[:1])
+    )
+    return first, second
 
 
 def moved(values: Sequence[Scalar], directions: Sequence[Scalar], unit: int) -> list[Scalar]:
@@ -129,10 +125,7 @@ def derivatives(
     function: Callable[..., Sequence[Scalar]], *arguments: Sequence[Scalar]
 ) -> list[list[Scalar]]:
     """List the derivatives of all values of a function by all its arguments, a row for each value."""
-    columns, count = list[list[Scalar]](), 0
-    for one in arguments:
-        columns.append(
-            [moved([entry], [1], SINGLE << number)[0] for number, entry in enumerate(one, start=count)]
-        )
-        count += len(one)
-    return [[along(one, SINGLE << number) for number in range(count)] for one in function(*columns)]
+    units = [SINGLE << number for number in range(sum(map(len, arguments)))]
+    left = iter(units)
+    columns = [[moved([entry], [1], next(left))[0] for entry in one] for one in arguments]
+    return [[along(one, unit) for unit in units] for one in function(*columns)]

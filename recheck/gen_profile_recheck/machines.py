@@ -60,16 +60,17 @@ class Machine:
         """Give the change of (q, dq) for one of x, and with −v the other way round."""
         n = len(q)
         rows = self.input_matrix(moved(q, change[:n], OUTER), a, k)
-        carried = (along(_product(row, v), OUTER) for row in rows)
+        carried = (along(inner(row, v), OUTER) for row in rows)
         return [*change[:n], *(one + other for one, other in zip(change[n:], carried, strict=True))]
 
 
 def carried(values: Values, matrix: Sequence[Values], v: Values) -> list[Scalar]:
     """Add a matrix times a vector to values."""
-    return [one + _product(row, v) for one, row in zip(values, matrix, strict=True)]
+    return [one + inner(row, v) for one, row in zip(values, matrix, strict=True)]
 
 
-def _product(row: Values, v: Values) -> Scalar:
+def inner(row: Values, v: Values) -> Scalar:
+    """Give the inner product of two vectors."""
     return sum((one * other for one, other in zip(row, v, strict=True)), start=0)
 
 
@@ -223,7 +224,7 @@ def _tank_inputs(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]
 
 
 def _tank_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
-    return [_product(k.rise, [sine_cosine(one)[0] for one in q])]
+    return [inner(k.rise, [sine_cosine(one)[0] for one in q])]
 
 
 def _machine(names: str, directions: int, *equations: Callable[..., Any]) -> Machine:

@@ -119,9 +119,8 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
     return TimedSetpoints(times, cycle, positions, resolution)
 
 
-Table = tuple[
-    float, str, Sequence[Sequence[float]]
-]  # cycle in s, layout, positions in an axis' units or counts
+# cycle in s, layout, and positions in an axis' units or counts
+Table = tuple[float, str, Sequence[Sequence[float]]]
 
 
 def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Table:

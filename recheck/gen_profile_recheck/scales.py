@@ -20,6 +20,7 @@ from gen_profile_recheck.boxes import (
     nodes,
     wide,
 )
+from gen_profile_recheck.machines import inner
 from gen_profile_recheck.reading import require
 
 NODES = 5  # of each parameter for K
@@ -31,19 +32,14 @@ class PolynomialMatrix:
     """A matrix of polynomials of the parameters, with so many terms in each; `most` encloses its entries."""
 
     def __init__(self, entries: Any, counts: Sequence[int]) -> None:
-        self.entries, self.degrees = entries, list(product(*map(range, counts)))
-        self.known = dict[Any, Matrix]()
-        self.most = [[wide(sum(map(abs, map(arb, one)), start=arb(0))) for one in row] for row in entries]
+        self.entries = [[[arb(x) for x in entry] for entry in row] for row in entries]
+        self.degrees = list(product(*map(range, counts)))
+        self.most = [[wide(sum(map(abs, entry), start=arb(0))) for entry in row] for row in self.entries]
 
-    def at(self, places: Sequence[Any], key: Any) -> Matrix:
-        """Evaluate at places of the parameters; entries that are nothing are 0."""
-        if key not in self.known:
-            basis = [prod(map(chebyshev_value, each, places), start=arb(1)) for each in self.degrees]
-            pairs = ([zip(basis, entry, strict=True) for entry in row] for row in self.entries)
-            self.known[key] = [
-                [sum((x * arb(y) for x, y in one if y), start=0) for one in row] for row in pairs
-            ]
-        return self.known[key]
+    def at(self, places: Sequence[Any]) -> Matrix:
+        """Evaluate at places of the parameters."""
+        basis = [prod(map(chebyshev_value, each, places), start=arb(1)) for each in self.degrees]
+        return [[inner(basis, entry) for entry in row] for row in self.entries]
 
 
 class ScaleMatrix:
@@ -58,7 +54,7 @@ class ScaleMatrix:
         few = [1 if single else min(3, terms) for terms in piece.box.terms]
         counts = [1 if count == 1 else NODES for count in few]
         self.piece, self.scale = piece, PolynomialMatrix(entries, few)
-        middles = (self.scale.at(each, n) for n, each in enumerate(product(*map(nodes, counts))))
+        middles = (self.scale.at(each) for each in product(*map(nodes, counts)))
         values = arb_mat([arb_mat(one).inv().entries() for one in middles])
         columns = [
             [one.mid() for one in row]
@@ -81,8 +77,7 @@ class ScaleMatrix:
 
     def times(self, matrix: Matrix, s: MachineState, before: ScaleMatrix | None = None) -> Matrix:
         """Give S times a matrix times K, which may be another one's."""
-        nearly = (before or self).nearly.at(s.places, s.key)
-        return multiplied(multiplied(self.scale.at(s.places, s.key), matrix), nearly)
+        return multiplied(multiplied(self.scale.at(s.places), matrix), (before or self).nearly.at(s.places))
 
     def change(self, before: ScaleMatrix) -> arb:
         """Bound the norm of this S times the inverse of another."""
@@ -90,9 +85,7 @@ class ScaleMatrix:
 
     def length(self, vector: Sequence[arb]) -> arb:
         """Bound the length of S times a vector of balls."""
-        return norm(
-            [sum((a * b for a, b in zip(row, vector, strict=True)), start=arb(0)) for row in self.scale.most]
-        )
+        return norm([inner(row, vector) for row in self.scale.most])
 
     def per_length(self, matrix: Matrix) -> Matrix:
         """Give the rows of a matrix of balls times S⁻¹: each bounds what a unit of length changes."""
@@ -105,14 +98,9 @@ class ScaleMatrix:
 
 
 def multiplied(a: Matrix, b: Matrix) -> list[Values]:
-    """Multiply matrices many of whose entries are 0."""
+    """Multiply matrices."""
     columns = list(zip(*b, strict=True))
-
-    def entry(row: Sequence[Any], column: Sequence[Any]) -> Any:
-        pairs = zip(row, column, strict=True)
-        return sum((x * y for x, y in pairs if not (_nothing(x) or _nothing(y))), start=0)
-
-    return [[entry(row, column) for column in columns] for row in a]
+    return [[inner(row, column) for column in columns] for row in a]
 
 
 def norm(values: Sequence[Any]) -> arb:
@@ -126,7 +114,3 @@ def _norm(matrix: Matrix) -> arb:
     )
     rows, columns = (reduce(arb.max, one) for one in sums)
     return (rows * columns).abs_upper().sqrt().abs_upper()
-
-
-def _nothing(value: Any) -> bool:
-    return isinstance(value, int) and value == 0

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import gen_profile as gp
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import PlantSimulation, equations_of, motion_of
-from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.dynamics import parameter_rows
 
 ROUNDS = 5
 
@@ -26,7 +26,7 @@ def test_machines_of_a_preset(preset, capsys):
         return np.array([one.q_u for one in PlantSimulation(plant, plan.motion, machines, until).at(times)])
 
     acceleration, motion = equations_of(plant)[0], motion_of(plan.motion)
-    parameters = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
+    parameters = parameter_rows(plant, machines)
     shape = (2, len(machines), len(plant.unactuated))
 
     def slope(time, state):

@@ -20,7 +20,7 @@ from simulated_blocks import exported, poked
 from gen_profile.deployment.s7_sim import SimulatedS7Controller
 from gen_profile.deployment.table import read_table
 from gen_profile.evaluation.simulation import free_swing
-from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.dynamics import parameter_rows
 from gen_profile.spec.reading import preset_spec, preset_text
 
 pytestmark = pytest.mark.slow
@@ -301,7 +301,7 @@ def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
     look_at(page, "measure")
     times = np.arange(0.0, 6.0, 0.03)
     spec = preset_spec("paper")
-    longer = parameter_column(spec.machine(), {**spec.plant.parameters, "L1": 0.52})
+    longer = parameter_rows(spec.machine(), [{**spec.plant.parameters, "L1": 0.52}])
     start = np.array([[0.1, 0.1, 0.0, 0.0]])
     swung = free_swing(spec.machine(), longer, q_a=[0.3], starts=start, times=times)[1][0, :, 0]
     table = np.stack(

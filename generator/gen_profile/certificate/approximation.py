@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -57,10 +58,7 @@ def approximate(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
 
 def _grid(terms: Sequence[int]) -> Array:
     """List Chebyshev's nodes of all ranges, shape (places, ranges)."""
-    ones = [chebyshev.nodes(count).mid for count in terms]
-    return (
-        np.stack([g.ravel() for g in np.meshgrid(*ones, indexing="ij")], axis=1) if ones else np.zeros((1, 0))
-    )
+    return np.array(list(product(*(chebyshev.nodes(count).mid for count in terms))))
 
 
 def rounded(coefficients: Array) -> Array:
@@ -103,7 +101,8 @@ def scales(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
     whole[..., :n_u, :n_u], whole[..., n_u:, n_u:] = blocks
     values = np.moveaxis(whole[:, :, 1:], 2, -1)
     series = chebyshev.interpolate(values.reshape(*values.shape[:4], *theorem.scale_terms), len(ranges.names))
-    return _rounded_scales(series.reshape(*values.shape[:4], -1))
+    quantum = 2.0 ** np.round(np.log2(np.abs(series).max() * FINE))  # digits beyond need not be stored
+    return np.asarray(np.round(series / quantum) * quantum).reshape(*values.shape[:4], -1)
 
 
 def _energies(plant: Plant, machines: Array, q_a: Array) -> Array:
@@ -123,11 +122,8 @@ def _inertia(plant: Plant) -> Function | None:
     d = dynamics(plant)
     if not plant.bodies:
         return None
-    slopes = sym.jacobian(d.energy, d.dq_u).T
-    moving = {"q_u": d.q_u, "dq_u": d.dq_u, "dq_a": d.dq_a}
-    still = sym.jacobian(slopes, d.dq_u)
-    for symbol in moving.values():
-        still = sym.substitute(still, symbol, sym.column([0.0] * symbol.shape[0]))
+    inertia = sym.jacobian(sym.jacobian(d.energy, d.dq_u).T, d.dq_u)
+    still = sym.at_zero(inertia, sym.column([d.q_u, d.dq_u, d.dq_a]))
     return Function("inertia", {"q_a": d.q_a, "p": d.p}, still)
 
 
@@ -136,9 +132,3 @@ def _root(matrices: Array, power: float) -> Array:
     values, vectors = np.linalg.eigh(matrices)
     values = np.maximum(values, NEGLIGIBLE * np.abs(values).max(axis=-1, keepdims=True))
     return np.asarray((vectors * values[..., None, :] ** power) @ np.swapaxes(vectors, -1, -2))
-
-
-def _rounded_scales(series: Array) -> Array:
-    """Cut digits that need not be stored."""
-    quantum = 2.0 ** np.round(np.log2(np.abs(series).max() * FINE))
-    return np.asarray(np.round(series / quantum) * quantum)

@@ -1,6 +1,6 @@
 """Boxes of parameters: the whole of some ranges, halved as often as it takes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import prod
 
@@ -27,6 +27,11 @@ class Ranges:
     names: tuple[str, ...]
     lower: Array
     upper: Array
+
+    @property
+    def ends(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest values by name."""
+        return dict(zip(self.names, zip(self.lower.tolist(), self.upper.tolist(), strict=True), strict=True))
 
     def values(self, box: DyadicBox, places: Array) -> Array:
         """Values at places on [−1, 1] of a box, rounded, shape (places, ranges)."""
@@ -58,11 +63,15 @@ def halves(box: DyadicBox, range_: int) -> tuple[DyadicBox, DyadicBox]:
     return first, second
 
 
+def volume(boxes: Iterable[DyadicBox]) -> Fraction:
+    """Sum up the fractions of the whole that boxes are."""
+    return sum((Fraction(1, prod(2**level for level, _ in box)) for box in boxes), Fraction(0))
+
+
 def covers(boxes: Sequence[DyadicBox]) -> bool:
     """Tell whether boxes are all there is: disjoint, and together of the whole's volume."""
-    volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in boxes), Fraction(0))
     inside = all(0 <= index < 2**level for box in boxes for level, index in box)
-    if not inside or volume != 1:
+    if not inside or volume(boxes) != 1:
         return False
     low, high = (np.array(ends).reshape(len(boxes), -1) for ends in zip(*map(shares, boxes), strict=True))
     return not any(

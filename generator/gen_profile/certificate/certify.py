@@ -1,9 +1,7 @@
 """Proving a bound of every machine's sway: boxes are halved until it is close, or there are too many."""
 
 from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
 from functools import partial
-from math import prod
 
 import attrs
 import numpy as np
@@ -11,7 +9,7 @@ import numpy as np
 from gen_profile.certificate import approximation
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.axis_motion import fitted
-from gen_profile.certificate.boxes import DyadicBox, halves, shares
+from gen_profile.certificate.boxes import DyadicBox, halves, shares, volume
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.packing import Motions
 from gen_profile.certificate.sway_limits import limits_of
@@ -189,13 +187,16 @@ def _too_wide(box: Box, most: float) -> CertificateError:
 
 def _turns(box: Box, part: DyadicBox) -> Array:
     """Tell how far modes' phases at the end turn along each range of a part at most, in rad."""
-    low, high = map(np.array, shares(part))
-    turns = np.zeros(len(part))
-    for column in range(len(part)):
-        line = np.tile(0.5 * (low + high), (PLACES, 1))
-        line[:, column] = np.linspace(low[column], high[column], PLACES)
-        turns[column] = np.abs(np.diff(box.phases(line), axis=0)).sum(axis=0).max()
-    return turns
+    lines = _lines(*map(np.array, shares(part)))
+    return np.array([np.abs(np.diff(box.phases(line), axis=0)).sum(axis=0).max() for line in lines])
+
+
+def _lines(low: Array, high: Array) -> Array:
+    """List places along every range, in the middle of the others, (ranges, places, ranges)."""
+    lines = np.tile(0.5 * (low + high), (len(low), PLACES, 1))
+    for column, (begin, end) in enumerate(zip(low, high, strict=True)):
+        lines[column, :, column] = np.linspace(begin, end, PLACES)
+    return lines
 
 
 def _wanted(largest_met: Array, limits: Array, options: CertificateOptions) -> Array:
@@ -253,7 +254,6 @@ def _prove(
 def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array) -> Attempt:
     """Keep the boxes with a bound."""
     proved = {box: proof for box, proof in done.items() if np.isfinite(proof.bound).all()}
-    volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in proved), Fraction(0))
     return Attempt(
         theorem=theorem,
         boxes=tuple(proved),
@@ -261,7 +261,7 @@ def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array
         scales=np.array([proof.scales for proof in proved.values()]),
         bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(largest_met)),
         largest_met=largest_met,
-        fraction=float(volume),
+        fraction=float(volume(proved)),
     )
 
 
@@ -284,15 +284,15 @@ def _prepared(
     """
     plant, ranges, watch = spec.machine(), ranges_of(spec), observation_time(spec)
     track = followed(spec, setpoints)
-    ends = zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True)
     box = Box(
         plant=plant,
         nominal=spec.plant.parameters,
-        ranges=dict(zip(ranges.names, ends, strict=True)),
+        ranges=ranges.ends,
         ends=(spec.move.start, spec.move.target),
         duration=float(track.times[-1]) + watch,
     )
-    fastest = float(box.phases(_middles(len(ranges.names))).max())
+    none, whole = np.zeros(len(ranges.names)), np.ones(len(ranges.names))
+    fastest = float(box.phases(np.concatenate([0.5 * whole[None], *_lines(none, whole)])).max())
     longest = options.radians_per_piece * box.duration / fastest
     limits = limits_of(spec)
     near = NEAR * min(limit.allowed for limit in limits)
@@ -313,11 +313,3 @@ def _prepared(
     if 3 * len(boxes) > (most := options.max_nodes / theorem.nodes):  # with the halves of each
         raise _too_wide(box, most)
     return theorem, boxes
-
-
-def _middles(count: int) -> Array:
-    """List places along all ranges, in the middle of the others, (places, ranges)."""
-    lines = np.full((max(count, 1), PLACES, count), 0.5)
-    for column in range(count):
-        lines[column, :, column] = np.linspace(0.0, 1.0, PLACES)
-    return lines.reshape(max(count, 1) * PLACES, count)

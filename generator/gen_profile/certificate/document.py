@@ -1,9 +1,8 @@
 """A certificate as a file: JSON, its large arrays compressed."""
 
-import binascii
 import json
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from math import inf, nan
 from operator import index
 from pathlib import Path
@@ -93,14 +92,12 @@ class Certificate(Summarised):
     def reasons(self) -> tuple[str, ...]:
         """Say what is not proved, a sentence each."""
         if self.fraction < 1.0:
-            coarse = (
-                ", or count positions more finely (axis.counts_per_metre), or issue them in a longer cycle "
-                "(export.cycle_time)"
-                if self.rounded
-                else ""
-            )
-            others = "swing too far, or differ too much"
+            coarse, others = "", "swing too far, or differ too much"
             if self.rounded:
+                coarse = (
+                    ", or count positions more finely (axis.counts_per_metre), "
+                    "or issue them in a longer cycle (export.cycle_time)"
+                )
                 others += ", or positions are rounded to counts that are too coarse for a bound"
             return (
                 f"Bounds are proved for {100.0 * self.fraction:.3g} % of the machines; others {others}: "
@@ -144,13 +141,14 @@ class Certificate(Summarised):
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON, without what only the proof needs."""
+        way = self.on_the_way
         return {
             "proved": self.proved,
             "bounds_m": self.bounds,
             "limits_m": self.limits,
             "largest_met_m": self.largest_met,
             "on_the_way": None
-            if (way := self.on_the_way) is None
+            if way is None
             else {
                 "load": way.limit.load,
                 "bound_m": way.bound,
@@ -229,20 +227,11 @@ def parse(content: bytes) -> Certificate:
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),
             terms=tuple(map(index, document["terms"])),
             motions=tuple(
-                Motions(quanta=tuple(quanta), packed=packed)
-                for quanta, packed in map(_taken_apart, document["motions"])
+                Motions(quanta=tuple(one.pop("quanta")), packed=one) for one in document["motions"]
             ),
             scales=unpack(document["scales"], "<f8", 2),
         )
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        OverflowError,
-        binascii.Error,
-        zlib.error,
-    ) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, zlib.error) as error:
         raise damaged(error) from error
 
 
@@ -253,10 +242,6 @@ def damaged(error: Exception) -> CertificateError:
 
 def _number(value: Any) -> float:
     return float(value + 0.0)  # which raises of a text
-
-
-def _taken_apart(motion: Mapping[str, Any]) -> tuple[Sequence[float], Mapping[str, Any]]:
-    return motion["quanta"], {name: one for name, one in motion.items() if name != "quanta"}
 
 
 def _part(level: int, number: int) -> tuple[int, int]:

@@ -211,12 +211,8 @@ class Enclosure:
         last = (1,) * (self.variables - 1)
 
         def columns(values: Ball) -> list[Ball]:
-            mid, rad = (np.moveaxis(part, -1, 0)[:, None] for part in (values.mid, values.rad))
-            shape = (*mid.shape, *last)
-            return [
-                shared(Ball(*pair), tuple(range(2, 2 + self.variables)))
-                for pair in zip(mid.reshape(shape), rad.reshape(shape), strict=True)
-            ]
+            each = (one.reshape(1, *one.shape, *last) for one in split(values, -1))
+            return [shared(one, tuple(range(2, 2 + self.variables))) for one in each]
 
         rate = powers(c, nodes, 1) / self.axes.halves[rows, None, None]
         return columns(powers(c, nodes, 0)), columns(rate)

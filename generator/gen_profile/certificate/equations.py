@@ -239,30 +239,27 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
         columns = [sym.directional(expression[:, k], variables, by) for k in range(expression.shape[1])]
         return sym.matrix([columns])
 
-    def enclosed(name: str, expression: sym.Symbol, inputs: Mapping[str, sym.Symbol] = state) -> Enclosed:
-        return Enclosed(Function(name, inputs, expression), plant.type)
-
     axes = sym.column([q_a, v])
     by_axes = sym.jacobian(f, axes)
     pull = slopes @ lift + by_position - change(lift, motion[: 2 * n_u + 2 * m], sym.column([f, v, ddq_a]))
+    curvature = sym.matrix([[sym.jacobian(by_axes[:, k], axes) for k in range(2 * m)]])
+    pull_change = change(pull, motion, sym.column([d_x, v, ddq_a, jerk]))
+    expressions = {
+        "rate": (f, state),
+        "jacobian": (slopes, state),
+        "jacobian_change": (change(slopes, x, d_x), {**state, "d_x": d_x}),
+        "lift": (lift, state),
+        "lift_change": (change(lift, x, d_x), {**state, "d_x": d_x}),
+        "by_position": (by_position, state),
+        "curvature": (curvature, state),
+        "pull": (pull, smooth),
+        "pull_change": (pull_change, {**smooth, "d_x": d_x, "jerk": jerk}),
+        "sway": (d.sway, arguments),
+        "sway_slopes": (sym.jacobian(d.sway, d.q_u), arguments),
+        "sway_by_position": (sym.jacobian(d.sway, q_a), arguments),
+    }
+    functions = {name: Function(name, inputs, one) for name, (one, inputs) in expressions.items()}
     return EnclosedEquations(
-        rate=enclosed("rate", f),
-        jacobian=enclosed("jacobian", slopes),
-        jacobian_change=enclosed("jacobian_change", change(slopes, x, d_x), {**state, "d_x": d_x}),
-        lift=enclosed("lift", lift),
-        lift_change=enclosed("lift_change", change(lift, x, d_x), {**state, "d_x": d_x}),
-        by_position=enclosed("by_position", by_position),
-        curvature=enclosed(
-            "curvature", sym.matrix([[sym.jacobian(by_axes[:, k], axes) for k in range(2 * m)]])
-        ),
-        pull=enclosed("pull", pull, smooth),
-        pull_change=enclosed(
-            "pull_change",
-            change(pull, motion, sym.column([d_x, v, ddq_a, jerk])),
-            {**smooth, "d_x": d_x, "jerk": jerk},
-        ),
-        sway=enclosed("sway", d.sway, arguments),
-        sway_slopes=enclosed("sway_slopes", sym.jacobian(d.sway, d.q_u), arguments),
-        sway_by_position=enclosed("sway_by_position", sym.jacobian(d.sway, q_a), arguments),
         jump=Function("jump", arguments, d.input_matrix),
+        **{name: Enclosed(function, plant.type) for name, function in functions.items()},
     )

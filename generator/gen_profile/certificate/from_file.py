@@ -171,16 +171,14 @@ def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
 def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certificate:
     """State what came out."""
     theorem = result.theorem
-    bounds = (
-        (result.bounds.max(axis=0) * (1.0 + SLACK)).tolist()
-        if result.boxes
-        else [None] * len(result.largest_met)
-    )
+    bounds = [None] * len(theorem.limits)
+    if result.boxes:
+        bounds = (result.bounds.max(axis=0) * (1.0 + SLACK)).tolist()
     sways = zip(theorem.limits, bounds, result.largest_met.tolist(), strict=True)
     return Certificate(
         spec_sha256=artefact.spec.sha256(),
         artefact_sha256=artefact.sha256,
-        ranges=_named(theorem),
+        ranges=theorem.ranges.ends,
         arrival=theorem.arrival,
         until=theorem.until,
         asked=asked,
@@ -196,12 +194,6 @@ def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certific
         scales=result.scales,
         rounded=bool(artefact.setpoints.resolution.any()),
     )
-
-
-def _named(theorem: Theorem) -> dict[str, tuple[float, float]]:
-    ranges = theorem.ranges
-    ends = zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True)
-    return dict(zip(ranges.names, ends, strict=True))
 
 
 def _require_about(claimed: Certificate, artefact: _Artefact) -> Theorem:
@@ -229,7 +221,7 @@ def _require_about(claimed: Certificate, artefact: _Artefact) -> Theorem:
         raise CertificateError("The certificate does not prove what it says of the setpoints.")
     if not len(claimed.boxes) == len(claimed.motions) == len(claimed.scales):
         raise CertificateError("The certificate is damaged: its arrays do not fit together.")
-    whole = dict(claimed.ranges) == _named(theorem) and covers(claimed.boxes)
+    whole = dict(claimed.ranges) == theorem.ranges.ends and covers(claimed.boxes)
     if not (whole and theorem.limits == limits_of(artefact.spec) and claimed.proved):
         raise CertificateError("The certificate does not cover all machines and limits of the spec.")
     watched = (

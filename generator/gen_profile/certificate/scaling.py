@@ -78,15 +78,8 @@ class Scaling:
         """Multiply polynomials, at as many nodes as determine their product; as a series."""
         counts = [one + other - 1 for one, other in zip(first.shape[4:], second.shape[4:], strict=True)]
         a, b = (chebyshev.evaluated(series, counts) for series in (first, second))
-        size = a.mid.shape[2]
-        products = sum(
-            (
-                Ball(a.mid[:, :, :, k, None], a.rad[:, :, :, k, None])
-                * Ball(b.mid[:, :, None, k], b.rad[:, :, None, k])
-                for k in range(size)
-            ),
-            start=Ball(0.0, 0.0),
-        )
+        pairs = (a[:, :, :, k, None] * b[:, :, None, k] for k in range(a.mid.shape[2]))
+        products = sum(pairs, start=Ball(0.0, 0.0))
         return chebyshev.interpolated(products, self.variables)
 
 

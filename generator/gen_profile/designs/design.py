@@ -15,7 +15,6 @@ from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, artefac
 from gen_profile.artefacts.writing import Kept, Staging, staged
 from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress
@@ -264,28 +263,16 @@ def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, 
         if spec.check.foreign is not None:
             check = judge_external(spec, spec.check.foreign, setpoints, rows)
         else:
-            check = _judged(
-                spec,
-                planned.evaluation,
-                setpoints,
-                rows,
-                by_fmpy=by_fmpy,
-                progress=progress,
-            )
+            check = _judged(planned, setpoints, rows, by_fmpy=by_fmpy, progress=progress)
         checks.append(attrs.evolve(check, searched=tried))
     return max(checks, key=lambda check: check.demand)
 
 
 def _judged(
-    spec: Spec,
-    evaluation: MotionEvaluation,
-    setpoints: SampledProfile,
-    rows: Sequence[Scenario],
-    *,
-    by_fmpy: bool,
-    progress: Progress,
+    planned: Plan, setpoints: SampledProfile, rows: Sequence[Scenario], *, by_fmpy: bool, progress: Progress
 ) -> Check:
     """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
+    spec, evaluation = planned.spec, planned.evaluation
     machines, spacing = [row for row in rows if row.followed], sample_spacing(spec, setpoints)
     responses = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, progress=progress)
     compared = responses[0].times[responses[0].times >= judged_from(spec, setpoints)]

@@ -24,13 +24,7 @@ from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.description.system_structure import Component, ssp
-from gen_profile_fmu.model.contents import (
-    AUTHOR,
-    Model,
-    plant_model,
-    profile_model,
-    system_model,
-)
+from gen_profile_fmu.model.contents import AUTHOR, Model, plant_model, profile_model, system_model
 from gen_profile_fmu.model.nominals import smooth_move, state_nominals
 from gen_profile_fmu.model.planner import planned_system_model, planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
@@ -186,15 +180,11 @@ def _rough_nominals(spec: Spec) -> dict[str, float]:
 
     None are found where that would throw a load over: a plant is good for other moves, too.
     """
+    move, duration = spec.move, spec.move.duration
     try:
-        return _nominals(spec, _rough_motion(spec))
+        if move.shortest:
+            slowest = linearize(spec.machine(), spec.plant.parameters, move.target).frequencies[0]
+            duration = PERIODS * 2.0 * np.pi / slowest
+        return _nominals(spec, smooth_move(move.start, move.target, duration))
     except (CosimulationError, InfeasibleProblem):
         return {}
-
-
-def _rough_motion(spec: Spec) -> Profile:
-    move, duration = spec.move, spec.move.duration
-    if move.shortest:
-        slowest = linearize(spec.machine(), spec.plant.parameters, move.target).frequencies[0]
-        duration = PERIODS * 2.0 * np.pi / slowest
-    return smooth_move(move.start, move.target, duration)

@@ -66,7 +66,36 @@ class MotionEvaluation(Summarised):
     @cached_property
     def figures(self) -> dict[str, float]:
         """Of the first axis and the end load: sway on the way of the nominal machine, afterwards of all."""
-        return _figures(self)
+        motion, command, duration = self.motion, self.command, self.motion.duration
+        end_load = self.swing.plant.end_load
+        during = self.swing.sway(np.linspace(0.0, duration, TRANSIENT_SAMPLES))
+        others = self.everywhere.sway(np.linspace(0.0, duration, COARSE_SAMPLES))
+        transients, residuals = (
+            [float(machine) for sway in sways for machine in peak(length(sway[:, :, end_load]))[:, 0]]
+            for sways in ((during, others), _afterwards(self))
+        )
+        names = ("velocity", "acceleration", "jerk")
+        units = ("m_per_s", "m_per_s2", "m_per_s3")
+        table = {"duration_s": duration}
+        for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1):
+            table[f"{name}_max_{unit}"] = greatest(motion, order)
+            if order > 1:
+                table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
+        table |= {
+            "sway_transient_peak_m": transients[0],
+            "sway_transient_worst_m": max(transients),
+            "sway_transient_rms_m": float(mean_square_root(length(during[0, :, end_load]))[0]),
+            "sway_residual_peak_m": residuals[0],
+            "sway_residual_peak_perturbed_m": residuals[min(1, len(self.machines) - 1)],
+            "sway_residual_worst_m": max(residuals),
+        }
+        if command is not motion:
+            table |= {
+                f"command_{name}_max_{unit}": greatest(command, order)
+                for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
+            }
+            table["command_overshoot_m"] = overshoot(command)
+        return table
 
     def followed(self, times: Array, others: Sequence[Scenario] = ()) -> tuple[Sway, ...]:
         """Tell how the loads of the machines, and of others, sway at rising times in s."""
@@ -192,36 +221,3 @@ def _afterwards(evaluation: MotionEvaluation) -> tuple[Array, Array]:
         evaluation.swing.sway(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES)),
         evaluation.everywhere.sway(np.linspace(begin, begin + watch, COARSE_SAMPLES)),
     )
-
-
-def _figures(evaluation: MotionEvaluation) -> dict[str, float]:
-    motion, command, duration = evaluation.motion, evaluation.command, evaluation.motion.duration
-    end_load = evaluation.swing.plant.end_load
-    during = evaluation.swing.sway(np.linspace(0.0, duration, TRANSIENT_SAMPLES))
-    others = evaluation.everywhere.sway(np.linspace(0.0, duration, COARSE_SAMPLES))
-    transients, residuals = (
-        [float(machine) for sway in sways for machine in peak(length(sway[:, :, end_load]))[:, 0]]
-        for sways in ((during, others), _afterwards(evaluation))
-    )
-    names = ("velocity", "acceleration", "jerk")
-    units = ("m_per_s", "m_per_s2", "m_per_s3")
-    table = {"duration_s": duration}
-    for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1):
-        table[f"{name}_max_{unit}"] = greatest(motion, order)
-        if order > 1:
-            table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
-    table |= {
-        "sway_transient_peak_m": transients[0],
-        "sway_transient_worst_m": max(transients),
-        "sway_transient_rms_m": float(mean_square_root(length(during[0, :, end_load]))[0]),
-        "sway_residual_peak_m": residuals[0],
-        "sway_residual_peak_perturbed_m": residuals[min(1, len(evaluation.machines) - 1)],
-        "sway_residual_worst_m": max(residuals),
-    }
-    if command is not motion:
-        table |= {
-            f"command_{name}_max_{unit}": greatest(command, order)
-            for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
-        }
-        table["command_overshoot_m"] = overshoot(command)
-    return table

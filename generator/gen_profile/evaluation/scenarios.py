@@ -6,7 +6,6 @@ from itertools import product
 import attrs
 import numpy as np
 
-from gen_profile.motion.profile import Array
 from gen_profile.problem.sampling import latin_hypercube
 from gen_profile.spec.model import Spec
 
@@ -142,7 +141,8 @@ def _draws(spec: Spec) -> list[Scenario]:
     if not (ranges and spec.check.samples):
         return []
     ends = np.array(list(ranges.values()))
-    values = ends[:, 0] + _latin_hypercube(spec, len(ranges)) * (ends[:, 1] - ends[:, 0])
+    random = np.random.default_rng(spec.check.seed)
+    values = ends[:, 0] + latin_hypercube(spec.check.samples, len(ranges), random) * np.ptp(ends, axis=1)
     rows = []
     for draw, drawn in enumerate(values.tolist()):
         named = dict(zip(ranges, drawn, strict=True))
@@ -150,8 +150,3 @@ def _draws(spec: Spec) -> list[Scenario]:
         parameters = {**spec.plant.parameters, **named}
         rows.append(Scenario(name=f"sample {draw}", parameters=parameters, group="samples", lag=lag_drawn))
     return rows
-
-
-def _latin_hypercube(spec: Spec, dimensions: int) -> Array:
-    drawn: Array = latin_hypercube(spec.check.samples, dimensions, np.random.default_rng(spec.check.seed))
-    return drawn

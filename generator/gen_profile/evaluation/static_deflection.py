@@ -120,8 +120,7 @@ def _statics(plant: Plant) -> Function:
     """[gradient, Hessian] of V − F s by q_u; below them the loads' sway."""
     d = dynamics(plant)
     force = sym.symbols("force", len(plant.loads))
-    moving = sym.column([d.dq_u, d.dq_a])
-    energy = sym.substitute(d.energy, moving, sym.column([0.0] * moving.shape[0]))
+    energy = sym.at_zero(d.energy, sym.column([d.dq_u, d.dq_a]))
     slope = sym.gradient(energy - sym.dot(force, d.sway), d.q_u)
     curved = sym.beside(slope, sym.jacobian(slope, d.q_u))
     seen = sym.beside(d.sway, sym.zeros(len(plant.loads), len(plant.unactuated)))

@@ -38,7 +38,13 @@ def drawings(plant: Plant, pose: Pose) -> tuple[Drawing, ...]:
     pose : Pose
         Over the frames of the animation.
     """
-    return plant.picture(pose) if plant.picture else _from_outputs(plant, pose)
+    if plant.picture:
+        return plant.picture(pose)
+    _, height = pose.at_rest().loads()
+    if not np.abs(height).max() > 0.0:
+        return _rail(plant, pose)
+    columns = slice(0, len(plant.loads) - plant.directions + 1)
+    return (hanging("from the side", pose, trolley=partial(_suspension, plant), columns=columns),)
 
 
 def _rail(plant: Plant, pose: Pose) -> tuple[Drawing, ...]:
@@ -71,15 +77,6 @@ def _rail(plant: Plant, pose: Pose) -> tuple[Drawing, ...]:
             *(Shape(kind="load", points=[point], size=(size, size)) for point in chain[1:]),
         ),
     )
-
-
-def _from_outputs(plant: Plant, pose: Pose) -> tuple[Drawing, ...]:
-    """Draw a machine without a picture of its own: its first axis, and its loads as they hang or trail."""
-    _, height = pose.at_rest().loads()
-    if not np.abs(height).max() > 0.0:
-        return _rail(plant, pose)
-    columns = slice(0, len(plant.loads) - plant.directions + 1)
-    return (hanging("from the side", pose, trolley=partial(_suspension, plant), columns=columns),)
 
 
 def _suspension(plant: Plant, pose: Pose) -> tuple[Array, Array]:

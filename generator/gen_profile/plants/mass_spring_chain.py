@@ -60,16 +60,14 @@ def member(masses: int) -> Plant:
 
 
 def _parameters(numbers: range) -> Iterator[Parameter]:
-    for i in numbers:
-        yield Parameter(f"m{i}", "kg", Phrase("mass {i}", i=i), nominal=1.0, lower=1e-6, upper=1e6)
-    for i in numbers:
-        yield Parameter(
-            f"k{i}", "N/m", Phrase("spring before mass {i}", i=i), nominal=100.0, lower=1e-6, upper=1e12
-        )
-    for i in numbers:
-        yield Parameter(
-            f"c{i}", "N s/m", Phrase("damper beside spring {i}", i=i), nominal=0.0, lower=0.0, upper=1e9
-        )
+    for letter, unit, template, nominal, lower, upper in (
+        ("m", "kg", "mass {i}", 1.0, 1e-6, 1e6),
+        ("k", "N/m", "spring before mass {i}", 100.0, 1e-6, 1e12),
+        ("c", "N s/m", "damper beside spring {i}", 0.0, 0.0, 1e9),
+    ):
+        for i in numbers:
+            words = Phrase(template, i=i)
+            yield Parameter(f"{letter}{i}", unit, words, nominal=nominal, lower=lower, upper=upper)
 
 
 def _equations(masses: int) -> Callable[..., Equations]:

@@ -68,8 +68,13 @@ def _pendulum(odd: int, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
 def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Rise of the liquid at the trailing wall, and the first mode's angle."""
     del q_a
-    rise = sum(4.0 * p.a / (odd * np.pi) ** 2 * np.sin(theta) for odd, theta in zip(ODD, q_u, strict=True))
+    rise = sum(_rises(q_u, p))
     return Outputs(sway=[rise], height=[rise], angle=[q_u[0]])
+
+
+def _rises(q_u: Vector, p: SimpleNamespace) -> list[Scalar]:
+    """How far each mode raises the liquid at the trailing wall."""
+    return [4.0 * p.a / (odd * np.pi) ** 2 * np.sin(theta) for odd, theta in zip(ODD, q_u, strict=True)]
 
 
 def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
@@ -90,18 +95,13 @@ def picture(pose: Pose) -> tuple[Drawing, ...]:
     along = np.linspace(0.0, 1.0, SURFACE)
 
     def points(pose: Pose) -> Array:
-        place = pose.q_a[:, 0]
-        heights = [
-            4.0 * a / (odd * np.pi) ** 2 * np.sin(theta) for odd, theta in zip(ODD, pose.q_u.T, strict=True)
-        ]
-        surface = [
-            (
-                place + (fraction - 0.5) * a,
-                h
-                + sum(rise * np.cos(odd * np.pi * fraction) for odd, rise in zip(ODD, heights, strict=True)),
-            )
-            for fraction in along
-        ]
+        place, rises = pose.q_a[:, 0], _rises(list(pose.q_u.T), pose.p)
+
+        def above(fraction: float) -> Array:
+            waves = (rise * np.cos(odd * np.pi * fraction) for odd, rise in zip(ODD, rises, strict=True))
+            return np.asarray(h + sum(waves))
+
+        surface = [(place + (fraction - 0.5) * a, above(fraction)) for fraction in along]
         left, right = place - 0.5 * a, place + 0.5 * a
         corners = [(left, height), (left, 0.0), (right, 0.0), (right, height)]
         low, high = travel(place, 0.6 * a)

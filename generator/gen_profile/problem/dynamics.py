@@ -116,7 +116,7 @@ def _require_symbols(plant: Plant, made: Dynamics) -> None:
     inputs = {name: getattr(made, name) for name in ("q_u", "dq_u", "q_a", "dq_a", "ddq_a", "p")}
     rest = {name: np.zeros((1, symbols.shape[0])) for name, symbols in inputs.items()}
     rest["q_a"] = np.array([plant.probe_places()])
-    rest["p"] = parameter_column(plant, plant.nominal())
+    rest["p"] = parameter_rows(plant, [plant.nominal()])
     at_rest = Function("at_rest", inputs, sym.column([made.ddq_u, made.outputs]))(*rest.values())
     if np.isnan(at_rest).any():
         raise SpecError(
@@ -130,11 +130,6 @@ def _energy(bodies: Mechanics, q: Symbol, dq: Symbol) -> Symbol:
     velocities = (sym.directional(sym.column(place), q, dq) for place in bodies.place)
     kinetic = (0.5 * m * sym.dot(v, v) for m, v in zip(bodies.mass, velocities, strict=True))
     return sum(kinetic, bodies.potential)
-
-
-def parameter_column(plant: Plant, values: Mapping[str, float]) -> Array:
-    """Order parameter values as `Dynamics.p` does, as one point (1, parameters)."""
-    return parameter_rows(plant, [values])
 
 
 def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:

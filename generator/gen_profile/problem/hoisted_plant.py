@@ -14,7 +14,6 @@ from types import SimpleNamespace
 
 import attrs
 
-from gen_profile.plants.drawing import Pose
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Plant, Vector
 from gen_profile.problem import symbolic as sym
 
@@ -52,25 +51,18 @@ def hoisted(plant: Plant, names: tuple[str, ...]) -> Plant:
     def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
         return _lagrange(mechanics(q_u, q_a, p), [q_u, q_a], [dq_u, dq_a])
 
-    def picture(pose: Pose) -> tuple[()]:
-        del pose
-        return ()
-
+    winches = (
+        Coordinate(name=name, unit="m", lower=known[name].lower, upper=known[name].upper) for name in names
+    )
     return attrs.evolve(
         plant,
         type=f"{plant.type} with {', '.join(names)} driven",
         parameters=tuple(parameter for parameter in plant.parameters if parameter.name not in names),
-        actuated=(
-            *plant.actuated,
-            *(
-                Coordinate(name=name, unit="m", lower=known[name].lower, upper=known[name].upper)
-                for name in names
-            ),
-        ),
+        actuated=(*plant.actuated, *winches),
         equations=equations,
         outputs=outputs,
         mechanics=mechanics,
-        picture=picture,
+        picture=lambda _: (),
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import dynamics, parameter_column
+from gen_profile.problem.dynamics import dynamics, parameter_rows
 from gen_profile.problem.symbolic import Array, Function
 
 SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
@@ -149,19 +149,22 @@ def linear_terms(plant: Plant, machines: Array, q_a: Sequence[float] | Array) ->
     q_a : (m,) sequence of float
         Where the axes stand.
     """
-    n_u, m = len(plant.unactuated), len(plant.actuated)
-    still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
-    terms = -_terms(plant)[0](still_u, still_u, np.array([q_a], dtype=np.float64), still_a, machines)
+    n_u = len(plant.unactuated)
+    terms = -_terms(plant)[0](*_at_rest(plant, machines, q_a))
     return terms[:, :, :n_u], terms[:, :, n_u : 2 * n_u]
+
+
+def _at_rest(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> tuple[Array, ...]:
+    """List what `_terms` are functions of, for machines that hang still."""
+    still_u, still_a = np.zeros((1, len(plant.unactuated))), np.zeros((1, len(plant.actuated)))
+    return still_u, still_u, np.array([q_a], dtype=np.float64), still_a, machines
 
 
 @lru_cache(maxsize=64)
 def _linearized(
     plant: Plant, parameters: tuple[tuple[str, float], ...], q_a: tuple[float, ...]
 ) -> Linearization:
-    n_u, m = len(plant.unactuated), len(plant.actuated)
-    still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
-    rest = (still_u, still_u, np.array([q_a]), still_a, parameter_column(plant, dict(parameters)))
+    n_u, rest = len(plant.unactuated), _at_rest(plant, parameter_rows(plant, [dict(parameters)]), q_a)
     motion_terms, sway_terms, _ = _terms(plant)
     free_q, free_dq, input_matrix = np.split(motion_terms(*rest)[0], [n_u, 2 * n_u], axis=1)
     frequencies, modes = _modes(plant, -free_q)
@@ -188,8 +191,7 @@ def _terms(plant: Plant) -> tuple[Function, Function, list[float | None]]:
     motion = sym.matrix([[sym.jacobian(d.drift, d.q_u), sym.jacobian(d.drift, d.dq_u), d.input_matrix]])
     sway = sym.jacobian(d.sway, d.q_u)
     moving = sym.column([d.q_u, d.dq_u, d.dq_a])
-    still = sym.column([0.0] * moving.shape[0])
-    at_rest = [sym.substitute(terms, moving, still) for terms in (motion, sway)]
+    at_rest = [sym.at_zero(terms, moving) for terms in (motion, sway)]
     depends = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
     places = [
         None if matters else place for matters, place in zip(depends, plant.probe_places(), strict=True)

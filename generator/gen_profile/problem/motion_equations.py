@@ -7,7 +7,7 @@ import attrs
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics
-from gen_profile.problem.sensitivities import sensitivities
+from gen_profile.problem.sensitivities import swing_equations
 from gen_profile.problem.symbolic import Function
 
 
@@ -40,10 +40,8 @@ class MotionEquations:
 def motion_equations(plant: Plant, desensitized: tuple[str, ...], order: int = 1) -> MotionEquations:
     """Derive a machine's equations, sensitivities to some of its parameters included, to an order."""
     d = dynamics(plant)
-    pendulum, rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
-    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
-    reached = sensitivities(rate, pendulum, by_name, desensitized, order)
-    y = sym.column([pendulum, *(s.states for s in reached)])
+    swing, rate, reached = swing_equations(plant, d, desensitized, order)
+    y = sym.column([swing, *(s.states for s in reached)])
     f = sym.column([rate, *(s.rates for s in reached)])
     axes = sym.column([d.q_a, d.dq_a, d.ddq_a])
     inputs, arguments = {"y": y, "axes": axes, "p": d.p}, sym.column([y, axes])

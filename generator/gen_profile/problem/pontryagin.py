@@ -26,7 +26,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import Dynamics, dynamics
 from gen_profile.problem.problem import Effort
-from gen_profile.problem.sensitivities import sensitivities
+from gen_profile.problem.sensitivities import swing_equations
 from gen_profile.problem.symbolic import Array, Function, Symbol
 
 SNAP_TIME = 0.02  # s; weighs snap against jerk: ½ (j² + (0.02 s · snap)²)
@@ -248,9 +248,7 @@ def _state_equations(
     plant: Plant, d: Dynamics, axes: _AxisChain, desensitized: tuple[str, ...], order: int
 ) -> tuple[StateLayout, Symbol, Symbol]:
     """Put what swings, the axes and the sensitivities into one state x, with ẋ = f."""
-    swing, rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
-    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
-    reached = sensitivities(rate, swing, by_name, desensitized, order)
+    swing, rate, reached = swing_equations(plant, d, desensitized, order)
     layout = StateLayout(
         n_u=len(plant.unactuated),
         m=len(plant.actuated),

@@ -12,7 +12,9 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 
+from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
+from gen_profile.problem.dynamics import Dynamics
 from gen_profile.problem.symbolic import Symbol
 
 
@@ -65,6 +67,15 @@ def sensitivities(
     return (*first, *second)
 
 
+def swing_equations(
+    plant: Plant, d: Dynamics, names: Sequence[str], order: int
+) -> tuple[Symbol, Symbol, tuple[Sensitivities, ...]]:
+    """Give (q_u, q̇_u) of a plant, its rates, and its sensitivities to parameters."""
+    swing, rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
+    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
+    return swing, rate, sensitivities(rate, swing, by_name, names, order)
+
+
 def _derived(
     names: tuple[str, ...], f: Symbol, x: Symbol, parameter: Symbol, of: Sequence[Sensitivities]
 ) -> Sensitivities:
@@ -91,7 +102,7 @@ def _derived(
 
 def _full(sensitivities: Sensitivities, column: Symbol, n: int) -> Symbol:
     """Put the rows of a column back to where they belong among n."""
-    entries = [sym.zero()] * n
+    entries = [sym.zeros(1, 1)] * n
     for row, entry in zip(sensitivities.rows, sym.split(column), strict=True):
         entries[row] = entry
     return sym.column(entries)

@@ -24,6 +24,17 @@ if hasattr(casadi.GlobalOptions, "setNumpyMode"):
     casadi.GlobalOptions.setNumpyMode(-1)
 
 
+solve: Callable[[Symbol, Symbol], Symbol] = casadi.solve  # x of a x = b
+jacobian: Callable[[Symbol, Symbol], Symbol] = casadi.jacobian  # ∂expression/∂variables
+gradient: Callable[[Symbol, Symbol], Symbol] = casadi.gradient  # of a scalar, as a column
+# change of an expression for a change of its variables, ∂expression/∂variables · change
+directional: Callable[[Symbol, Symbol, Symbol], Symbol] = casadi.jtimes
+substitute: Callable[[Symbol, Symbol, Symbol], Symbol] = casadi.substitute  # values for variables
+exp: Callable[[Symbol], Symbol] = casadi.exp
+sqrt: Callable[[Symbol], Symbol] = casadi.sqrt
+dot: Callable[[Symbol, Symbol], Symbol] = casadi.dot
+
+
 def symbols(name: str, count: int) -> Symbol:
     """Make a column of symbols."""
     return casadi.SX.sym(name, count)
@@ -37,11 +48,6 @@ def split(column: Symbol) -> list[Symbol]:
 def column(entries: Sequence[Any]) -> Symbol:
     """Stack scalars and columns."""
     return casadi.vertcat(*entries) if len(entries) else casadi.SX(0, 1)
-
-
-def zero() -> Symbol:
-    """Make a zero that is none by its form."""
-    return casadi.SX(1, 1)
 
 
 def matrix(rows: Sequence[Sequence[Any]]) -> Symbol:
@@ -59,49 +65,14 @@ def rows(matrix: Symbol) -> list[list[Symbol]]:
     return [list(casadi.horzsplit(row)) for row in casadi.vertsplit(matrix)]
 
 
-def solve(a: Symbol, b: Symbol) -> Symbol:
-    """Solve ``a x = b`` symbolically."""
-    return casadi.solve(a, b)
-
-
-def jacobian(expression: Symbol, variables: Symbol) -> Symbol:
-    """∂expression/∂variables."""
-    return casadi.jacobian(expression, variables)
-
-
-def directional(expression: Symbol, variables: Symbol, change: Symbol) -> Symbol:
-    """Change of an expression for a change of its variables, ∂expression/∂variables · change."""
-    return casadi.jtimes(expression, variables, change)
-
-
-def gradient(expression: Symbol, variables: Symbol) -> Symbol:
-    """Gradient of a scalar, as a column."""
-    return casadi.gradient(expression, variables)
-
-
 def depends(expression: Symbol, variables: Symbol) -> bool:
     """Tell whether any entry of an expression has any of some variables in it."""
     return bool(casadi.depends_on(casadi.simplify(expression), variables))
 
 
-def substitute(expression: Symbol, variables: Symbol, values: Symbol) -> Symbol:
-    """Replace variables in an expression."""
-    return casadi.substitute(expression, variables, values)
-
-
-def exp(expression: Symbol) -> Symbol:
-    """Raise e to the expression."""
-    return casadi.exp(expression)
-
-
-def sqrt(expression: Symbol) -> Symbol:
-    """Take the square root of every entry."""
-    return casadi.sqrt(expression)
-
-
-def dot(a: Symbol, b: Symbol) -> Symbol:
-    """Inner product of two columns."""
-    return casadi.dot(a, b)
+def at_zero(expression: Symbol, variables: Symbol) -> Symbol:
+    """Let variables be zero in an expression."""
+    return casadi.substitute(expression, variables, casadi.DM.zeros(variables.shape))
 
 
 def symmetric(matrix: Symbol) -> Symbol:

@@ -129,10 +129,6 @@ class Trajectory:
         powers = local[:, None] ** np.arange(self.scheme.stages + 1)
         return np.asarray(np.einsum("tp,tps->ts", powers, self.coefficients()[interval]))
 
-    def on(self, mesh: Array) -> Trajectory:
-        """Interpolate to another mesh."""
-        return sampled(self, self.scheme, mesh)
-
     def blend(self, other: Trajectory, weight: float) -> Trajectory:
         """``self + weight · (other − self)`` on the same mesh."""
         return attrs.evolve(
@@ -171,63 +167,25 @@ def sampled(function: Callable[[Array], Array], scheme: Scheme, mesh: Array) -> 
     )
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Linearized:
-    """Collocation equations linearised about a trajectory, their stages eliminated.
+def newton_step(flow: Array, current: Trajectory, initial: Array, final: Array) -> Trajectory:
+    """Solve the collocation equations linearised about a trajectory: a full Newton step.
 
-    Corrections are solved for, not trajectories: their rounding errors are as small as they are themselves.
-
-    Attributes
-    ----------
-    current : Trajectory
-    response : (intervals, stages, size, 1 + size) array
-        Corrections of the stages, and beside them their derivatives by the correction at the interval's
-        beginning.
-    transition, offset : (intervals, size, size) and (intervals, size) arrays
-        The corrections of neighbouring nodes obey ``δ_{k+1} = transition_k δ_k + offset_k``.
-    """
-
-    current: Trajectory
-    response: Array
-    transition: Array
-    offset: Array
-
-    def solve(self, initial: Array, final: Array) -> Trajectory:
-        """Find the trajectory between boundary values: a full Newton step.
-
-        Parameters
-        ----------
-        initial, final : (size / 2,) arrays
-            Of the first half of the unknowns (the states); entries of `final` that are NaN are free, and the
-            matching costate is zero instead.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            When they do not determine it.
-        """
-        nodes, stages = self.current.nodes, self.current.stages
-        n, free = len(initial), np.isnan(final)
-        ends = np.where(free, np.arange(n) + n, np.arange(n))
-        residual = np.where(free, 0.0, final) - nodes[-1, ends]
-        correction = _solve_nodes(self.transition, self.offset, initial - nodes[0, :n], residual, ends)
-        answer = self.response[..., 0] + np.einsum("kiab,kb->kia", self.response[..., 1:], correction[:-1])
-        return attrs.evolve(self.current, nodes=nodes + correction, stages=stages + answer)
-
-
-def linearize(flow: Array, current: Trajectory) -> Linearized:
-    """Linearise the collocation equations.
+    Stages are eliminated first. Corrections are solved for, not trajectories: their rounding errors are as
+    small as they are themselves.
 
     Parameters
     ----------
     flow : (points, size, 1 + size) array
         F, and beside it ∂F/∂z, at the trajectory's collocation points.
     current : Trajectory
+    initial, final : (size / 2,) arrays
+        Of the first half of the unknowns (the states); entries of `final` that are NaN are free, and the
+        matching costate is zero instead.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        When the equations of an interval are singular.
+        When the equations of an interval are singular, or the boundary values do not determine the solution.
     """
     nodes, stages, scheme = current.nodes, current.stages, current.scheme
     intervals, count, size = stages.shape
@@ -252,12 +210,14 @@ def linearize(flow: Array, current: Trajectory) -> Linearized:
     response = response.reshape(intervals, count, size, 1 + size)
 
     across = _across(lengths, current, values, response)
-    return Linearized(
-        current=current,
-        response=response,
-        transition=np.ascontiguousarray(across[:, :, 1:]),
-        offset=across[:, :, 0] - np.diff(nodes, axis=0),
-    )
+    n, free = len(initial), np.isnan(final)
+    ends = np.where(free, np.arange(n) + n, np.arange(n))
+    residual = np.where(free, 0.0, final) - nodes[-1, ends]
+    offset = across[:, :, 0] - np.diff(nodes, axis=0)
+    transition = np.ascontiguousarray(across[:, :, 1:])
+    correction = _solve_nodes(transition, offset, initial - nodes[0, :n], residual, ends)
+    answer = response[..., 0] + np.einsum("kiab,kb->kia", response[..., 1:], correction[:-1])
+    return attrs.evolve(current, nodes=nodes + correction, stages=stages + answer)
 
 
 def _across(lengths: Array, current: Trajectory, values: Array, response: Array) -> Array:

@@ -27,13 +27,7 @@ class Status(Enum):
     GIVEN_UP = "The search for a motion was given up, for it took too long."
 
 
-ERRORS: dict[Status, type[NoMotion]] = {
-    Status.SWINGS_TOO_FAR: InfeasibleProblem,
-    Status.INFEASIBLE: InfeasibleProblem,
-    Status.NOT_CONTROLLABLE: InfeasibleProblem,
-    Status.DIVERGED: SolverDiverged,
-    Status.GIVEN_UP: SolverDiverged,
-}
+UNKNOWN = {Status.DIVERGED, Status.GIVEN_UP}  # whether there is a motion
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -150,7 +144,8 @@ class Solution(Summarised):
             With the status's sentence and what to change.
         """
         if self.optimum is None:
-            raise ERRORS[self.status](
+            error: type[NoMotion] = SolverDiverged if self.status in UNKNOWN else InfeasibleProblem
+            raise error(
                 *filter(None, [self.status.value, self.advice]),
                 reasons=[Reason(code=Code[self.status.name])],
                 suggestions=self.suggestions,

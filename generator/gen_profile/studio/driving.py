@@ -21,7 +21,7 @@ from gen_profile.planner.machine import planned_axes, sensed_directions
 from gen_profile.planner.planner import Planner
 from gen_profile.plants.drawing import Drawing
 from gen_profile.plants.looks import body_size, drawings, pose_of
-from gen_profile.problem.dynamics import parameter_column, parameter_rows
+from gen_profile.problem.dynamics import parameter_rows
 from gen_profile.proof.sensing import stated_swing
 from gen_profile.report.animation import Actor, Animation
 from gen_profile.spec.model import Spec
@@ -285,7 +285,7 @@ class Drive:
         outputs, actors = equations_of(self._plant)[1], []
         for index, (name, parameters) in enumerate(zip(self._followers, self._parameters(), strict=True)):
             q_u = np.concatenate([still, swung[:, index]])
-            row = parameter_column(self._plant, parameters)
+            row = parameter_rows(self._plant, [parameters])
             sway = outputs(q_u, q_a, row)[:, : len(self._plant.loads), 0][:, self._plant.end_load]
             drawn = self._drawn(parameters, q_a, q_u)
             sign = sway[:, -1] if sway.shape[1] == 1 else np.linalg.norm(sway, axis=1)

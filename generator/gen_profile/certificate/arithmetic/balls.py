@@ -123,9 +123,8 @@ def ball(value: Operand) -> Ball:
     """Take numbers as they are, exactly."""
     if isinstance(value, Ball):
         return value
-    return Ball(
-        np.float64(value) if isinstance(value, (int, float)) else value, 0.0
-    )  # 1/0 raises of Python's
+    # 1/0 raises of Python's numbers
+    return Ball(np.float64(value) if isinstance(value, (int, float)) else value, 0.0)
 
 
 def stack(balls: list[Ball], axis: int = 0) -> Ball:

@@ -26,19 +26,13 @@ NEAR = 1.005  # of the greatest value seen: how closely a bound is sought
 
 def nodes(count: int) -> Ball:
     """Chebyshev's nodes of the first kind, falling, shape (count,)."""
-    return Ball(_cosines(count, 2)[:, 1], np.full(count, COSINE))
-
-
-@cache
-def values_at_nodes(count: int, terms: int) -> Array:
-    """Matrix from coefficients to values at nodes, shape (count, terms); entries are off by `COSINE`."""
-    return _cosines(count, terms)
+    return Ball(values_at_nodes(count, 2)[:, 1], np.full(count, COSINE))
 
 
 @cache
 def coefficients_of(count: int) -> Array:
     """Matrix from values at nodes to the interpolant's coefficients; entries are off by twice `COSINE`."""
-    matrix = 2.0 / count * _cosines(count, count).T
+    matrix = 2.0 / count * values_at_nodes(count, count).T
     matrix[0] *= 0.5
     return matrix
 
@@ -131,9 +125,7 @@ def weighted(series: Array, weights: Sequence[Array]) -> Array:
 
 def first(series: Array, variables: int) -> Array:
     """Take the coefficients of degree 0 in all variables."""
-    for _ in range(variables):
-        series = series[..., 0]
-    return series
+    return series.reshape(*series.shape[: series.ndim - variables], -1)[..., 0]
 
 
 def spread(series: Array, variables: int) -> Ball:
@@ -260,7 +252,10 @@ def _ends(terms: int) -> Array:
 
 
 @cache
-def _cosines(count: int, terms: int) -> Array:
-    """cos(k (2 j + 1) π / 2 N), the argument reduced in whole numbers."""
+def values_at_nodes(count: int, terms: int) -> Array:
+    """Matrix from coefficients to values at nodes, cos(k (2 j + 1) π / 2 N), shape (count, terms).
+
+    Arguments are reduced in whole numbers; entries are off by `COSINE`.
+    """
     whole = np.outer(2 * np.arange(count) + 1, np.arange(terms)) % (4 * count)
     return np.asarray(np.cos(whole * (np.pi / (2 * count))))

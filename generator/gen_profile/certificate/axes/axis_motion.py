@@ -4,7 +4,6 @@ Pieces are quintic polynomials through position, velocity and acceleration at bo
 cycles. The motion and its velocity are continuous by construction, whatever rounding made of these values.
 """
 
-from functools import partial
 from itertools import pairwise
 
 import attrs
@@ -269,7 +268,10 @@ def _piece_gap(c: Ball, half: Ball, bend: Array, track: Track) -> Gap:
     """Bound all that `Gap` holds, over one piece."""
     times, at = ball(track.times), track.position
     begin, end = times[:1], times[-1:]
-    x_of = partial(_place, 0.5 * (begin + end), half)
+
+    def x_of(times: Ball) -> Ball:
+        return (times - 0.5 * (begin + end)) / half
+
     step = times[1:] - times[:-1]
     middle = 0.5 * (times[1:] + times[:-1])
     longest, curvature = step.most.max(), bend + track.bend.max(axis=0)
@@ -296,10 +298,6 @@ def _piece_gap(c: Ball, half: Ball, bend: Array, track: Track) -> Gap:
 def _greater(values: Array) -> Array:
     """Take the greater one of two neighbours."""
     return np.maximum(values[1:], values[:-1])
-
-
-def _place(middle: Ball, half: Ball, times: Ball) -> Ball:
-    return (times - middle) / half
 
 
 def _running_sum(values: Ball) -> Ball:

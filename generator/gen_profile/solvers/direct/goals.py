@@ -11,16 +11,13 @@ from gen_profile.problem.cost import SwayCost, axis_reach
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.pontryagin import SNAP_TIME
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.direct.bezier import Piece, elevation, gram
+from gen_profile.solvers.direct.bezier import Piece, gram
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
 from gen_profile.solvers.direct.transcription import Iterate, Transcription
 
 WITHIN = 1.0 - 1e-6  # fraction of a limit that a program may use: its own tolerance must not break the limit
 
-STEEPER = (
-    2.0  # by which the exponent of the sway's cost may grow from one expansion to the next; 1 costs 6e-4
-)
 HELD = 3e-7  # cost of changing the highest derivative by as much as it is usually
 USUAL_ACCELERATION, USUAL_JERK = 25.0, 1e3  # halves of squares, dimensionless; a quintic's are 9 and 360
 DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
@@ -40,12 +37,7 @@ def effort_form(problem: Problem, piece: Piece) -> Array:
         return square(piece.derivative(3)) + (SNAP_TIME / problem.duration) ** 2 * square(piece.derivative(4))
     if problem.effort == "reference":
         # ÿ_ref = ÿ + τ y⃛, and ÿ counts as jerk times duration
-        jerk = piece.derivative(3)
-        rows = (
-            piece.derivative(2)
-            + (problem.tau or 0.0) / problem.duration * elevation(jerk.shape[-2] - 1) @ jerk
-        )
-        return square(rows) * problem.duration**2
+        return square(piece.leading(2, (problem.tau or 0.0) / problem.duration)) * problem.duration**2
     return square(piece.derivative(3))
 
 
@@ -104,24 +96,6 @@ def held(
     padding = (0, len(linear) - columns)
     whole = sparse.diags(np.pad(weights, padding), format="csr")
     return quadratic + whole, linear - np.pad(weights * iterate.local.ravel(), padding)
-
-
-def approach(transcription: Transcription, sway_cost: SwayCost, before: Iterate, after: Iterate) -> Iterate:
-    """Go from one iterate towards the next, as far as the sway's cost resembles its expansion.
-
-    It is exponential: from far below, a quadratic model leads to where it is steep beyond all measure.
-    """
-    if sway_cost.beta == 0.0:
-        return after
-
-    def exponent(iterate: Iterate) -> float:
-        return float(sway_cost.exponents(transcription.end_sway_found(iterate)).max())
-
-    most, way = exponent(before) + STEEPER, after.flat() - before.flat()
-    while exponent(after) > most:
-        way = 0.5 * way
-        after = before.of_flat(before.flat() + way)
-    return after
 
 
 @attrs.frozen(kw_only=True, eq=False)

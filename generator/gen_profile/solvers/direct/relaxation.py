@@ -81,11 +81,9 @@ class Relaxed:
             finer, iterate = bisected(goal.setup, sequence_result.iterate, where)
             goal = attrs.evolve(goal, setup=finer)
             sequence_result = attrs.evolve(sequence_result, goal=goal, iterate=iterate)
-        return (
-            None
-            if sequence_result is self.sequence_result
-            else attrs.evolve(self, sequence_result=sequence_result)
-        )
+        if sequence_result is self.sequence_result:
+            return None
+        return attrs.evolve(self, sequence_result=sequence_result)
 
     @property
     def solution(self) -> Solution:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.problem.cost import SwayCost, axis_reach
-from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.dynamics import parameter_rows
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.motion_equations import motion_equations
@@ -196,7 +196,7 @@ def _nominal(
     swung = initial_state(problem.plant, problem.initial)
     return TranscribedMachine(
         equations=motion_equations(problem.plant, problem.desensitized, problem.order),
-        parameters=parameter_column(problem.plant, dict(problem.parameters)),
+        parameters=parameter_rows(problem.plant, [problem.parameters]),
         scale=scale[states],
         start=np.pad(swung, (0, len(states) - len(swung))) / scale[states],
         end=modal[np.ix_(states[asked[states] & exact], states)],
@@ -210,7 +210,7 @@ def _other(
     scale = canonical.data.scale[: 2 * canonical.system.layout.n_u]
     return TranscribedMachine(
         equations=motion_equations(problem.plant, (), problem.order),
-        parameters=parameter_column(problem.plant, dict(parameters)),
+        parameters=parameter_rows(problem.plant, [parameters]),
         scale=scale,
         start=initial_state(problem.plant, problem.initial) / scale,
         end=np.zeros((0, len(scale))),

@@ -42,6 +42,8 @@ LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
 FAR = 1e-2  # likewise of how far that is from 1
 TINY = 1e-6  # below which how little it is does not matter
+# by which the exponent of the sway's cost may grow from one expansion to the next; 1 costs 6e-4
+STEEPER = 2.0
 UNWEIGHTED = SwayCost(beta=0.0, gamma=1.0)
 
 
@@ -96,13 +98,11 @@ class Goal:
             if self.widened:
                 program.at_most(-linear[None], np.zeros(1))
             quadratic = self.effort_price * setup.effort_form
-            quadratic.resize(program.variables, program.variables)
-            return quadratic, linear
-        scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
-        expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
-        quadratic = expanded.copy()
+        else:
+            scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
+            expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
+            quadratic, linear[: len(slope)] = expanded.copy(), slope
         quadratic.resize(program.variables, program.variables)
-        linear[: len(slope)] = slope
         return quadratic, linear
 
     def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
@@ -126,8 +126,21 @@ class Goal:
         return float(np.sqrt(effort(after[columns] - moved) / effort(after[columns])))
 
     def approach(self, before: Iterate, after: Iterate) -> Iterate:
-        """Go from one iterate towards the next, as far as what was expanded holds."""
-        return goals.approach(self.setup.transcription, self.sway_cost, before, after)
+        """Go from one iterate towards the next, as far as the sway's cost resembles its expansion.
+
+        It is exponential: from far below, a quadratic model leads to where it is steep beyond all measure.
+        """
+        if self.sway_cost.beta == 0.0:
+            return after
+
+        def exponent(iterate: Iterate) -> float:
+            return float(self.sway_cost.exponents(self.setup.transcription.end_sway_found(iterate)).max())
+
+        most, way = exponent(before) + STEEPER, after.flat() - before.flat()
+        while exponent(after) > most:
+            way = 0.5 * way
+            after = before.of_flat(before.flat() + way)
+        return after
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -39,7 +39,6 @@ from gen_profile.solvers.direct.transient_sway import to_be_asked
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution
-from gen_profile.spec.model import AxisLimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
 TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case; a hundred times as much costs 0.1 % less
@@ -80,7 +79,9 @@ def solve(problem: Problem) -> Solution:
     Solution
         Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
     """
-    free = [axis for axis in range(len(problem.target)) if not _limits_effort(problem.limits.of(axis))]
+    limits = map(problem.limits.of, range(len(problem.target)))
+    # of these no limit bounds how much effort less sway may take
+    free = [axis for axis, own in enumerate(limits) if own.acceleration is None and own.jerk is None]
     bounded = _held_back(problem, free) if free else problem
     solutions: list[Solution] = []
     try:
@@ -92,11 +93,6 @@ def solve(problem: Problem) -> Solution:
             raise
     motions = [solution for solution in solutions if solution.optimum is not None]
     return attrs.evolve((motions or solutions)[-1], problem=problem)
-
-
-def _limits_effort(own: AxisLimitsSpec) -> bool:
-    """Whether an axis' limits bound how much effort less sway may take."""
-    return own.acceleration is not None or own.jerk is not None
 
 
 def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:

@@ -14,12 +14,11 @@ from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array
 from gen_profile.problem.cost import SwayCost, axis_reach, effort_weights
 from gen_profile.problem.initial_state import initial_state
-from gen_profile.problem.linearization import Linearization
-from gen_profile.problem.linearization import linearize as linearized_machine
+from gen_profile.problem.linearization import Linearization, linearize
 from gen_profile.problem.pontryagin import OptimalitySystem, RuntimeParameters, StateLayout
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.problem.reachability import independent_states
-from gen_profile.solvers.collocation import Scheme, Trajectory, linearize, sampled
+from gen_profile.solvers.collocation import Scheme, Trajectory, newton_step, sampled
 
 # Shares of a state's response outside the span of the others', below which its end condition is implied.
 # What a sensitivity left at a thousandth of itself adds to the sway is far less than what second order does.
@@ -161,7 +160,7 @@ class BoundaryValueProblem:
         numpy.linalg.LinAlgError
             When they have no solution.
         """
-        return linearize(flow, trajectory).solve(self.initial, self.final)
+        return newton_step(flow, trajectory, self.initial, self.final)
 
     def quantities(self, points: Array) -> Array:
         """H, g, highest derivatives, sways and angles; see `OptimalitySystem`."""
@@ -211,12 +210,8 @@ class BoundaryValueProblem:
         """Greatest fraction by which an end condition fails that was not asked for, as others imply it."""
         own = slice(0, 2 * self.system.layout.n_u)
         implied = np.isnan(self.final[own])
-        return float(
-            np.max(
-                np.abs(self.weights(solution) * solution.nodes[-1, : len(self.final)])[own][implied],
-                initial=0.0,
-            )
-        )
+        left = np.abs(self.weights(solution) * solution.nodes[-1, : len(self.final)])
+        return float(left[own][implied].max(initial=0.0))
 
     def greatest_angle(self, solution: Trajectory) -> float:
         """Greatest rope angle at the collocation points in rad."""
@@ -239,7 +234,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> BoundaryVal
     distance, reach = np.array(problem.distance), axis_reach(problem)
     weights = effort_weights(reach)
     middle = tuple((np.array(problem.start) + np.array(problem.target)) / 2.0)
-    linear = linearized_machine(problem.plant, problem.parameters, middle)
+    linear = linearize(problem.plant, problem.parameters, middle)
     static = np.abs(np.linalg.solve(linear.stiffness, linear.input @ (reach / duration**2))).max()
     scale = np.ones(layout.size)
     scale[: layout.n_u] = static
@@ -264,8 +259,8 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> BoundaryVal
         offset=offset,
         scale=scale,
     )
-    excited = _excited(linear, swung[: 2 * layout.n_u], reach, duration)
-    basis, shown = _modal(layout, linear, _shown(linear, excited, reach))
+    excited, seen = _excited(linear, swung[: 2 * layout.n_u], reach, duration)
+    basis, shown = _modal(layout, linear, seen)
     final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
     initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
     return BoundaryValueProblem(
@@ -348,28 +343,22 @@ def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Ar
     return basis, sway
 
 
-def _excited(linear: Linearization, swung: Array, reach: Array, duration: float) -> Array:
-    """Sway in m that each mode may be left with, shape (n_u,).
+def _excited(linear: Linearization, swung: Array, reach: Array, duration: float) -> tuple[Array, Array]:
+    """Sway in m that each mode may be left with, and per unit of it, each of shape (n_u,).
 
     The jerk with which a move of distance D in time T begins leaves a fast mode swinging by its gain times
-    60 D / (ω T)³; it otherwise follows the axes statically, and swings as at the start.
+    60 D / (ω T)³; it otherwise follows the axes statically, and swings as at the start. Modes that are too
+    fast to be excited noticeably count as showing nothing: asking those to rest would only spoil the
+    equations' condition.
     """
     drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
     z, dz = np.linalg.solve(linear.modes, swung.reshape(2, -1).T).T
     begun = np.hypot(z, dz / linear.frequencies)
     left = QUINTIC_JERK * drive / (linear.frequencies * duration) ** 3 + begun
-    return np.asarray(np.abs(linear.sway_gain @ linear.modes).max(axis=0) * left)
-
-
-def _shown(linear: Linearization, excited: Array, reach: Array) -> Array:
-    """Sway in m per unit of each mode, shape (n_u,); 0 for modes that are too fast to be excited noticeably.
-
-    Asking those to rest would only spoil the equations' condition.
-    """
-    drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
     shown = np.abs(linear.sway_gain @ linear.modes).max(axis=0)
+    excited = shown * left
     # a mode that no axis drives is not too fast: whether it rests must be seen
-    return np.where((drive > 0.0) & (excited < NEGLIGIBLE * reach.max()), 0.0, shown)
+    return excited, np.where((drive > 0.0) & (excited < NEGLIGIBLE * reach.max()), 0.0, shown)
 
 
 def _finite(values: Array) -> Array:

@@ -55,14 +55,12 @@ def solve_newton(problem: BoundaryValueProblem, guess: Trajectory) -> NewtonOutc
         if trial is not None and _shortens(problem, current, trial, damping):
             stalled = trial.step < STALLED and trial.step > SLOW * current.step
             current, damping = trial, min(1.0, 2.0 * damping)
-            if stalled:
-                return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
-        elif current.step < STALLED:
-            return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         else:
-            damping /= 2.0
-            if damping < SMALLEST_DAMPING:
-                break
+            stalled, damping = current.step < STALLED, damping / 2.0
+        if stalled:
+            return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
+        if damping < SMALLEST_DAMPING:
+            break
     return NewtonOutcome(solution=None, iterations=iteration, residual=current.step)
 
 

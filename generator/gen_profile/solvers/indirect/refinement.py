@@ -1,6 +1,6 @@
 """Mesh refinement: split the intervals on which a collocated solution is not accurate enough."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 
 import attrs
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
-from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.collocation import Trajectory, sampled
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 
@@ -45,28 +45,15 @@ def refine(
             if parts.max() == 1:
                 break
             meshes = [_split(solution.mesh, np.minimum(parts, most)) for most in MOST_PARTS]
-        outcome, spent = _first_solved(canonical, solution, meshes, solve)
-        iterations += spent
-        if outcome.solution is None:
+        for mesh in meshes:
+            outcome = solve(canonical, sampled(solution, solution.scheme, mesh))
+            iterations += outcome.iterations
+            if outcome.solution is not None:
+                break
+        else:
             return attrs.evolve(outcome, iterations=iterations)
         solution, residual, meshes = outcome.solution, outcome.residual, []
     return NewtonOutcome(solution=solution, iterations=iterations, residual=residual)
-
-
-def _first_solved(
-    canonical: BoundaryValueProblem,
-    solution: Trajectory,
-    meshes: Sequence[Array],
-    solve: Callable[[BoundaryValueProblem, Trajectory], NewtonOutcome],
-) -> tuple[NewtonOutcome, int]:
-    """Try one mesh after the other; also count the iterations of all."""
-    spent = 0
-    for mesh in meshes:
-        outcome = solve(canonical, solution.on(mesh))
-        spent += outcome.iterations
-        if outcome.solution is not None:
-            break
-    return outcome, spent
 
 
 def _parts(canonical: BoundaryValueProblem, solution: Trajectory) -> NDArray[np.intp]:

@@ -42,12 +42,6 @@ class _SimplifiedIterate:
     trajectory: Trajectory
     slopes: Array
 
-    @property
-    def final_costates(self) -> Array:
-        """λ(1)."""
-        size = self.trajectory.size
-        return self.trajectory.nodes[-1, size // 2 :]
-
 
 @attrs.frozen(kw_only=True, eq=False)
 class _Model:
@@ -174,11 +168,12 @@ def _corrected(
     force[..., model.driven_states] += least.controls.reshape(*force.shape[:2], -1)
     rises, _, _ = response.states(force)
     load += (model.costed.swapaxes(2, 3) @ least.pull.reshape(*load.shape[:2], -1, 1))[..., 0]
-    final_costates = np.zeros(n)
-    final_costates[model.asked] = least.multipliers
-    _, falls = response.costates(load, final_costates)
+    multipliers = np.zeros(n)
+    multipliers[model.asked] = least.multipliers
+    _, falls = response.costates(load, multipliers)
     slopes = current.slopes + np.concatenate([rises, -falls / weights], axis=-1)
-    return _integrated(current.trajectory, slopes, problem.initial, current.final_costates + final_costates)
+    final_costates = current.trajectory.nodes[-1, n:] + multipliers
+    return _integrated(current.trajectory, slopes, problem.initial, final_costates)
 
 
 def _consistent(problem: BoundaryValueProblem, start: Trajectory) -> _SimplifiedIterate:

@@ -86,8 +86,9 @@ __all__ = ["METHOD", "solve"]
 MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 
 
+@one_thread()
 def solve(
-    problem: Problem, far: Callable[[], bool] = lambda: True, options: IndirectOptions | None = None
+    problem: Problem, far: Callable[[], bool] = lambda: True, options: IndirectOptions = USUAL
 ) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
@@ -96,7 +97,7 @@ def solve(
     problem : Problem
     far : () → bool
         Whether one that swings far is worth looking for, which takes long; asked where there is no other.
-    options : IndirectOptions, optional
+    options : IndirectOptions
 
     Returns
     -------
@@ -108,16 +109,11 @@ def solve(
     InfeasibleProblem
         The machine does not hang at rest, so that it has no natural frequencies.
     """
-    with one_thread():
-        return _solve(problem, far, options or USUAL)
-
-
-def _solve(problem: Problem, far: Callable[[], bool], options: IndirectOptions) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     unweighted = canonical_problem(problem, system)
     asked, redundant = independence(unweighted)
     if redundant:
-        solution = _solve(without(problem, redundant), far, options)
+        solution = solve(without(problem, redundant), far, options)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     final = np.where(asked, unweighted.final, np.nan)
     unweighted = attrs.evolve(unweighted, final=final, options=options)
