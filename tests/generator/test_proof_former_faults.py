@@ -42,6 +42,10 @@ FORMER = {  # machine: how many are drawn, seed, number
         (225, 3, 9),  # a stop 4.8 s late, as its stated ends left too little room for calming
         (100, 4, 57),  # 2.7 s late, as what half of a long plan leaves was calmed
     ],
+    "measured": [
+        (2000, 1003, 112),  # an override that was not obeyed for 20 s, as the load was damped on the way
+        (2000, 1002, 725),  # damped 4.5 s late, as the last 5 mm took the axis 6 s
+    ],
 }
 
 
