@@ -341,7 +341,7 @@ def _misstated(
     own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
     strength = rate**2 * np.sqrt(own[:, 0]) / disturbance.gust.acceleration
     strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
-    strength *= cycles * cycle < min(resets, default=np.inf)  # when it forgets, perhaps on the way
+    strength *= cycles < min((round(time / cycle) for time in resets), default=len(used))  # when it forgets
     at = int(np.argmax(strength))
     scale = axis.of("fSensorScale")
     remembered = max(0.0, 1.0 - own[at, 0] / max(own[at, 1], 1e-300))  # of what it showed before it failed

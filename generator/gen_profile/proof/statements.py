@@ -429,7 +429,7 @@ def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
         below = at_most - [stated[begin:end].min() for begin, end in rests]  # as nothing decays
         worst = int(np.argmax(below))
-        yield Allowance("understated", ends[worst], float(below[worst]), EXACT)
+        yield Allowance("understated", ends[worst], float(below[worst]), BESIDE * limit)
 
 
 def _remains_at_last(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
