@@ -76,13 +76,16 @@ VIEWS = ("design", "compare", "drive", "measure", "take", "watch")
 
 
 def test_every_view_has_a_place_in_the_address_and_fits_it(page):
-    heads = """
-        const heads = [...document.querySelectorAll('main h2')].filter((head) => head.checkVisibility());
-        return heads.map((head) => head.textContent)"""
+    headings = """
+        const shown = [...document.querySelectorAll('main h2')].filter((head) => head.checkVisibility());
+        const headings = shown.map((head) => head.textContent);
+        return """
+    look_at(page, "watch")
+    page.wait(headings + "headings[0].endsWith('.st')")
     seen = {}
     for view in VIEWS:
         look_at(page, view)
-        seen[view] = page.run(heads)
+        seen[view] = page.run(headings + "headings")
         shown = page.run("return [location.hash.split('/')[0], document.title]")
         assert shown[0] == ("" if view == "design" else f"#{view}") and len(shown[1].split(" · ")) == 3
         assert page.run("return document.querySelectorAll('#places [aria-current=page]').length") == 1

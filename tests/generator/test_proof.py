@@ -24,7 +24,6 @@ from gen_profile.proof.judging import WatchedRun, judge_run
 from gen_profile.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH, Numbering
 from gen_profile.proof.on_cluster import ProofRecipe, judge_part
 from gen_profile.proof.prove import prove, replay
-from gen_profile.proof.verdict import lateness
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
@@ -111,14 +110,6 @@ def test_a_sound_block_is_proved(spec, proof):
     document = proof.to_dict()
     for name in ("velocity", "acceleration", "jerk"):
         assert 0.9 < document["limits"][name] <= 1.0 + 1e-9
-
-
-@pytest.mark.slow
-def test_a_block_does_not_become_slower(proof):
-    """Slow periods beyond what limits take, on average: 0.05 more than when this was written."""
-    most = {"position": 0.32, "on the way": 0.29, "velocity": 0.22, "stop": 0.59}
-    late = {kind: np.mean(values) for kind, values in lateness(proof.judged).items()}
-    assert {kind for kind in most if late[kind] > most[kind]} == set()
 
 
 def test_sway_on_the_way_is_told_where_it_is_limited(proof):

@@ -27,6 +27,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (225, 5, 125),  # 2.6 s late, as from rest a plan for the target before led away from the new one
         (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
         (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
+        (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded

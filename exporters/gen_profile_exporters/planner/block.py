@@ -280,6 +280,7 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "model": len(c.model),
         "column": WIDE,
         "wide": WIDE,
+        "mean": 4 * axes,
         "conditions": conditions * KERNEL_SLOTS,
         "row": conditions,
         "gram": conditions**2,
