@@ -14,6 +14,7 @@ from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
 from gen_profile.cli.options import (
+    Number,
     PathType,
     SpecChoice,
     output_options,
@@ -61,7 +62,7 @@ Words = tuple[str, ...]
     "--for",
     "seconds",
     metavar="SECONDS",
-    type=click.FloatRange(min=1.0),
+    type=Number(min=1.0),
     default=60.0,
     help="To log the phone for; 60 s.",
 )
