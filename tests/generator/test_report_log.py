@@ -93,11 +93,23 @@ def test_the_exported_table_is_such_a_log(tmp_path):
         (table(["time_s", "sway"], TIMES[:5], TIMES[:5]), "needs at least 16 samples, found 5"),
         (
             table(["time_s", "sway"], TIMES[::-1], TIMES),
-            "the times must rise from row to row, and do not after 0.38 s",
+            "the times must rise from row to row, and do not after 0.38 s; sort the rows, and remove",
         ),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n", "row 22: sway holds 'x', which is no number"),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,1e300\n", "row 22: sway holds '1e300', which is no"),
-        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n", "row 22: sway holds 'nan'"),
+        (
+            table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n",
+            "which is no number of a log; leave the cell",
+        ),
+        (
+            "\n" + table(["time_s", "sway"], TIMES, TIMES) + "\n\n0.5,1 mm\n",
+            "row 25: sway holds '1 mm', which",
+        ),
+        ('time_s,sway\n"0,0","0,5"\n' * 9, "row 2: time_s holds '0,0', which is no number of a log; write"),
+        (
+            "time_s,sway\n0,00,0,50\n" + "0,02,0,50\n" * 20,
+            "row 2: holds 4 numbers below 2 names;",
+        ),
         ("time_s,sway\n0,0,5\n" * 9, "row 3: time_s holds 'time_s'"),
     ],
 )
