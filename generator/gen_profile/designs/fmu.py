@@ -11,7 +11,7 @@ import numpy as np
 
 from gen_profile.artefacts.writing import deliver
 from gen_profile.designs.plan import plan
-from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError
+from gen_profile.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
 from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import planned_axes
@@ -104,7 +104,7 @@ def export_fmu(
     Raises
     ------
     GenProfileError
-        Nothing was written.
+        Nothing was written: a choice or the file's suffix is wrong, or there is no such motion.
 
     Examples
     --------
@@ -116,7 +116,10 @@ def export_fmu(
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
     systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}
     identifier = c_name(systems.get(kind, f"{spec.name} {kind}"))
-    path = Path(path or f"{identifier}.{'ssp' if kind in LEADERS else 'fmu'}")
+    suffix = ".ssp" if kind in LEADERS else ".fmu"
+    path = Path(path or f"{identifier}{suffix}")
+    if path.suffix.lower() != suffix:
+        raise OutputError(f"out {path}: name a file that ends in {suffix}, as other tools ask for.")
     version, input_kind = _one_of(Version, version, "version"), _one_of(InputKind, input_kind, "input_kind")
     platforms = platform_names("host") if platforms is None else tuple(as_names(platforms))
     for platform in platforms:
