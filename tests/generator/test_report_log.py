@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.errors import OutputError
+from gen_profile.errors import OutputError, SpecError
 from gen_profile.report.log import parse_log, read_log
 from gen_profile.spec.reading import preset_spec
 
@@ -120,6 +120,11 @@ def test_what_is_no_such_table_is_refused_with_a_sentence(text, complaint):
     assert message.startswith("measured log.csv") and complaint in message and message.endswith(".")
 
 
+def test_degrees_without_a_unit_are_asked_about():
+    with pytest.raises(SpecError, match="more than half a turn; is it in deg"):
+        parse_log(table(["time_s", "angle"], TIMES, [9.0 * time for time in TIMES]), "log.csv", paper())
+
+
 def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path):
     with pytest.raises(OutputError, match=r"measured: cannot read the log .*log\.csv: "):
         read_log(tmp_path / "log.csv", paper())
@@ -186,12 +191,12 @@ def test_columns_that_are_not_there(columns):
 
 
 def test_a_chosen_column_is_in_the_unit_that_its_name_states():
-    rows = "\n".join(f"{index},{index}" for index in range(20))
+    rows = "\n".join(f"{index},{0.1 * index}" for index in range(20))
     text = f"Zeit [ms],Gyroscope x (rad/s)\n{rows}"
     chosen = "time=1,payload_angle=2"
     with pytest.raises(OutputError, match="payload_angle is in rad/s, which measures no angle"):
         parse_log(text, "log.csv", paper(), chosen)
     log = parse_log(text.replace("rad/s", "deg"), "log.csv", paper(), chosen)
     assert log.times[1] == pytest.approx(1e-3)
-    assert log.angles["payload"][1] == pytest.approx(np.radians(1.0))
-    assert parse_log(text, "log.csv", paper(), "time=1,payload_angle_rad=2").angles["payload"][1] == 1.0
+    assert log.angles["payload"][1] == pytest.approx(np.radians(0.1))
+    assert parse_log(text, "log.csv", paper(), "time=1,payload_angle_rad=2").angles["payload"][1] == 0.1

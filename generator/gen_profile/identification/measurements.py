@@ -256,11 +256,17 @@ def cut_swing(
         template = "{source}: a swing needs at least {least} samples, found {count}."
         raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
     require_rising(times, source)
-    if quantity == "angle" and (span := float(np.ptp(values))) > np.pi:
+    if quantity == "angle":
+        require_angle(values)
+    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
+
+
+def require_angle(values: Array) -> None:
+    """Refuse, by a `SpecError`, angles in rad that go over more than half a turn, as degrees do."""
+    if (span := float(np.ptp(values))) > np.pi:
         raise SpecError(
             "unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?", span=span
         )
-    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
 
 
 def require_rising(times: Array, source: str) -> None:
