@@ -71,7 +71,7 @@ def listed(names: Iterable[str]) -> str:
 
 def meant(word: str, known: Iterable[str]) -> list[str]:
     """Find the names, `MOST` at most, that a person may mean: by meaning, by a part, or misspelt."""
-    names, word = list(known), word.strip().lower()
+    names, word = list(known), str(word).strip().lower()  # from Python, it may be no text
     same = [name for name in names if name.lower() == word]
     by_meaning = [name for name in names if word in SYNONYMS.get(name, "").split()]
     by_part = [

@@ -134,6 +134,9 @@ def test_errors_are_one_json_document_too(tmp_path, monkeypatch, command, words)
         (["compare", "--plott", "x"], "No such option"),
         (["check"], "Missing argument 'ARTEFACT'"),
         (["formats", "csv"], "unexpected extra argument"),
+        (["robustness", "--range", "nan"], "'nan' is no finite number"),
+        (["deploy", "a.st", "--to", "opc.tcp://127.0.0.1:1", "--for", "nan"], "'nan' is no finite number"),
+        (["identify", "--after", "inf"], "'inf' is no finite number"),
     ],
 )
 def test_misused_arguments(tmp_path, monkeypatch, words, message):

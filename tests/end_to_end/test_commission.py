@@ -77,6 +77,14 @@ def test_a_wrong_answer_is_asked_for_again(site):
     assert sorted(one.name for one in site.iterdir()) == ["run.csv"]
 
 
+def test_answers_are_kept_where_the_log_is_not_there(site):
+    answers = ["bay-crane", "", "", "6.2±0.1", *[""] * 8, "nun.csv"]
+    ended = commissioned(site, answers=answers)
+    assert ended.returncode == 130 and "There is no log nun.csv; name its file" in ended.stderr
+    assert read_spec(site / "hall.toml").plant.parameters["L1"] == 6.2
+    assert "Most like which" not in commissioned(site, answers=[]).stderr
+
+
 @pytest.mark.parametrize(
     ("option", "reason"),
     [(("--swing", "nun.csv"), "There is no log nun.csv"), (("--export", "plk"), "unknown format 'plk'")],

@@ -120,6 +120,10 @@ def test_unproved_blocks_are_refused(tmp_path, check, text, words):
             ("--planner", "paper.st", "--commands", "commands.csv", "--live-parameter", "L3=1"),
             "--live-parameter: the block has no live parameter 'L3'",
         ),
+        (
+            ("--planner", "paper.st", "--commands", "commands.csv", "--live-parameter", "L1=nan"),
+            "--live-parameter: L1 must be from",
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, options, words):

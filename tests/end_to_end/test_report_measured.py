@@ -8,6 +8,10 @@ from command_line import run_here
 from scipy.integrate import solve_ivp
 
 from gen_profile.designs.plan import plan
+from gen_profile.errors import OutputError
+from gen_profile.evaluation.motion_evaluation import evaluate
+from gen_profile.report.log import MeasuredLog
+from gen_profile.report.measured import compare_measured
 from gen_profile.spec.reading import preset_spec
 
 STEP = 0.01
@@ -157,6 +161,17 @@ def test_a_log_without_the_move_is_refused(tmp_path, spec, motion):
     outcome, _, page = report(tmp_path, "--measured-start", "7")
     assert (outcome.code, page) == (2, "")
     assert "log on until the load is at rest" in outcome.errors[-1]
+
+
+@pytest.mark.parametrize("factor", [1e-3, -1.0, 3.0])
+def test_a_log_of_another_way_is_refused(spec, motion, factor):
+    times = np.linspace(0.0, 8.0, 400)
+    positions = {"cart": factor * motion(times).position[:, 0]}
+    log = MeasuredLog(source="log.csv", times=times, positions=positions, sways={}, angles={})
+    with pytest.raises(
+        OutputError, match=f"cart goes from 0 to {0.3 * factor:.4g} m in the log, and from 0 to 0.3"
+    ):
+        compare_measured(spec, evaluate(spec, motion), log, motion.duration)
 
 
 @pytest.mark.slow

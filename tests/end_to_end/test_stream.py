@@ -214,7 +214,7 @@ class TestArtefact:
 
     def test_unverified(self, tmp_path):
         run_here("--preset", "paper", "--no-check", "--export", "can", "--out", tmp_path)
-        assert "is unverified" in self.refused(tmp_path / "paper.log")
+        assert "or accept it as it is (accept_unverified)." in self.refused(tmp_path / "paper.log")
         assert run_here("stream", tmp_path / "paper.log", "--dry-run", "--accept-unverified").code == 0
 
     def test_failed(self, deployed, tmp_path):

@@ -217,6 +217,7 @@ class TestInPython:
         for given, words in (
             ({"target": 1.0, "stop": True}, "give one of target, velocity, stop and quick_stop"),
             ({"live": {"L2": 1.0}}, "no live parameter 'L2' (known: L1)"),
+            ({"live": [6.0]}, "live: give values by name, such as {'L1': 6.0}, found [6.0]"),
             ({"target": "far"}, "target: must be a number, found 'far'"),
             ({"velocity": np.zeros(3)}, "velocity: must be a number or one for each of 250 cycles"),
         ):
@@ -225,6 +226,8 @@ class TestInPython:
         for seconds in (0.0, -1.0, math.nan, math.inf):
             with pytest.raises(gp.SpecError, match=r"at least one cycle of 0\.004 s"):
                 planner.hold(seconds)
+        with pytest.raises(gp.SpecError, match="at most 8000 in one go"):
+            planner.hold(1e9)
         with pytest.raises(gp.OutputError, match=r"Cannot read the block .*none.st: No such file"):
             gp.Planner(tmp_path / "none.st")
         assert planner.hold(0.1, target=math.nan).error_id[-1] == 3

@@ -483,10 +483,13 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
     assert "the target is reached, at 2" in run_here("planner", "explain", events).out
     plain = run_here("planner", "play", *write_plain(tmp_path), "--events", events)
     assert (plain.code, "state planner.events = true" in plain.err) == (2, True)
-    for wrong in ("1,21,here", "1,inf,0", "1,21"):
+    for wrong in ("1,21,here", "1,inf,0", "1,21", "1,1.5,0", "nan,1,0", "1,21,0,5"):
         events.write_text(f"time_s,code,value\n{wrong}\n")
         refused = run_here("planner", "explain", events)
-        assert (refused.code, "line 2: three numbers are wanted" in refused.err) == (2, True)
+        assert (refused.code, "line 2: a time, a whole number and a value" in refused.err) == (
+            2,
+            True,
+        )
 
 
 def write_plain(folder):

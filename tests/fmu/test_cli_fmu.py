@@ -126,6 +126,8 @@ def test_choices_are_those_of_the_workflow():
         (("fmu", "profile", "--input", "velocity"), 2, "--input: the inputs of a profile are its own"),
         (("fmu", "plant", "--source-only", "--platform", "all"), 2, "--source-only puts no binary in"),
         (("fmu", "plant", "--set", "plant.L1=-1"), 2, "plant.L1: must be a number"),
+        (("fmu", "plant", "--out", "a.zip"), 2, "--out a.zip: name a file that ends in .fmu"),
+        (("fmu", "ssp", "--out", "a.fmu"), 2, "--out a.fmu: name a file that ends in .ssp"),
         (("fmu", "plant", "--out", "/proc/none/a.fmu"), 2, "there is no folder /proc/none; make it"),
     ],
 )

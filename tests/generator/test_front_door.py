@@ -54,6 +54,10 @@ def test_a_spec_from_keyword_values_is_the_one_of_the_file(tmp_path):
     assert longer.move.duration == 10.0
 
 
+def test_one_override_needs_no_list():
+    assert gp.preset_spec("paper", "move.duration=3.2") == gp.preset_spec("paper", move={"duration": 3.2})
+
+
 def test_a_limit_of_all_axes_replaces_that_of_one():
     spec = gp.preset_spec("gantry-crane", ["limits.axis.y={velocity=0.3, jerk=2.0}", "limits.velocity=0.5"])
     changed = gp.evolve_spec(spec, limits={"velocity": 0.4})
@@ -141,7 +145,29 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             r"moves 2 axes, .* machine has 1 \(cart\)",
         ),
         (lambda _: gp.plan(3), "A spec, or the path of one, is expected, found 3"),
-        (lambda spec: gp.compare(spec, own="mine.csv"), "takes a list of profiles, .* found 'm'"),
+        (lambda spec: gp.compare(spec, own="mine.csv"), r"such as gp\.plan\(spec\)\.motion, found a str"),
+        (lambda spec: gp.compare(spec, own=[STANDING]), "A Profile .* found a SampledProfile"),
+        (lambda spec: gp.robustness(spec, "L1", own=3), "A Profile .* found a int"),
+        (lambda spec: gp.evaluate(spec, STANDING), "A Profile .* found a SampledProfile"),
+        (lambda _: gp.sample(STANDING, 0.01), "A Profile .* found a SampledProfile"),
+        (lambda spec: gp.cosimulate(spec, straight(1, "mine")), r"such as gp\.sample.* found a Profile"),
+        (lambda spec: gp.residual_sways(spec, np.zeros((9, 1)), {}), r"gp\.sample.* found a ndarray"),
+        (lambda spec: gp.robustness(spec, "L1", points=1), "points: must be at least 3, found 1"),
+        (lambda spec: gp.robustness(spec, "L1", half_range=np.nan), "range: must be .* 0.9 .* found nan"),
+        (
+            lambda spec: gp.linearize(spec.machine(), spec.plant.parameters, [0.0, 1.0]),
+            "one position per axis",
+        ),
+        (lambda spec: gp.export_fmu(spec, "plant", version="4"), r"version: .* '4' \(known: 2, 3\)"),
+        (lambda spec: gp.export_fmu(spec, input_kind="speed"), "input_kind: .*; did you mean 'velocity'"),
+        (lambda spec: gp.export_fmu(spec, platforms="linux"), "platforms: .*; did you mean 'linux-x86_64'"),
+        (
+            lambda _: gp.deploy_planner(gp.preset_spec("bay-crane"), "plc", "unused", histories=0),
+            "at least 1",
+        ),
+        (lambda _: gp.preset_spec("paper", move={"duration": 3j}), "found a complex"),
+        (lambda _: gp.preset_spec("paper", move={3: 1}), "move.3: unknown key"),
+        (lambda _: gp.preset_spec(None), "unknown preset None"),
         (lambda spec: gp.compare(spec, own=straight(1, "zvd")), "Two motions are called 'zvd'"),
         (lambda spec: gp.export_fmu(spec, "plnt"), "no FMU of the kind 'plnt'; did you mean 'plant'"),
         (lambda spec: gp.cosimulate(spec, STANDING, {"L3": 1.0}), "machine has no 'L3'"),
@@ -168,7 +194,7 @@ def test_slips_are_told_in_a_sentence(call, sentence):
     assert not Path("unused").exists()
 
 
-@pytest.mark.parametrize("cycle_time", [0.0, -1.0, np.nan, np.inf, 1e-12])
+@pytest.mark.parametrize("cycle_time", [0.0, -1.0, np.nan, np.inf, 1e-12, "0.01"])
 def test_a_cycle_that_cannot_be_is_told_in_a_sentence(cycle_time):
     with pytest.raises(gp.GenProfileError, match="cycle"):
         gp.sample(straight(1, "mine"), cycle_time)

@@ -107,6 +107,7 @@ def test_what_loggers_write_above_the_numbers_is_passed_over(head):
     log = log_of("\n".join([*head, *rows]), ("t", "angle"))
     np.testing.assert_allclose(log.times, [t for t, _ in ROWS])
     np.testing.assert_allclose(log.values, np.radians([v for _, v in ROWS]))
+    assert np.array_equal(log_of("\n".join(["# bay 3", "", *rows]), ("1", "2")).values, log.values)
 
 
 def test_rows_without_a_value_are_left_out():

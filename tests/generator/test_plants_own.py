@@ -84,6 +84,13 @@ def test_a_spec_finds_the_machine_beside_itself(folder):
     assert spec.to_dict()["plant"]["file"] == "pendulum.py"  # no folder of this computer
 
 
+def test_what_a_machine_s_file_prints_is_no_part_of_the_outcome(folder, capsys):
+    with (folder / "machines" / "pendulum.py").open("a", encoding="utf-8") as file:
+        file.write('print("read")\n')
+    read_spec(folder / "own.toml")
+    assert capsys.readouterr() == ("", "read\n")
+
+
 def test_a_spec_carries_its_machine_wherever_it_goes(folder):
     spec = read_spec(folder / "own.toml")
     shutil.rmtree(folder / "machines")

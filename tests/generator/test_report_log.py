@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.errors import OutputError
+from gen_profile.errors import OutputError, SpecError
 from gen_profile.report.log import parse_log, read_log
 from gen_profile.spec.reading import preset_spec
 
@@ -93,11 +93,23 @@ def test_the_exported_table_is_such_a_log(tmp_path):
         (table(["time_s", "sway"], TIMES[:5], TIMES[:5]), "needs at least 16 samples, found 5"),
         (
             table(["time_s", "sway"], TIMES[::-1], TIMES),
-            "the times must rise from row to row, and do not after 0.38 s",
+            "the times must rise from row to row, and do not after 0.38 s; sort the rows, and remove",
         ),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n", "row 22: sway holds 'x', which is no number"),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,1e300\n", "row 22: sway holds '1e300', which is no"),
-        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n", "row 22: sway holds 'nan'"),
+        (
+            table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n",
+            "which is no number of a log; leave the cell",
+        ),
+        (
+            "\n" + table(["time_s", "sway"], TIMES, TIMES) + "\n\n0.5,1 mm\n",
+            "row 25: sway holds '1 mm', which",
+        ),
+        ('time_s,sway\n"0,0","0,5"\n' * 9, "row 2: time_s holds '0,0', which is no number of a log; write"),
+        (
+            "time_s,sway\n0,00,0,50\n" + "0,02,0,50\n" * 20,
+            "row 2: holds 4 numbers below 2 names;",
+        ),
         ("time_s,sway\n0,0,5\n" * 9, "row 3: time_s holds 'time_s'"),
     ],
 )
@@ -106,6 +118,11 @@ def test_what_is_no_such_table_is_refused_with_a_sentence(text, complaint):
         parse_log(text, "log.csv", paper())
     message = str(raised.value)
     assert message.startswith("measured log.csv") and complaint in message and message.endswith(".")
+
+
+def test_degrees_without_a_unit_are_asked_about():
+    with pytest.raises(SpecError, match="more than half a turn; is it in deg"):
+        parse_log(table(["time_s", "angle"], TIMES, [9.0 * time for time in TIMES]), "log.csv", paper())
 
 
 def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path):
@@ -174,12 +191,12 @@ def test_columns_that_are_not_there(columns):
 
 
 def test_a_chosen_column_is_in_the_unit_that_its_name_states():
-    rows = "\n".join(f"{index},{index}" for index in range(20))
+    rows = "\n".join(f"{index},{0.1 * index}" for index in range(20))
     text = f"Zeit [ms],Gyroscope x (rad/s)\n{rows}"
     chosen = "time=1,payload_angle=2"
     with pytest.raises(OutputError, match="payload_angle is in rad/s, which measures no angle"):
         parse_log(text, "log.csv", paper(), chosen)
     log = parse_log(text.replace("rad/s", "deg"), "log.csv", paper(), chosen)
     assert log.times[1] == pytest.approx(1e-3)
-    assert log.angles["payload"][1] == pytest.approx(np.radians(1.0))
-    assert parse_log(text, "log.csv", paper(), "time=1,payload_angle_rad=2").angles["payload"][1] == 1.0
+    assert log.angles["payload"][1] == pytest.approx(np.radians(0.1))
+    assert parse_log(text, "log.csv", paper(), "time=1,payload_angle_rad=2").angles["payload"][1] == 0.1

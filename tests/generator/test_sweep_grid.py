@@ -95,6 +95,9 @@ def test_overrides_say_what_the_values_are():
         (["a=1979-05-27"], "finite numbers, texts or arrays"),
         (["a=1:1:2"], "a value comes twice"),
         (["a=1,2", "a=3,4"], "a key is varied once"),
+        (["a=0.5:1:1e3"], r"how many values to take\.$"),
+        (["a=0.5:1:99999999"], "more than 10000000 combinations"),
+        (["a=0.1,,0.2"], "between two commas of '0.1,,0.2' there is no value"),
         (["a=0:1:9999", "b=0:1:9999"], "more than 10000000 combinations"),
     ],
 )

@@ -42,6 +42,8 @@ def list_(interface: str | None, channel: str | None, bitrate: int) -> None:
 
     if channel is not None and interface is None:
         raise SpecError(f"--channel {channel}: name its interface, too, as --interface socketcan.")
+    if interface is not None:
+        detection.require_known(interface)
     names = detection.hardware() if interface is None else [interface]
     nodes = None
     if interface is not None and channel is not None:

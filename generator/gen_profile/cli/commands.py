@@ -13,6 +13,7 @@ from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
     Count,
     InputFile,
+    Number,
     OutputFile,
     PathType,
     SpecChoice,
@@ -167,7 +168,7 @@ def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | N
     "--range",
     "half_range",
     metavar="SHARE",
-    type=click.FloatRange(0.0, 0.9, min_open=True),
+    type=Number(0.0, 0.9, min_open=True),
     help="Greatest relative error, such as 0.3; one and a half times the spec's range by default.",
 )
 @click.option(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
@@ -27,6 +28,17 @@ class Count(click.IntRange):
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Call it N in the help."""
         return "N"
+
+
+class Number(click.FloatRange):
+    """A finite number within bounds: NaN lies beyond none of them."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Take the number."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is no finite number.", param, ctx)
+        return number
 
 
 class PathType(click.Path):

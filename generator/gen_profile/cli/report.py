@@ -11,6 +11,7 @@ import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import (
+    Number,
     OutputFile,
     PathType,
     SpecChoice,
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
     "--measured-start",
     "log_start",
     metavar="SECONDS",
-    type=float,
+    type=Number(),
     help="When the move begins in the log; found by itself by default.",
 )
 @click.option(

@@ -12,7 +12,7 @@ from gen_profile.designs.shortest import timed
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
-from gen_profile.motion.profile import Profile
+from gen_profile.motion.profile import Profile, require_motion
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.solvers.motion import optimal_profile
@@ -57,6 +57,20 @@ def own_method(spec: Spec) -> str:
     return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
 
 
+def as_motions(own: Sequence[Profile] | Profile) -> Sequence[Profile]:
+    """Take motions as they are, or a single one.
+
+    Raises
+    ------
+    SpecError
+        One is no profile.
+    """
+    motions = own if isinstance(own, list | tuple) else (own,)
+    for motion in motions:
+        require_motion(motion)
+    return motions
+
+
 def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
     """List shapers, then optimal motions, then motions that were made elsewhere.
 
@@ -71,12 +85,10 @@ def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
     Raises
     ------
     SpecError
-        Two have the same name, or one is no profile.
+        Two have the same name.
     """
     known = [*SHAPERS, *(candidate.method for candidate in _optimal_candidates(spec))]
     for motion in own:
-        if not isinstance(motion, Profile):
-            raise SpecError(f"own: takes a list of profiles, such as gp.plan(spec).motion, found {motion!r}.")
         if motion.method in known:
             raise SpecError(f"Two motions are called {motion.method!r}; give yours another method.")
         known.append(motion.method)

@@ -6,7 +6,7 @@ from typing import Any
 
 import attrs
 
-from gen_profile.comparison.candidates import Candidate, candidates
+from gen_profile.comparison.candidates import Candidate, as_motions, candidates
 from gen_profile.errors import GenProfileError, InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, keeps_residual_sway
 from gen_profile.evaluation.phrases import mm, number
@@ -250,7 +250,7 @@ def compare(
     left_out: dict[str, str] = {}
     too_slow: dict[str, float] = {}
     impossible: dict[str, str] = {}
-    listed = tuple(candidates(spec, (own,) if isinstance(own, Profile) else own))
+    listed = tuple(candidates(spec, as_motions(own)))
     for done, candidate in enumerate(listed):
         progress("comparing", done, len(listed), candidate.method)
         try:

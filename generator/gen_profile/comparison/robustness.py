@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.comparison.candidates import candidates
+from gen_profile.comparison.candidates import as_motions, candidates
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.actuator import lag_compensated
@@ -28,6 +28,7 @@ POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
 USUAL_RANGE = 0.3  # relative, of a parameter that the spec takes for certain
 BEYOND = 1.5  # of a parameter's own range, which the curve covers
 WIDEST = 0.9
+FEWEST = 3  # points of a curve
 # rad of the fastest mode between setpoints: linear interpolation errs by some 10⁻⁴ of the sway
 STEP_PHASE = 0.05
 STEPS_PER_MOVE = 300
@@ -164,7 +165,7 @@ def robustness(
     parameters: Sequence[str] | str = (),
     *,
     methods: Sequence[str] | str = (),
-    own: Sequence[Profile] = (),
+    own: Sequence[Profile] | Profile = (),
     points: int | None = None,
     half_range: float | None = None,
     progress: Progress = no_progress,
@@ -178,7 +179,7 @@ def robustness(
         One or two; the first uncertain one by default.
     methods : sequence of str, or str
         As `gen_profile.comparison.candidates` names them; all by default.
-    own : sequence of Profile
+    own : sequence of Profile, or Profile
         Further motions of the axes, each of a ``method`` of its own.
     points : int, optional
         Per parameter.
@@ -190,14 +191,14 @@ def robustness(
     Raises
     ------
     SpecError
-        A parameter or method is unknown.
+        A parameter or method is unknown, there are too few points, or the range is none.
 
     Examples
     --------
     >>> gp.robustness(gp.preset_spec("paper"), "L1", methods=["zv", "optimal-beta50"], points=5)
     <Robustness name: paper, errors: L1 -30 to +30 %, zv: 17.72 mm at worst, optimal-beta50: 4.781 mm ...>
     """
-    spec, parameters, methods = as_spec(spec), as_names(parameters), as_names(methods)
+    spec, parameters, methods, own = as_spec(spec), as_names(parameters), as_names(methods), as_motions(own)
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}
     left_out: dict[str, str] = {}
@@ -229,7 +230,8 @@ def error_grid(
     Raises
     ------
     SpecError
-        A parameter is unknown or 0, none is uncertain, or more than two are asked for.
+        A parameter is unknown or 0, none is uncertain, or more than two are asked for; or there are too few
+        points, or no such range.
     """
     plant, nominal, ranges = spec.machine(), spec.plant.parameters, spec.robustness.uncertain
     names = tuple(dict.fromkeys(parameters)) or tuple(ranges)[:1]
@@ -237,6 +239,12 @@ def error_grid(
         raise SpecError("parameter: name one, such as L1; the spec states no uncertain ones.")
     if len(names) > 2:
         raise SpecError("parameter: at most two, of which a map is drawn.")
+    if points is not None and points < FEWEST:
+        raise SpecError(f"points: must be at least {FEWEST}, found {points}.")
+    if half_range is not None and not 0.0 < half_range <= WIDEST:
+        raise SpecError(
+            f"range: must be greater than 0 and at most {WIDEST} (0.1 is 10 %), found {half_range}."
+        )
     bounds = {parameter.name: (parameter.lower, parameter.upper) for parameter in plant.parameters}
     grid: dict[str, Array] = {}
     for name in names:
@@ -245,7 +253,7 @@ def error_grid(
         if nominal[name] == 0.0:
             raise SpecError(f"parameter {name}: its value is 0, so a relative error means nothing.")
         widest = min(BEYOND * ranges[name] if name in ranges else USUAL_RANGE, WIDEST)
-        half = (points or POINTS[len(names)]) // 2
+        half = int(points or POINTS[len(names)]) // 2
         errors = np.array([(half_range or widest) * k / half for k in range(-half, half + 1)])
         low, high = bounds[name]
         values = nominal[name] * (1.0 + errors)

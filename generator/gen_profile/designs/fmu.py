@@ -1,23 +1,24 @@
 """From a spec to an FMU of its plant, motion or planner, of the plant with either, or to a system of FMUs."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
 
 from gen_profile.artefacts.writing import deliver
 from gen_profile.designs.plan import plan
-from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError
+from gen_profile.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
 from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec
+from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.building.build import build_fmu
@@ -31,6 +32,7 @@ from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
 KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
+Kind = TypeVar("Kind", bound=Enum)
 LEADERS = {"ssp": "profile", "planned-ssp": "planner"}  # of systems of two FMUs: what the plant follows
 
 
@@ -73,9 +75,9 @@ def export_fmu(
     kind: str = "plant",
     path: Path | str | None = None,
     *,
-    version: Version = Version.FMI2,
-    input_kind: InputKind = InputKind.SETPOINT,
-    platforms: tuple[str, ...] | None = None,
+    version: Version | str = Version.FMI2,
+    input_kind: InputKind | str = InputKind.SETPOINT,
+    platforms: Sequence[str] | str | None = None,
     author: str = AUTHOR,
     progress: Progress = no_progress,
 ) -> Export:
@@ -88,10 +90,11 @@ def export_fmu(
         One of `KINDS`.
     path : Path or str, optional
         Named after the spec in the working folder if not given.
-    version : Version
-    input_kind : InputKind
-        What a plant's drives are asked for.
-    platforms : tuple of str, optional
+    version : Version or str
+        ``"2"`` or ``"3"``.
+    input_kind : InputKind or str
+        What a plant's drives are asked for: ``"setpoint"``, ``"acceleration"`` or ``"velocity"``.
+    platforms : sequence of str, or str, optional
         Names of `PLATFORMS`, none for sources only; this computer's by default.
     author : str
         Who made the model.
@@ -101,7 +104,7 @@ def export_fmu(
     Raises
     ------
     GenProfileError
-        Nothing was written.
+        Nothing was written: a choice or the file's suffix is wrong, or there is no such motion.
 
     Examples
     --------
@@ -113,8 +116,15 @@ def export_fmu(
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
     systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}
     identifier = c_name(systems.get(kind, f"{spec.name} {kind}"))
-    path = Path(path or f"{identifier}.{'ssp' if kind in LEADERS else 'fmu'}")
-    platforms = platform_names("host") if platforms is None else platforms
+    suffix = ".ssp" if kind in LEADERS else ".fmu"
+    path = Path(path or f"{identifier}{suffix}")
+    if path.suffix.lower() != suffix:
+        raise OutputError(f"out {path}: name a file that ends in {suffix}, as other tools ask for.")
+    version, input_kind = _one_of(Version, version, "version"), _one_of(InputKind, input_kind, "input_kind")
+    platforms = platform_names("host") if platforms is None else tuple(as_names(platforms))
+    for platform in platforms:
+        if platform not in PLATFORMS:
+            raise SpecError(f"platforms: unknown platform {platform!r}{suggestion(platform, PLATFORMS)}")
 
     def built(model: Model) -> bytes:
         return build_fmu(attrs.evolve(model, author=author), version, platforms, progress)
@@ -129,6 +139,15 @@ def export_fmu(
         content = built(_model(spec, kind, input_kind, progress))
     deliver(path, content)
     return Export(path=path, content=content, identifier=identifier, version=version, platforms=platforms)
+
+
+def _one_of(kinds: type[Kind], value: Kind | str, place: str) -> Kind:
+    """Take a member of an enumeration as it is, or by its value."""
+    known = {str(member.value): member for member in kinds}
+    found = value if isinstance(value, kinds) else known.get(str(value))
+    if found is None:
+        raise SpecError(f"{place}: unknown value {value!r}{suggestion(str(value), known)}")
+    return found
 
 
 def platform_names(choice: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Sway
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
-from gen_profile.motion.profile import Array, Profile
+from gen_profile.motion.profile import Array, Profile, require_motion
 from gen_profile.problem.dynamics import parameter_rows
 from gen_profile.problem.limits import rounded_down
 from gen_profile.problem.parameter_box import machines_inside
@@ -118,7 +118,7 @@ def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
     Raises
     ------
     SpecError
-        The motion has not the machine's axes.
+        It is no motion, or has not the machine's axes.
     InfeasibleProblem
         It goes on to where the machine cannot be.
 
@@ -130,6 +130,7 @@ def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
     1.955
     """
     spec = as_spec(spec)
+    require_motion(motion)
     plant, until = spec.machine(), _watched_until(spec, motion)
     named = [machine.parameters for machine in scenarios(spec)]
     swing = PlantSimulation(plant, motion, named, until, spec.move.initial)

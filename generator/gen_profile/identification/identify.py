@@ -131,7 +131,7 @@ def read_swing(
     path: Path | str,
     spec: Spec,
     *,
-    columns: tuple[str, str],
+    columns: tuple[str | int, str | int],
     signal: str = "angle",
     unit: str | None = None,
     time_unit: str | None = None,
@@ -143,7 +143,7 @@ def read_swing(
     ----------
     path : Path or str
         Table with a column of times and one of values.
-    columns : (str, str)
+    columns : (str or int, str or int)
         Their names, or their numbers from 1.
     signal : str
         What the values are: ``angle``, ``sway`` or ``rate`` (of the angle) of the first load, or of a named
@@ -182,7 +182,7 @@ def read_swing(
     return parse_swing(
         read_text(Path(path), "swing"),
         str(path),
-        columns=columns,
+        columns=(str(columns[0]), str(columns[1])),
         per_second=None if time_unit is None else TIME_UNITS[time_unit],
         per_unit=per_unit,
         after=after,

@@ -6,7 +6,7 @@ import errno
 import math
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import Phrase
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import number_meant, suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
 MOST_BYTES = 1 << 25
@@ -30,6 +30,8 @@ _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")
 _BEHIND = re.compile(r".+[_ ](ms|us|s|rad|deg|mm|um)", re.IGNORECASE)
 # what is a unit, and no remark, though it may be one that nothing here is measured in
 _UNIT = re.compile(r".*[/^²³·].*|[kmµ]?[VAWNg]|kg|t|%|k?Hz|m?bar|°C|K|min|h|ms|us|s|rad|deg|m|mm|um")
+MISSING = {"nan", "na", "n/a", "null", "none", "-", "--"}  # what loggers write where they have no value
+LEAVE_EMPTY = "; leave the cell empty where nothing was measured"
 GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
 # what a file begins with that is no text, and what to do about it
 OTHERS = {
@@ -48,12 +50,12 @@ class LogTable:
     Attributes
     ----------
     rows : sequence of sequence of str
-        Of what is no blank line; at least one.
+        Of what is no blank line; at least one. It tells each one's line in the file, too.
     decimal_comma : bool
         Whether a comma may stand for a decimal point.
     """
 
-    rows: Sequence[Sequence[str]]
+    rows: "_Rows"
     decimal_comma: bool
 
     def cell(self, row: int, place: int) -> str:
@@ -80,6 +82,13 @@ class LogTable:
         except ValueError:
             return math.nan
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+    def head(self, columns: Collection[str]) -> int:
+        """Find the row of these columns' names; where all are numbers, the first with so many cells."""
+        names = {column for column in columns if not column.isdecimal()}
+        most = max((int(column) for column in columns if column.isdecimal()), default=0)
+        fits = ((names & set(cells)) if names else len(cells) >= most for cells in self.rows)
+        return next((row for row, fit in enumerate(fits) if fit), 0)
 
     def place(self, head: int, column: str, source: str) -> int:
         """Find a column by its name in a row of names, or by its number from 1.
@@ -125,11 +134,12 @@ class LogTable:
         Raises
         ------
         OutputError
-            A cell holds no number.
+            A cell holds no number, or numbers with decimal commas stand between commas.
         """
         time, values = places[0], array("d")
         below = range(head + self.is_head(head), len(self.rows))
         first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
+        self._require_separate(head, first, source)
         for row in range(first, len(self.rows)):
             held = [self.cell(row, place) for place in places]
             if not all(held):
@@ -140,13 +150,29 @@ class LogTable:
                     name: str = Phrase("column {number}", number=place + 1)
                     if self.is_head(head):
                         name = self.cell(head, place)
-                    template = "{source}, row {row}: {name} holds {text!r}, which is no number of a log."
-                    raise OutputError(template, source=source, row=row + 1, name=name, text=text[:40])
+                    line = self.rows.line(row)
+                    hint = LEAVE_EMPTY if text.lower() in MISSING else number_meant(text)
+                    template = (
+                        "{source}, row {row}: {name} holds {text!r}, which is no number of a log{hint}."
+                    )
+                    raise OutputError(template, source=source, row=line, name=name, text=text[:40], hint=hint)
             values.extend(values_here)
         table = np.array(values).reshape(-1, len(places))
         if len(table) and math.isnan(self.number(first, time)):  # a date
             table[:, 0] -= table[0, 0]
         return table
+
+    def _require_separate(self, head: int, first: int, source: str) -> None:
+        """Refuse numbers whose decimal commas separate columns, too: they are twice as many as the names."""
+        names, cells = len(self.rows[head]), self.rows[first] if first < len(self.rows) else ()
+        whole = all(cell.lstrip("+-").isdecimal() for cell in cells)
+        if not self.decimal_comma and self.is_head(head) and names > 1 and whole and len(cells) == 2 * names:
+            template = (
+                "{source}, row {row}: holds {count} numbers below {names} names; where decimals have commas, "
+                "separate columns by semicolons or tabs."
+            )
+            line = self.rows.line(first)
+            raise OutputError(template, source=source, row=line, count=len(cells), names=names)
 
 
 def read_text(path: Path, option: str) -> str:
@@ -201,30 +227,37 @@ def read_table(text: str, source: str) -> LogTable:
     OutputError
         It is empty, or no table.
     """
-    lines = [line for line in text.splitlines() if line.strip()]
+    rows = _Rows(text, source)
+    lines = rows.lines
     if not lines:
         raise OutputError("{source}: the log is empty.", source=source)
     common = (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines))
-    separator = next(common, ",")
-    return LogTable(rows=_Rows(lines, separator, source), decimal_comma=separator != ",")
+    rows.separator = next(common, ",")
+    return LogTable(rows=rows, decimal_comma=rows.separator != ",")
 
 
 class _Rows(Sequence[Sequence[str]]):
     """Lines that are split when they are asked for: all cells at once take ten times the text's memory."""
 
-    def __init__(self, lines: Sequence[str], separator: str, source: str) -> None:
-        self._lines, self._separator, self._source = lines, separator, source
+    def __init__(self, text: str, source: str) -> None:
+        self.lines = [line for line in text.splitlines() if line.strip()]
+        self.separator, self._text, self._source = ",", text, source
         self._split: tuple[int, list[str]] = (-1, [])  # the row that was asked for last
 
     def __len__(self) -> int:
-        return len(self._lines)
+        return len(self.lines)
+
+    def line(self, row: int) -> int:
+        """Count a row's line in the file from 1, blank ones, too."""
+        lines = enumerate(self._text.splitlines(), 1)
+        return [number for number, line in lines if line.strip()][row]
 
     def __getitem__(self, row: Any) -> Any:
         if row != self._split[0]:
             try:
-                cells = next(csv.reader([self._lines[row]], delimiter=self._separator))
+                cells = next(csv.reader([self.lines[row]], delimiter=self.separator))
             except csv.Error as error:
                 template = "{source}, row {row}: it is no table ({problem})."
-                raise OutputError(template, source=self._source, row=row + 1, problem=error) from error
+                raise OutputError(template, source=self._source, row=self.line(row), problem=error) from error
             self._split = (row, [cell.strip() for cell in cells])
         return self._split[1]

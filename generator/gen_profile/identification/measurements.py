@@ -204,8 +204,7 @@ def parse_swing(
         The table cannot be read.
     """
     cells = read_table(text, source)
-    named = {column for column in columns if not column.isdecimal()}
-    head = next((row for row in range(len(cells.rows)) if named & set(cells.rows[row])), 0)
+    head = cells.head(columns)
     places = [cells.place(head, column, source) for column in columns]
     known = ((per_second, "time", TIME_UNITS), (per_unit, quantity, units_of(SI_UNITS[quantity])))
     scales = [
@@ -256,13 +255,29 @@ def cut_swing(
     if len(times) < LEAST_SAMPLES:
         template = "{source}: a swing needs at least {least} samples, found {count}."
         raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
-    if not (np.diff(times) > 0.0).all():
-        raise OutputError("{source}: the times must rise from row to row.", source=source)
-    if quantity == "angle" and (span := float(np.ptp(values))) > np.pi:
+    require_rising(times, source)
+    if quantity == "angle":
+        require_angle(values)
+    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
+
+
+def require_angle(values: Array) -> None:
+    """Refuse, by a `SpecError`, angles in rad that go over more than half a turn, as degrees do."""
+    if (span := float(np.ptp(values))) > np.pi:
         raise SpecError(
             "unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?", span=span
         )
-    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
+
+
+def require_rising(times: Array, source: str) -> None:
+    """Refuse, by an `OutputError`, times in s that do not rise."""
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(back):
+        template = (
+            "{source}: the times must rise from row to row, and do not after {time:.6g} s; sort the rows, "
+            "and remove those that come twice."
+        )
+        raise OutputError(template, source=source, time=times[back[0]])
 
 
 def _positive(where: str, what: str, value: float) -> float:

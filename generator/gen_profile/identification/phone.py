@@ -42,7 +42,10 @@ class Phone:
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)
         if parts.scheme != "http" or not parts.hostname or parts.query:
-            raise SpecError(f"{url}: is no address such as http://192.168.0.42:8080.")
+            raise SpecError(
+                f"{url}: is no address such as http://192.168.0.42:8080 of a phone, opc.tcp://10.0.0.5:4840 "
+                "or can:socketcan:can0."
+            )
         self._url, self._open = url.rstrip("/"), build_opener(ProxyHandler({})).open
         config = self._ask("config")
         try:

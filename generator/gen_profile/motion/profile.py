@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
-from gen_profile.errors import GenProfileError
+from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.summary import Drawable, Sampled, Summarised, Tabled
 
 Array = NDArray[np.float64]
@@ -321,13 +321,14 @@ def sample(profile: Profile, cycle_time: float) -> SampledProfile:
     Raises
     ------
     GenProfileError
-        The cycle time in s is not positive, or too short for a motion so long.
+        It is no profile, or the cycle time in s is not positive, or too short for a motion so long.
 
     Examples
     --------
     >>> gp.sample(gp.plan(gp.preset_spec("paper")).motion, cycle_time=0.01).position.shape
     (301, 1)
     """
+    require_motion(profile)
     _require_cycle(cycle_time)
     if profile.duration / cycle_time > MOST_SAMPLES:
         raise GenProfileError(f"A motion of {profile.duration:g} s has too many cycles of {cycle_time:g} s.")
@@ -342,8 +343,25 @@ def sample(profile: Profile, cycle_time: float) -> SampledProfile:
     )
 
 
+def require_motion(value: object) -> None:
+    """Refuse, by a `SpecError`, what is no profile: most often a plan, which holds one."""
+    if not isinstance(value, Profile):
+        raise SpecError(
+            f"A Profile is expected, such as gp.plan(spec).motion, found a {type(value).__name__}."
+        )
+
+
+def require_samples(value: object) -> None:
+    """Refuse, by a `SpecError`, what is no sampled profile: most often one that was not sampled yet."""
+    if not isinstance(value, SampledProfile):
+        known = "gp.sample(motion, cycle_time=0.01)"
+        raise SpecError(
+            f"A SampledProfile is expected, such as {known} gives, found a {type(value).__name__}."
+        )
+
+
 def _require_cycle(cycle_time: float) -> None:
-    if not (np.isfinite(cycle_time) and cycle_time > 0.0):
+    if isinstance(cycle_time, str) or not (np.isfinite(cycle_time) and cycle_time > 0.0):
         raise GenProfileError("A sampled profile's cycle time must be positive.")
 
 

@@ -2,11 +2,13 @@
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
+from gen_profile.suggestion import number_meant
 
 KEPT = 16
 COLUMNS = ("time_s", "code", "value")
@@ -110,12 +112,16 @@ def read_events(text: str) -> list[Event]:
         )
     events = []
     for row in rows:
+        cells = [text for text in row.values() if isinstance(text, str)]  # those beyond the names in a list
         try:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
-            events.append(Event(time, int(code), value))
-        except (TypeError, ValueError, OverflowError):
-            line = ",".join(str(cell) for cell in row.values())
+        except ValueError:
+            time, code, value = math.nan, math.nan, math.nan
+        if None in row or not (math.isfinite(time) and code.is_integer()):
+            hint = next(filter(None, map(number_meant, cells)), "")
             raise SpecError(
-                f"events, line {rows.line_num}: three numbers are wanted, found {line!r}."
-            ) from None
+                f"events, line {rows.line_num}: a time, a whole number and a value are wanted, "
+                f"found {','.join(cells)!r}{hint}."
+            )
+        events.append(Event(time, int(code), value))
     return sorted((event for event in events if event.code), key=lambda event: event.time)

@@ -34,6 +34,7 @@ OF_AXES: dict[
     "velocity": "fVelocityCommand",
     "velocity_limit": "fVelocityLimit",
 }
+MOST_CYCLES = 2_000_000  # in one go: each takes some hundred bytes
 IDLE = dict.fromkeys(("bExecute", "bVelocity", "bStop", "bQuickStop"), 0.0)  # no command
 ZONES = ("aBlockedLow", "aBlockedHigh", "aSlowLow", "aSlowHigh", "aSlowLimit")
 KINDS = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
@@ -280,12 +281,15 @@ class Planner(Summarised):
         Raises
         ------
         SpecError
-            As of `step`; or there is no whole cycle, or an array of another length.
+            As of `step`; or there is no whole cycle, too many for one go, or an array of another length.
         """
         exact = float(_column("seconds", seconds, 1)[0]) / self.cycle_time
         cycles = round(exact) if math.isfinite(exact) else 0
         if cycles < 1:
             raise SpecError(f"seconds: at least one cycle of {self.cycle_time:g} s, found {seconds!r}.")
+        if cycles > MOST_CYCLES:
+            most = MOST_CYCLES * self.cycle_time
+            raise SpecError(f"seconds: at most {most:g} in one go, found {seconds!r}; call it several times.")
         issued = self._issue(orders, cycles)
         return SetpointHistory(
             outputs=issued,
@@ -332,7 +336,10 @@ class Planner(Summarised):
         if (override := orders.get("override")) is not None:
             columns["rOverride"] = _column("override", override, cycles)
         columns |= self._sensed(orders.get("sensor"), cycles)
-        for name, value in (orders.get("live") or {}).items():
+        live = orders.get("live") or {}
+        if not isinstance(live, Mapping):
+            raise SpecError(f"live: give values by name, such as {{'L1': 6.0}}, found {live!r}.")
+        for name, value in live.items():
             if name not in self._live:
                 raise SpecError(
                     f"live: the planner has no live parameter {name!r}{suggestion(name, self._live)}"

@@ -85,5 +85,5 @@ def read_sensor_log(text: str, axes: Sequence[BlockAxis]) -> SensorLog:
     if not (math.isfinite(times.sum()) and times[0] >= 0.0) or any(
         b < a for a, b in pairwise(times.tolist())
     ):
-        raise SpecError("sensor: time_s must rise from 0 or later on.")
+        raise SpecError("sensor: time_s must rise from 0 or later on; sort the rows.")
     return SensorLog(axes=axes, times=times, values=np.stack(values, axis=1))

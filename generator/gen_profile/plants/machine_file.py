@@ -2,7 +2,9 @@
 
 import hashlib
 import re
+import sys
 import traceback
+from contextlib import redirect_stdout
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -70,7 +72,8 @@ def plant_of_file(file: MachineFile) -> Plant:
     """
     module = ModuleType(file.name.removesuffix(".py"))
     try:
-        exec(compile(file.content, file.name, "exec"), module.__dict__)  # what the user asked for
+        with redirect_stdout(sys.stderr):  # what it prints is no part of a JSON document
+            exec(compile(file.content, file.name, "exec"), module.__dict__)  # what the user asked for
     except (Exception, SystemExit) as error:
         raise SpecError(f"plant.file: {_place(file, error)}: {type(error).__name__}: {error}.") from error
     plant = getattr(module, "PLANT", None)

@@ -80,7 +80,7 @@ def linearize(
     Raises
     ------
     SpecError
-        A parameter is missing, or no finite number.
+        A parameter is missing, or no finite number; or there is not a place of each axis.
     InfeasibleProblem
         A mode has no restoring force, so the machine has no natural frequency to speak of.
 
@@ -94,6 +94,9 @@ def linearize(
         if not math.isfinite(parameters.get(name, math.nan)):
             raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")
     axes = [0.0] * len(plant.actuated) if q_a is None else q_a
+    if len(axes) != len(plant.actuated):
+        template = "at: must hold one position per axis ({axes}), found {found}."
+        raise SpecError(template, axes=len(plant.actuated), found=len(axes))
     return _linearized(plant, tuple(parameters.items()), resting_place(plant, axes))
 
 

@@ -18,11 +18,10 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import attrs
-import numpy as np
 
 from gen_profile.errors import OutputError
 from gen_profile.identification.log_table import LogTable, read_table, read_text
-from gen_profile.identification.measurements import LEAST_SAMPLES, SI_UNITS
+from gen_profile.identification.measurements import LEAST_SAMPLES, SI_UNITS, require_angle, require_rising
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.spec.model import Spec
 from gen_profile.units import COUNTS, UNITS
@@ -130,12 +129,11 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     if len(times) < LEAST_SAMPLES:
         template = "{where}: needs at least {least} samples, found {count}."
         raise OutputError(template, where=where, least=LEAST_SAMPLES, count=len(times))
-    back = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(back):
-        template = "{where}: the times must rise from row to row, and do not after {time:.6g} s."
-        raise OutputError(template, where=where, time=times[back[0]])
+    require_rising(times, where)
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
     for (quantity, owner), values in signals.items():
+        if quantity == "angle":
+            require_angle(values)
         by_quantity[quantity][owner] = read_only(values)
     return MeasuredLog(
         source=source,
@@ -251,10 +249,10 @@ def _required(meaning: str, spec: Spec, where: str) -> _Column:
 
 def _head(table: LogTable, chosen: Collection[str]) -> int:
     """Find the row of names, chosen or known ones, below what a logger wrote above it."""
-    stated = {column for column in chosen if not column.isdecimal()}
+    if chosen:
+        return table.head(chosen)
     for row, cells in enumerate(table.rows):
-        known = sum(_COLUMN.fullmatch(cell) is not None for cell in cells)
-        if stated & set(cells) or (not chosen and known > 1):
+        if sum(_COLUMN.fullmatch(cell) is not None for cell in cells) > 1:
             return row
         if row > 0 and table.is_head(row - 1) and not table.is_head(row):
             break
@@ -263,7 +261,7 @@ def _head(table: LogTable, chosen: Collection[str]) -> int:
 
 def _with_unit(table: LogTable, head: int, place: int) -> str:
     """Read a column's name, with the unit that stands in the row below behind it, where the name has none."""
-    name, below = table.rows[head][place], head + 1 < len(table.rows)
+    name, below = table.cell(head, place), head + 1 < len(table.rows)
     match, unit = _COLUMN.fullmatch(name), table.cell(head + 1, place).strip("[]() ") if below else ""
     if match is None or match["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
         return name

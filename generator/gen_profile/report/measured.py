@@ -20,6 +20,10 @@ from gen_profile.spec.model import Spec
 
 STARTS = 400  # starts of the move that are tried before the best is refined
 MOST_FITTED = 4000  # samples
+LEAST_WAY, UNLIKE = (
+    0.1,
+    0.25,
+)  # shares of an axis' way: that it goes in a log, and (RMS) that it is off the plan
 ANYTHING = 0.1  # rad, of what no angle tells
 PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
 
@@ -165,9 +169,11 @@ def compare_measured(
     Raises
     ------
     OutputError
-        The log does not hold the move.
+        The log does not hold the move, or one that is like it.
     """
-    start = _best_start(evaluation, log) if start is None else start
+    if start is None:
+        start = _best_start(evaluation, log)
+        _require_alike(evaluation, log, start)
     move = _the_move(evaluation, log, start)
     q_a, responses = evaluation.motion(move.times).position, evaluation.swing.at(move.times)
     plant, loads = spec.machine(), spec.machine().loads
@@ -199,6 +205,34 @@ def _signals(
         for column, (name, unit) in enumerate(units.items())
         if name in measured
     }
+
+
+def _moving(evaluation: MotionEvaluation, log: MeasuredLog) -> tuple[str, int] | None:
+    """Name an axis that moves and was logged, with its number; None where there is none."""
+    ways = evaluation.motion.target - evaluation.motion.start
+    axes = [axis.name for axis in evaluation.swing.plant.actuated]
+    return next(((name, axes.index(name)) for name in log.positions if ways[axes.index(name)]), None)
+
+
+def _require_alike(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> None:
+    """Refuse a log whose axis goes another way than planned, as in another unit or the other way round."""
+    moving = _moving(evaluation, log)
+    if moving is None:
+        return
+    name, column = moving
+    signal, motion = log.positions[name], evaluation.motion
+    begin, end = motion.start[column], motion.target[column]
+    during = (log.times >= start) & (log.times <= start + motion.duration)
+    off = (signal - motion(log.times - start).position[:, column])[during] / (end - begin)
+    if np.ptp(signal) < LEAST_WAY * abs(end - begin) or (off**2).sum() > UNLIKE**2 * len(off):
+        unit = evaluation.swing.plant.actuated[column].unit
+        template = (
+            "measured {source}: {axis} goes from {first:.4g} to {last:.4g} {unit} in the log, and from "
+            "{begin:.4g} to {end:.4g} {unit} in the move; look at the unit and the sign of its column, and "
+            "whether this is the whole log of this move."
+        )
+        values = {"first": signal[0] + 0.0, "last": signal[-1], "begin": begin, "end": end, "unit": unit}
+        raise OutputError(template, source=log.source, axis=name, **values)
 
 
 def _the_move(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> MeasuredLog:
@@ -262,13 +296,11 @@ def _best_start(evaluation: MotionEvaluation, log: MeasuredLog) -> float:
     An axis' position tells it best; the sway of a load where no axis that moves was logged.
     """
     plant, duration = evaluation.swing.plant, evaluation.motion.duration
-    ways = np.abs(evaluation.motion.target - evaluation.motion.start)
-    axes = [axis.name for axis in plant.actuated]
-    moving = [name for name in log.positions if ways[axes.index(name)] > 0.0]
+    moving = _moving(evaluation, log)
     grid = np.linspace(0.0, duration, 2001)
-    if moving:
-        signal = log.positions[moving[0]]
-        planned = evaluation.motion(grid).position[:, axes.index(moving[0])]
+    if moving is not None:
+        name, column = moving
+        signal, planned = log.positions[name], evaluation.motion(grid).position[:, column]
     else:
         name, signal = next(iter({**log.sways, **log.angles}.items()))
         (nominal, *_) = evaluation.swing.at(grid)

@@ -175,7 +175,7 @@ def overridden(document: Document, overrides: Sequence[str]) -> Document:
         An override makes no sense.
     """
     changed = copy.deepcopy(document)
-    for override in overrides:
+    for override in as_names(overrides):
         _override(changed, override)
     return changed
 

@@ -6,6 +6,7 @@ A field's annotation says what it may hold; `gen_profile.spec.structure` holds e
 import math
 import re
 from collections.abc import Mapping, Sequence
+from datetime import date, time
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
@@ -115,8 +116,10 @@ def found(value: object) -> str:
         case list() | tuple():
             short = len(value) <= 3 and all(type(item) in {int, float} for item in value)
             return str(list(value)) if short else "an array"
-        case _:
+        case date() | time():
             return "a date or time"
+        case _:  # from Python
+            return f"a {type(value).__name__}"
 
 
 Name = Annotated[

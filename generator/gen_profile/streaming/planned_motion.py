@@ -113,7 +113,7 @@ class PlannedMotion:
     ------
     SpecError
         The block's cycle does not fit that of SYNC, its travel leaves the drive's, or there is no such
-        parameter.
+        parameter, or not of this value.
     ExportError
         The bus is too slow, or a position does not fit 32 bits.
     """
@@ -139,7 +139,7 @@ class PlannedMotion:
         self.planned: int | None = None
         self.most = LONGEST + MARGIN
         self._block, self._axes, self._operator = block, block.axes, operator
-        self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live)
+        self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live, spec.planner.live)
         self._calls = _calls(spec, self._values["fCycleTime"])
         self._sensor, self._heard = spec.can.sensor, -math.inf  # which of the block's cycles had news of it
         self._shown, self._fresh = _sensor_inputs(spec, block.axes, self._values["fCycleTime"])
@@ -381,11 +381,17 @@ def _calls(spec: Spec, cycle: float) -> int:
     return calls
 
 
-def _live_values(block: BlockInstance, live: Mapping[str, float]) -> dict[str, float]:
+def _live_values(
+    block: BlockInstance, live: Mapping[str, float], ranges: Mapping[str, Sequence[float]]
+) -> dict[str, float]:
+    """Give live parameters by the inputs' names; refuse what the block would, before the axes are enabled."""
     known = live_inputs(block.inputs, block.axes)
-    for name in live:
+    for name, value in live.items():
         if name not in known:
             raise SpecError(
                 f"live_parameter: the block has no live parameter {name!r}{suggestion(name, known)}"
             )
+        low, high = ranges[name]
+        if not low <= value <= high:
+            raise SpecError(f"live_parameter: {name} must be from {low:g} to {high:g}, found {value:g}.")
     return {known[name]: value for name, value in live.items()}

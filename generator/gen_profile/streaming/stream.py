@@ -109,7 +109,9 @@ def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: b
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == format_}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
     if manifest.check is None and not accept_unverified:
-        raise SpecError(f"{path} is unverified: export it with its check, or accept it as it is.")
+        raise SpecError(
+            f"{path} is unverified: export it with its check, or accept it as it is (accept_unverified)."
+        )
     if manifest.check is not None and not manifest.check.get("passed"):
         raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
     return spec_from_dict(manifest.spec, path.parent)

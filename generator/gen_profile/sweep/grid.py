@@ -16,6 +16,7 @@ from gen_profile.spec.reading import parse_toml
 from gen_profile.suggestion import number_meant
 
 MOST_CASES = 10_000_000
+TOO_MANY = f"vary: more than {MOST_CASES} combinations; vary less, or in several sweeps."
 DIGITS = 12  # of a value between the ends of an axis: 0.3, not 0.30000000000000004
 
 
@@ -103,7 +104,7 @@ def grid_of_values(vary: Mapping[str, Sequence[Any]]) -> Grid:
 
 def _grid(axes: tuple[GridAxis, ...]) -> Grid:
     if math.prod(len(axis.values) for axis in axes) > MOST_CASES:
-        raise SpecError(f"vary: more than {MOST_CASES} combinations; vary less, or in several sweeps.")
+        raise SpecError(TOO_MANY)
     return Grid(axes=axes)
 
 
@@ -139,11 +140,13 @@ def _range(text: str, parts: Sequence[str]) -> list[float]:
         first, last, number = parts
         low, high, count = float(first), float(last), int(number)
     except ValueError as error:
-        point = next(filter(None, map(number_meant, parts)), "")
+        point = next(filter(None, (number_meant(part) for part in parts if not _is_number(part))), "")
         raise SpecError(
             f"vary {text!r}: LO:HI:N are two numbers and how many values to take{point}."
         ) from error
-    if not 2 <= count <= MOST_CASES or not (math.isfinite(low) and math.isfinite(high)):
+    if count > MOST_CASES:
+        raise SpecError(TOO_MANY)
+    if count < 2 or not (math.isfinite(low) and math.isfinite(high)):
         raise SpecError(f"vary {text!r}: take two values or more, from one finite number to another.")
     inner = [float(f"{value:.{DIGITS}g}") for value in np.linspace(low, high, count)[1:-1]]
     return [low, *inner, high]
@@ -162,5 +165,8 @@ def _listed(stated: str) -> list[Any]:
     try:
         values = parse_toml(f"values = [{stated}]")
     except tomllib.TOMLDecodeError:
-        return [part.strip() for part in stated.split(",")]
+        texts = [part.strip() for part in stated.split(",")]
+        if not all(texts):
+            raise SpecError(f"vary: between two commas of {stated!r} there is no value.") from None
+        return texts
     return values["values"] if values.keys() == {"values"} else [stated]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.scenarios import Scenario
 from gen_profile.evaluation.simulation import AT_REST, Response
-from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.motion.profile import Array, SampledProfile, require_samples
 from gen_profile.problem.linearization import eigenvalues
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
@@ -36,7 +36,7 @@ def cosimulate(
     Raises
     ------
     SpecError
-        The machine has no such parameter, or does not take this value.
+        The machine has no such parameter, or does not take this value; or these are no setpoints.
     CosimulationError
         The FMU cannot be built or run.
 
@@ -49,6 +49,7 @@ def cosimulate(
     True
     """
     spec = as_spec(spec)
+    require_samples(setpoints)
     values, *others = _machines(spec, parameters).tolist()
     if others:
         raise SpecError("parameters: one value of each; residual_sways takes many machines.")
@@ -78,7 +79,8 @@ def residual_sways(
     Raises
     ------
     SpecError
-        The machine has no such parameter, does not take a value, or there are not as many values of each.
+        The machine has no such parameter, does not take a value, or there are not as many values of each; or
+        these are no setpoints.
     CosimulationError
         The FMU cannot be built or run.
 
@@ -90,6 +92,7 @@ def residual_sways(
     (5, 2)
     """
     spec = as_spec(spec)
+    require_samples(setpoints)
     plant, tau = spec.machine(), spec.actuator.tau or 0.0
     machines = _machines(spec, parameters)
     ends = (spec.move.start, spec.move.target)

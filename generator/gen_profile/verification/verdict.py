@@ -195,6 +195,12 @@ class Check(Drawable, Tabled, Examination):
                 "The {load} sways by {found:.4g} mm after the move ({name}), and {limit:.4g} mm are allowed "
                 "(check.residual_sway; integration error up to {error})."
             )
+            if finding.residual[load] <= self.limit[load]:
+                template = (
+                    "The {load} sways by {found:.4g} mm after the move ({name}), which keeps the {limit:.4g} "
+                    "mm that are allowed (check.residual_sway), but the integration may be off by {error}; "
+                    "allow more."
+                )
             yield self._exceeded(template, finding, load, finding.residual[load], self.limit[load])
         swaying, load = max(findings, key=self._share_on_the_way), self._end_load_name()
         if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:

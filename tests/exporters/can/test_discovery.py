@@ -169,3 +169,7 @@ class TestOnAChannel:
     def test_a_channel_without_its_interface(self):
         outcome = run_here("can", "list", "--channel", "can0")
         assert (outcome.code, "name its interface" in outcome.err) == (2, True)
+
+    def test_an_interface_that_python_can_does_not_know(self):
+        outcome = run_here("can", "list", "--interface", "socket-can")
+        assert (outcome.code, "'socket-can'; did you mean 'socketcan'" in outcome.err) == (2, True)

@@ -9,6 +9,9 @@ from typing import Any
 import attrs
 import can
 
+from gen_profile.errors import SpecError
+from gen_profile.suggestion import suggestion
+
 # what is no hardware of this computer: who looks for its channels has to ask the network, or finds any number
 NOT_HARDWARE = {"virtual", "udp_multicast", "socketcand"}
 
@@ -51,6 +54,13 @@ class Channel:
 def hardware() -> list[str]:
     """List the interfaces that python-can knows for hardware of this computer."""
     return sorted(can.VALID_INTERFACES - NOT_HARDWARE)
+
+
+def require_known(interface: str) -> None:
+    """Refuse, by a `SpecError`, an interface that python-can does not know."""
+    if interface not in can.VALID_INTERFACES:
+        known = sorted(can.VALID_INTERFACES)
+        raise SpecError(f"interface: unknown interface {interface!r}{suggestion(interface, known)}")
 
 
 def needs(interface: str, channel: str = "can0") -> str:

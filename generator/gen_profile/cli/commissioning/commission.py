@@ -14,6 +14,7 @@ from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
 from gen_profile.cli.options import (
+    Number,
     PathType,
     SpecChoice,
     output_options,
@@ -61,7 +62,7 @@ Words = tuple[str, ...]
     "--for",
     "seconds",
     metavar="SECONDS",
-    type=click.FloatRange(min=1.0),
+    type=Number(min=1.0),
     default=60.0,
     help="To log the phone for; 60 s.",
 )
@@ -80,14 +81,15 @@ def commission(path: Path, *, yes: bool, **options: Any) -> None:
     require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
     run = _Guide(click.get_current_context(), options, yes)
     require_formats(options["formats"])
+    run.require_log(options["swing"] or "")
     with redirect_stdout(sys.stderr) if as_json() else nullcontext():
         _announce("1. The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
+        run.write(path, overrides)  # what was answered so far is not asked again
         _announce("2. A swing, which tells where the rope's pendulum really ends")
         log, signal = run.logged(path)
         url = run.answer("url", "Controller to deploy to, as opc.tcp://HOST:PORT; nothing for none", "")
-        overrides += ('export.plc_tables="variables"',) * bool(url)
-        run.write(path, overrides)
+        run.write(path, ('export.plc_tables="variables"',) * bool(url))
         if log is not None or readings or options["periods"]:
             _announce("3. What that tells of the machine")
             run.call(identify, spec_path=path, out=path, log=log, readings=readings, **signal)
@@ -166,23 +168,32 @@ class _Guide:
 
         while (text := self.answer("", question, unchanged)) != unchanged:
             try:
-                if "±" in text or "+-" in text:
-                    reading = f"{key.removeprefix('plant.')}={text}"
-                    parse_reading(reading)
-                    return given, (*readings, reading)
+                read: Words = ()
+                if key.startswith("plant.") and ("±" in text or "+-" in text):
+                    read = (f"{key.removeprefix('plant.')}={text}",)
+                    text = f"{parse_reading(*read).value}"
                 SpecChoice(None, self._preset, (*given, f"{key}={text}")).spec()
-                return (*given, f"{key}={text}"), readings
+                return (*given, f"{key}={text}"), (*readings, *read)
             except GenProfileError as error:
                 click.echo(f"Error: {error}", err=True)
         return given, readings
 
+    def require_log(self, swing: str) -> None:
+        """Refuse a log that is not there."""
+        if swing and not swing.startswith("http:") and not Path(swing).is_file():
+            raise OutputError(f"There is no log {swing}; name its file, or a phone's address with http://.")
+
     def logged(self, path: Path) -> tuple[Path | None, dict[str, str]]:
         """Give the log of a swing, which a phone may write now, and what it is a log of."""
         question = "Log of a free swing: a file, or a phone's address; nothing for none"
-        swing = self.answer("swing", question, "")
+        while True:
+            swing = self.answer("swing", question, "")
+            try:
+                self.require_log(swing)
+                break
+            except OutputError as error:  # of what was asked: of an option it was looked at first
+                click.echo(f"Error: {error}", err=True)
         if not swing.startswith("http:"):
-            if swing and not Path(swing).is_file():
-                raise OutputError(f"There is no log {swing}; nothing was written.")
             return (Path(swing) if swing else None), {}
         log = path.with_name("swing.csv")
         self.call(log_swing, source=swing, out=log, seconds=self._options["seconds"])

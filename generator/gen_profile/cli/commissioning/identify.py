@@ -12,6 +12,7 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import (
     InputFile,
+    Number,
     PathType,
     SpecChoice,
     output_options,
@@ -93,7 +94,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option(
     "--after",
     metavar="SECONDS",
-    type=float,
+    type=Number(),
     default=0.0,
     help="Leave out what the log holds before this time; of dates, so long after the first.",
 )

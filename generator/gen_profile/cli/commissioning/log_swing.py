@@ -12,7 +12,7 @@ import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, client_options
-from gen_profile.cli.options import Count, OutputFile, bitrate_option, output_options
+from gen_profile.cli.options import Count, Number, OutputFile, bitrate_option, output_options
 from gen_profile.cli.outcome import print_outcome, print_warnings
 from gen_profile.errors import OutputError, SpecError
 
@@ -30,7 +30,7 @@ DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and colu
 @click.option(
     "--for",
     "seconds",
-    type=click.FloatRange(min=1.0),
+    type=Number(min=1.0),
     metavar="SECONDS",
     help="Log so long, not until Ctrl-C.",
 )

@@ -19,7 +19,7 @@ from gen_profile.cli.deployment.access import (
     password,
     require_protocol,
 )
-from gen_profile.cli.options import Count, OutputFile, PathType, output_options
+from gen_profile.cli.options import Count, Number, OutputFile, PathType, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 @click.option(
     "--watch", is_flag=True, help="Verify, then hold every setpoint to what was proved until Ctrl-C."
 )
-@click.option("--for", "seconds", type=click.FloatRange(min=0.1), metavar="SECONDS", help="Watch so long.")
+@click.option("--for", "seconds", type=Number(min=0.1), metavar="SECONDS", help="Watch so long.")
 @click.option(
     "--log", metavar="CSV", type=OutputFile(), help="Write what is watched, a row for each cycle seen."
 )

@@ -122,9 +122,10 @@ class BoundaryValueProblem:
             When they overflow.
         """
         flow = _finite(self.system.flow(self.unknowns(points), self.data.row()))
-        modal = self.inverse_transform @ flow
-        modal[:, :, 1:] = modal[:, :, 1:] @ self.transform
-        return np.asarray(modal)
+        with np.errstate(over="ignore", invalid="ignore"):  # of an iterate that diverges
+            modal = self.inverse_transform @ flow
+            modal[:, :, 1:] = modal[:, :, 1:] @ self.transform
+        return _finite(modal)
 
     def slopes(self, points: Array) -> tuple[Array, Array]:
         """Evaluate ζ' alone, and the end load's sway in m: (points, 2 n) and (points, sways).
@@ -136,7 +137,9 @@ class BoundaryValueProblem:
         """
         values = _finite(self.system.slopes(self.unknowns(points), self.data.row()))[:, :, 0]
         size = points.shape[1]
-        return values[:, :size] @ self.inverse_transform.T, values[:, size:]
+        with np.errstate(over="ignore", invalid="ignore"):
+            modal = values[:, :size] @ self.inverse_transform.T
+        return _finite(modal), values[:, size:]
 
     def linear(self, points: Array) -> tuple[Array, Array]:
         """Differentiate ξ' by ζ, and by ξ the end load's sway in m and what else costs half its square.
