@@ -156,10 +156,10 @@ class Planner(Summarised):
     """
 
     def __init__(self, source: Spec | Path | str, position: ArrayLike | None = None) -> None:
-        if isinstance(source, Spec) or Path(source).suffix == ".toml":
-            self._text = planner_block(as_spec(source)).text
-        else:
+        if isinstance(source, str | Path) and Path(source).suffix != ".toml":
             self._text = read_block(Path(source))
+        else:
+            self._text = planner_block(as_spec(source)).text
         self._block = BlockInstance(self._text)
         self._axes = self._block.axes
         self._inputs = self._block.inputs  # as they are in the next cycle

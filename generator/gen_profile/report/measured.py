@@ -20,10 +20,8 @@ from gen_profile.spec.model import Spec
 
 STARTS = 400  # starts of the move that are tried before the best is refined
 MOST_FITTED = 4000  # samples
-LEAST_WAY, UNLIKE = (
-    0.1,
-    0.25,
-)  # shares of an axis' way: that it goes in a log, and (RMS) that it is off the plan
+LEAST_WAY = 0.1  # of an axis' way, that it goes in a log at least
+UNLIKE = 0.25  # of it, RMS: by which a log is off the plan that is none of this move
 ANYTHING = 0.1  # rad, of what no angle tells
 PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
 
