@@ -145,6 +145,7 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             r"moves 2 axes, .* machine has 1 \(cart\)",
         ),
         (lambda _: gp.plan(3), "A spec, or the path of one, is expected, found 3"),
+        (lambda _: gp.Planner(3), "A spec, or the path of one, is expected, found 3"),
         (lambda spec: gp.compare(spec, own="mine.csv"), r"such as gp\.plan\(spec\)\.motion, found a str"),
         (lambda spec: gp.compare(spec, own=[STANDING]), "A Profile .* found a SampledProfile"),
         (lambda spec: gp.robustness(spec, "L1", own=3), "A Profile .* found a int"),
