@@ -119,7 +119,7 @@ def test_nothing_is_forgotten_without_damping(text, rope, load, promised):
     assert out["bPromise"][200 : round(promised / CYCLE)].all()
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [5, 6])
 def test_an_axis_without_a_promise_moves_on_as_soon(text, seed):
     """A metre took up to 12 s: each plan that left a millimetre more than was left already was refused."""
     crane, random = Crane(text, 6.0, 1500.0), np.random.default_rng(seed)
