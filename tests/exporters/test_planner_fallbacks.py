@@ -61,6 +61,22 @@ def test_the_time_to_go_by_pulses_stays_when_a_stop_before_them_cannot_be_planne
     assert np.abs(off[round(3.0 / CYCLE) :]).max() < 4.0
 
 
+TURNS = [  # rope in m, targets and for how long, and the latest time for the last one
+    (7.0, ((27.0, 4.3), (13.0, 23.5))),  # 27.4 s: too few slots were left to turn in
+    (4.0, ((7.0, 5.0), (19.0, 15.0))),  # 18.2 s
+    (6.0, ((5.0, 7.1), (24.0, 22.0))),  # 24.2 s: after a stop, pulses led there
+    (6.0, ((23.0, 5.6), (27.0, 1.5), (11.0, 24.0))),  # 30.5 s
+]
+
+
+@pytest.mark.parametrize(("rope", "targets"), TURNS)
+def test_an_axis_that_must_turn_round_is_at_its_target_soon(text, rope, targets):
+    driver = Driver(text, fActPosition=20.0, fL1=rope, fm2=2000.0).hold(5.0)
+    for target, seconds in targets:
+        driver.hold(CYCLE, bExecute=0).hold(seconds - CYCLE, bExecute=1, fTarget=target)
+    assert driver.parts[-1]["bDone"][-1]
+
+
 def test_a_far_target_is_not_put_off_by_what_changes_of_mind_have_left(text):
     """A plan that makes up for it took 36 s; pulses add little to it."""
     late = {"rOverride": 1.0, "fVelocityLimit": 0.6312414434101448, "bStop": 0}

@@ -119,6 +119,22 @@ def test_nothing_is_forgotten_without_damping(text, rope, load, promised):
     assert out["bPromise"][200 : round(promised / CYCLE)].all()
 
 
+@pytest.mark.parametrize("seed", [5, 6])
+def test_an_axis_without_a_promise_moves_on_as_soon(text, seed):
+    """A metre took up to 12 s: each plan that left a millimetre more than was left already was refused."""
+    crane, random = Crane(text, 6.0, 1500.0), np.random.default_rng(seed)
+    while crane.parts[-1]["bPromise"][-1]:
+        crane.hold(CYCLE, bExecute=0.0, bVelocity=1.0, fVelocityCommand=0.0)
+        speed = VELOCITY * random.choice([-1.0, -0.5, 0.5, 1.0])
+        crane.hold(random.uniform(0.5, 7.0), fVelocityCommand=speed)
+        target = random.uniform(0.0, HIGH)
+        crane.hold(random.uniform(0.5, 9.0), bVelocity=0.0, bExecute=1.0, fTarget=target)
+    crane.hold(20.0, bExecute=0.0, bStop=1.0).hold(CYCLE, bStop=0.0)
+    for target, seconds in ((20.0, 40.0), (21.0, 9.6), (20.0, 9.6), (21.0, 9.6)):
+        crane.hold(CYCLE, bExecute=0.0).hold(seconds, bExecute=1.0, fTarget=target)
+        assert crane.parts[-1]["bDone"][-1]
+
+
 def test_what_motions_leave_between_the_machines_watched_is_stated(text):
     """Where they take each other away on these: 2 % above the worst of them would be 1.5 % too little."""
     crane = Crane(text, 6.0, 1500.0).hold(0.1, bVelocity=1.0, fVelocityCommand=0.0)

@@ -44,6 +44,16 @@ def standing(text, rope, load, place=20.0):
     return Driver(text, fL1=rope, fm2=load, fActPosition=place).hold(2.0)
 
 
+@pytest.mark.parametrize(("rope", "load", "way"), [(7.0, 2000.0, 0.5), (5.0, 0.0, 1.0), (9.0, 2000.0, 0.5)])
+def test_moves_to_and_fro_take_little_longer_than_the_first(text, rope, load, way):
+    """It took up to twice as long to make up for what the errors had left of second order."""
+    driver, lasted = standing(text, rope, load).hold(10.0), []
+    for number in range(4):
+        driver.hold(20.0, bExecute=1, fTarget=20.0 + way * ((number + 1) % 2))
+        lasted.append(np.flatnonzero(driver.parts[-1]["fVelocity"])[-1] * CYCLE)
+    assert max(lasted) < 1.55 * lasted[0]
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_no_history_leaves_more_than_is_stated(text, seed):
     random = np.random.default_rng(seed)

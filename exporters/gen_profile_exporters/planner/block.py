@@ -442,11 +442,10 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cInside": INSIDE + (RESERVE if c.rates else 0.0),
         "cReserve": RESERVE if c.rates else 0.0,
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
-        "cCalm": c.tolerated_sway,
         "cAtOnce": 2.0,  # of full speed, from a slot's pulse to the next: no bound
         "cAfterCut": 0.1,  # of full speed, by which pulses grow from slot to slot after one was cut
         **(
-            {"cDoubt": c.stated_error}
+            {"cDoubt": c.stated_error, "cCalm": c.tolerated_sway}
             if c.rates
             else {
                 "cSwayShare": c.sway_share / c.sway_limit / len(c.axes),
