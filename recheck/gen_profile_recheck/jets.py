@@ -39,9 +39,11 @@ class Jet:
         if not isinstance(other, Jet):
             return Jet({key: value * other for key, value in self.parts.items()})
         parts: dict[int, Scalar] = {}
+        every = list(other.parts.items())
+        common = [part for part in every if part[0] < SINGLE]
         for one, first in self.parts.items():
-            for two, second in other.parts.items():
-                if not (one & two or (one >= SINGLE <= two)):
+            for two, second in every if one < SINGLE else common:
+                if not one & two:
                     product = first * second
                     parts[one | two] = parts[one | two] + product if one | two in parts else product
         return Jet(parts)
