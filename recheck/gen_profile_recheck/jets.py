@@ -13,8 +13,6 @@ from math import factorial
 from operator import mul
 from typing import Any
 
-from flint import arb
-
 Scalar = Any  # of python-flint: arb, arb_series; or a number of Python's
 SINGLE = 1 << 9  # the first of units of which no two are multiplied: all slopes at once
 
@@ -101,7 +99,7 @@ def sine_cosine(x: Scalar) -> tuple[Scalar, Scalar]:
         return sine, cosine
     slopes = [sine, cosine, -sine, -cosine]
     first, second = (
-        _expanded(x, (slope * (arb(1) / factorial(order)) for order, slope in enumerate(cycle(each))))
+        _expanded(x, (slope / factorial(n) if n > 1 else slope for n, slope in enumerate(cycle(each))))
         for each in (slopes, slopes[1:] + slopes[:1])
     )
     return first, second
