@@ -192,14 +192,14 @@ def _arm(q: Values, a: Values, k: SimpleNamespace) -> Posture:
 
 
 def _liquid(q: Values, a: Values, k: SimpleNamespace) -> Posture:
-    turned = list(map(sine_cosine, q))
+    angles = list(map(sine_cosine, q))
 
     def drift(dq: Values, v: Values) -> list[Scalar]:
-        modes = zip(turned, dq, k.L, k.loss, strict=True)
+        modes = zip(angles, dq, k.L, k.loss, strict=True)
         return [-(k.g * sine) / length - loss * rate for (sine, _), rate, length, loss in modes]
 
-    inputs = [[cosine / length] for (_, cosine), length in zip(turned, k.L, strict=True)]
-    return Posture(inputs, drift, lambda: [inner(k.rise, [sine for sine, _ in turned])])
+    inputs = [[cosine / length] for (_, cosine), length in zip(angles, k.L, strict=True)]
+    return Posture(inputs, drift, lambda: [inner(k.rise, [sine for sine, _ in angles])])
 
 
 def _tank(p: Mapping[str, Scalar]) -> SimpleNamespace:

@@ -45,8 +45,8 @@ class Scaling:
     @cached_property
     def slip(self) -> Array:
         """Bound |S V − I|, or nan where it is no small number, (boxes, pieces)."""
-        product, missed = self._product(self.series, self.inverse)
-        off = chebyshev.total(product - _identity(product), missed).sum(axis=(-1, -2)) * ROUND_UP
+        product, away = self._product(self.series, self.inverse)
+        off = chebyshev.total(product - _identity(product), away).sum(axis=(-1, -2)) * ROUND_UP
         return np.where(off < 0.5, off, np.nan)
 
     @cached_property
