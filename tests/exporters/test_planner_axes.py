@@ -315,7 +315,12 @@ def test_a_far_target_is_approached_where_pulses_are_refused():
 def test_a_long_way_is_held_against_slow_intervals_in_no_more_operations():
     """All of it was in one cycle: 6 600 operations here, and up to 8 500 of 6 000."""
     changes = [
-        *("export.cycle_time=0.01", "planner.operations=6000", "planner.zones=true", "planner.sway_share=0.0"),
+        *(
+            "export.cycle_time=0.01",
+            "planner.operations=6000",
+            "planner.zones=true",
+            "planner.sway_share=0.0",
+        ),
         "limits.axis.x={velocity=1.5, acceleration=0.12, jerk=1.0, travel=[0.0, 40.0]}",
         "limits.axis.y={velocity=1.0, acceleration=0.1, jerk=1.0, travel=[0.0, 20.0]}",
     ]
