@@ -79,9 +79,16 @@ def meant(word: str, known: Iterable[str]) -> list[str]:
         for name in names
         if word in (*re.split(r"[-_. ]", name.lower()), name.lower().rstrip("0123456789"))
         or (len(word) > 2 and name.lower().startswith(word))
+        or _abbreviates(word.split("-"), name.lower().split("-"))
     ]
     candidates = same or by_meaning or by_part if word else []
     return candidates[:MOST] or _misspelt(word, names)
+
+
+def _abbreviates(word: list[str], name: list[str]) -> bool:
+    """Tell whether a word of several parts has the beginning of each part of a name, as 2h-ei of 2hump-ei."""
+    pairs = zip(word, name, strict=False)
+    return 1 < len(word) == len(name) and all(part and whole.startswith(part) for part, whole in pairs)
 
 
 def _misspelt(word: str, names: Iterable[str]) -> list[str]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from itertools import product
+from itertools import chain, product
 from math import log, pi
 from types import SimpleNamespace
 from typing import Any
@@ -21,9 +21,17 @@ from flint import arb, arb_mat, arb_poly, arb_series, ctx
 
 from gen_profile_recheck.axes import AxisPiece
 from gen_profile_recheck.jets import along, moved, parts_of
-from gen_profile_recheck.machines import INNER, Machine, carried
+from gen_profile_recheck.machines import INNER, Machine, Posture, carried
 
 Values = list[Any]
+
+
+class Places(tuple[Any, ...]):
+    """Places of all parameters, told apart as objects: balls are not hashed."""
+
+    __slots__ = ()
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
 
 
 @dataclass
@@ -36,29 +44,32 @@ class MachineState:
     x: Values
     y: Values
     slope: Values
-    lifts: Sequence[Values]  # D
+    posture: Posture
     axes: Sequence[Values]  # position, velocity, acceleration
     k: SimpleNamespace
-    places: Values
+    places: Places
 
 
 @dataclass(frozen=True)
 class Expansion:
-    """A function of time and parameters: coefficients of Chebyshev's polynomials, how many, and the rest."""
+    """A function of parameters and time: coefficients of Chebyshev's polynomials, how many, and the rest.
 
-    coefficients: arb_mat
+    The last variable's degree, time's, changes first.
+    """
+
+    coefficients: Sequence[arb]
     counts: tuple[int, ...]
     rest: arb
 
     @property
     def size(self) -> arb:
         """Bound its absolute value."""
-        return sum(map(abs, self.coefficients.entries()), start=self.rest).abs_upper()
+        return sum(map(abs, self.coefficients), start=self.rest).abs_upper()
 
     @property
     def upper(self) -> arb:
         """Bound it."""
-        first = self.coefficients[0, 0]
+        first = self.coefficients[0]
         return (first + (self.size - abs(first))).upper()
 
 
@@ -100,6 +111,19 @@ def nodes(count: int) -> list[arb]:
 
 
 @cache
+def grid(counts: tuple[int, ...]) -> list[Places]:
+    """List all nodes of the parameters."""
+    return [Places(one) for one in product(*map(nodes, counts))]
+
+
+@cache
+def _anywhere(count: int, variable: int | None, terms: int) -> Places:
+    """Enclose all places of so many parameters; of one of them give a series about any place."""
+    near = arb_series([wide(1), 1], terms)
+    return Places(near if number == variable else wide(1) for number in range(1, count + 1))
+
+
+@cache
 def node_values(terms: tuple[int, ...], counts: tuple[int, ...]) -> arb_mat:
     """Matrix with the products of Chebyshev's polynomials of all parameters at all nodes, (terms, nodes)."""
     return kronecker(
@@ -131,6 +155,14 @@ def kronecker(matrices: Any) -> arb_mat:
     return arb_mat(result)
 
 
+def transformed(matrices: Sequence[arb_mat], entries: Sequence[arb]) -> list[arb]:
+    """Multiply entries, whose last variable's index changes first, by a matrix for each variable."""
+    for matrix in reversed(matrices):
+        columns = arb_mat(len(entries) // matrix.ncols(), matrix.ncols(), entries).transpose()
+        entries = (matrix * columns).entries()  # now the last variable's index comes first
+    return list(entries)
+
+
 @dataclass(frozen=True)
 class MachineBox:
     """Machines whose parameters lie in a part of their ranges.
@@ -144,8 +176,12 @@ class MachineBox:
     parts: Sequence[tuple[int, int]]
     terms: tuple[int, ...]
 
-    def constants(self, places: Sequence[Any]) -> SimpleNamespace:
+    @cached_property
+    def constants(self) -> Callable[[Places], SimpleNamespace]:
         """Give the machine's constants at places of its parameters."""
+        return cache(self._constants)
+
+    def _constants(self, places: Places) -> SimpleNamespace:
         p: dict[str, Any] = {name: arb(value) for name, value in self.nominal.items()}
         for (name, (low, high)), (level, index), u in zip(
             self.ranges.items(), self.parts, places, strict=True
@@ -180,21 +216,19 @@ class MotionPiece:
         at = [in_powers(one.nrows()) * one * node_values(self.box.terms, counts) for one in self.series]
         columns = [one.transpose().tolist() for one in at]
         axes = self._axes(lambda poly: arb_series(poly.coeffs(), terms + 1))
-        for number, places in enumerate(product(*map(nodes, counts))):
+        for number, places in enumerate(grid(counts)):
             x = [arb_series(column[number], terms + 1) for column in columns]
             k = self.box.constants(places)
-            lifts = self.box.machine.input_matrix(x[:n], axes[0], k)
-            y = x[:n] + carried(x[n:], lifts, axes[1])
+            here = self.box.machine.at(x[:n], axes[0], k)
+            y = x[:n] + carried(x[n:], here.inputs, axes[1])
             slope = [one.derivative() / self.half for one in y]
-            yield MachineState(x, y, slope, lifts, axes, k, list(places))
+            yield MachineState(x, y, slope, here, axes, k, places)
 
     def around(self, variable: int | None = None, terms: int = 1) -> MachineState:
         """Take all times and parameters: balls, or series of one of them (0 is time) about any place."""
         ctx.cap, n = terms, len(self.series) // 2
         x, slope, times = Values(), Values(), self.series[0].nrows()
-        places: Values = [wide(1) for _ in self.box.terms]
-        if variable:
-            places[variable - 1] = arb_series([wide(1), 1], terms)
+        places = _anywhere(len(self.box.terms), variable, terms)
         parameters = _greatest(self.box.terms, variable, terms)
         time = arb_mat([[1] * times, [k * k for k in range(times)]])
         if variable == 0:
@@ -217,18 +251,17 @@ class MotionPiece:
         )
         a, v, dv = axes
         k = self.box.constants(places)
-        lifts = self.box.machine.input_matrix(x[:n], a, k)
         speed = self.box.machine.speed(moved(x, slope, INNER), moved(a, v, INNER), moved(v, dv, INNER), k)
         y = x[:n] + [parts_of(one)[0] for one in speed]
         slope = slope[:n] + [along(one, INNER) for one in speed]
-        return MachineState(x, y, slope, lifts, axes, k, places)
+        return MachineState(x, y, slope, self.box.machine.at(x[:n], a, k), axes, k, places)
 
     def enclosed(
         self, function: Callable[[MachineState], Values], fits: Callable[[list[arb]], bool], most: int = 20
     ) -> list[Expansion]:
         """Enclose functions of the motions, with as many terms of each variable as what they miss fits."""
         counts, rests, amplified = list[int](), [], arb(1)
-        for variable in [*range(1, 1 + len(self.box.terms)), 0]:
+        for variable in [*range(1, 1 + len(self.box.terms)), 0]:  # time is the last one
             late = [_coefficients(one, most + 1) for one in function(self.around(variable, most + 1))]
             for count in range(1, most + 1):
                 factor = amplified * (arb(2) ** (1 - count) if variable else 1)
@@ -239,18 +272,10 @@ class MotionPiece:
             amplified *= 1 + 2 / pi * log(count) + 1e-9
         *own, terms = counts
         rows = [[_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(own), terms)]
-        tables = (_interpolated(list(one), terms, own) for one in zip(*rows, strict=True))
+        matrices = [*map(interpolation, own), from_powers(terms)]
+        tables = (transformed(matrices, list(chain(*one))) for one in zip(*rows, strict=True))
         sums = (sum(one, start=arb(0)).abs_upper() for one in zip(*rests, strict=True))
-        return [Expansion(one, (terms, *own), rest) for one, rest in zip(tables, sums, strict=True)]
-
-
-def _interpolated(table: Values, terms: int, counts: Sequence[int]) -> arb_mat:
-    """Take powers of time at nodes for coefficients, one variable after the other, the last one first."""
-    entries = [one for row in table for one in row]
-    for matrix in (from_powers(terms), *map(interpolation, reversed(counts))):
-        columns = arb_mat(len(entries) // matrix.ncols(), matrix.ncols(), entries).transpose()
-        entries = (matrix * columns).entries()  # the last variable's index comes first
-    return arb_mat(len(table), terms, entries).transpose()
+        return [Expansion(one, tuple(counts), rest) for one, rest in zip(tables, sums, strict=True)]
 
 
 def _coefficients(value: Any, terms: int) -> list[arb]:

@@ -201,7 +201,7 @@ class Case:
         axes, still = [arb(one) for one in self.spec["move"]["target"]], [arb(0)] * self.proof.coordinates
         k = self.machine.constants({name: arb(value) for name, value in parameters.items()})
         q, dq, v = still[::2], still[::2], [arb(0)] * len(axes)
-        pulls = derivatives(lambda q: self.machine.drift(q, dq, axes, v, k), q)
+        pulls = derivatives(lambda q: self.machine.at(q, axes, k).drift(dq, v), q)
         values = acb_mat([[-arb(one) for one in row] for row in pulls]).eig(algorithm="approx")
         return float(min(float(one.real.mid()) for one in values) ** 0.5)
 

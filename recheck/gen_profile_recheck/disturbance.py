@@ -27,26 +27,29 @@ class Disturbance:
 
     `shift` encloses X − x̃, and `terms` all of the defect but what x̃ has on smooth axes: each is a vector that
     is bounded over the piece, times the root mean square of a function of time. So the mean of the defect's
-    length is at most the sum of theirs. `state` encloses x̃ and smooth axes, `axes` those of the setpoints.
+    length is at most the sum of theirs. `off` lists axes that leave smooth ones, and their
+    directions, `state` encloses x̃ and smooth axes, `axes` those of the setpoints.
     """
 
     def __init__(self, piece: MotionPiece) -> None:
         self.piece, self.machine, self.state, axes = piece, piece.box.machine, piece.around(), piece.axes
         n, m = len(piece.series), len(axes)
-        self.units = [[int(row == chosen) for row in range(m)] for chosen in range(m)]
+        units = [[int(row == chosen) for row in range(m)] for chosen in range(m)]
+        pairs = zip(axes, units, strict=True)
+        self.off = [(axis, unit) for axis, unit in pairs if not axis.gap.most.is_zero()]
         position, velocity, _ = self.state.axes
         self.axes = (
             [one + wide(axis.gap.most) for one, axis in zip(position, axes, strict=True)],
             [one + wide(axis.rate.most) for one, axis in zip(velocity, axes, strict=True)],
         )
         self.lifts, self.terms, ways = list[Values](), list[Values](), list[tuple[Values, Size]]()
-        for axis, unit in zip(axes, self.units, strict=True):
+        for axis, unit in self.off:
             lift, pull = self._along(axis, unit)
             self.lifts.append(lift)
             ways += [(lift + unit + [0] * m, axis.gap), (pull + [0] * 2 * m, axis.swing)]
             ways.append(([0] * (n + m) + unit, axis.rate))
-        sums = ([one * wide(size.most) for one in way[:n]] for way, size in ways)
-        self.shift = [sum(row, start=arb(0)) for row in zip(*sums, strict=True)]
+        sizes = [(way, wide(size.most)) for way, size in ways]
+        self.shift = [sum((way[row] * size for way, size in sizes), start=arb(0)) for row in range(n)]
         places = self.near() + self.axes[0] + self.axes[1]
         for (one, size), (other, its_size) in combinations_with_replacement(ways, 2):
             z = moved(moved(places, one, 1), other, 2)
@@ -85,7 +88,7 @@ class Disturbance:
         """Enclose by how much y leaps where x̃ does, and at the beginning how far it is from the machine's."""
         (a, v, _), wides = self.state.axes, [wide(one) for one in leap]
         total = wides
-        for axis, unit, lift in zip(self.piece.axes, self.units, self.lifts, strict=True):
+        for (axis, unit), lift in zip(self.off, self.lifts, strict=True):
             lifts = self.machine.rate(moved(self.near(wides), wides, 2), a, moved(v, unit, 1), self.state.k)
             own = [along(along(one, 1), 2) * wide(axis.gap.most) for one in lifts]
             if at_start:
@@ -100,7 +103,7 @@ class Disturbance:
         x = self.near(self.in_rates(off, -1, off))
         for one, column in zip(size, columns, strict=True):
             x = moved(x, column, SINGLE << one)
-        for axis, unit in zip(self.piece.axes, self.units, strict=True):
+        for axis, unit in self.off:
             for order, mean in enumerate([axis.gap.mean, axis.rate.mean]):
                 near, fast = (moved(one, unit, 1) if n == order else one for n, one in enumerate(self.axes))
                 rate = self.machine.rate(x, near, fast, self.state.k)

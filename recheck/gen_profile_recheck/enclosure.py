@@ -22,7 +22,7 @@ from gen_profile_recheck.reading import NotProvedError, require
 from gen_profile_recheck.scales import Matrix, ScaleMatrix, norm
 
 MISSED = 2.0**-11  # of a bound, that all that series leave out may be worth
-GROWTH = 2.0**-4  # by whose exponential errors may grow for what series of the growth leave out
+GROWTH = 2.0**-2  # by whose exponential errors may grow for what series of the growth leave out
 ATTEMPTS, WIDER = 12, 2
 
 
@@ -99,11 +99,11 @@ class PieceProof:
         return error
 
     def _defect_and_sways(self, s: MachineState) -> Values:
-        q, dq = s.y[: self.n], s.y[self.n :]
-        a, v, dv = s.axes
-        rates = dq + carried(self.machine.drift(q, dq, a, v, s.k), s.lifts, dv)
+        dq = s.y[self.n :]
+        _, v, dv = s.axes
+        rates = dq + carried(s.posture.drift(dq, v), s.posture.inputs, dv)
         entries = [one - two for one, two in zip(s.slope, rates, strict=True)]
-        sways = self.machine.sway(q, a, s.k)
+        sways = s.posture.sways()
         for claim in self.claims:
             own = sways[claim.loads]
             entries.append(own[0] if len(own) == 1 else sum(one * one for one in own))
@@ -135,7 +135,7 @@ class PieceProof:
 
     def _growth(self, off: Sequence[arb]) -> arb:
         """Bound the logarithmic norm on smooth axes by Gershgorin's circles of the symmetric part."""
-        n, indices = self.n, range(2 * self.n)
+        n, indices, half = self.n, range(2 * self.n), arb(0.5)
         tube = [one + two for one, two in zip(off, self.beside.in_rates(self.beside.shift), strict=True)]
 
         def matrix(s: MachineState) -> Matrix:
@@ -145,7 +145,7 @@ class PieceProof:
 
         def symmetric(s: MachineState) -> Values:
             changed = self.scale.times(matrix(s), s)
-            return [(changed[i][j] + changed[j][i]) / arb(2) for i in indices for j in indices if j <= i]
+            return [(changed[i][j] + changed[j][i]) * half for i in indices for j in indices if j <= i]
 
         most = GROWTH / (2 * n * self.span)
         found = iter(self.piece.enclosed(symmetric, lambda rest: all(one < most for one in rest), 12))
@@ -157,7 +157,7 @@ class PieceProof:
     def _away(self, off: Sequence[arb], error: arb) -> list[arb]:
         """Bound by how much sways of all loads differ from those of the approximate motion."""
         beside, k, q = self.beside, self.beside.state.k, self.beside.near(off)[: self.n]
-        gains = derivatives(lambda q, a: self.machine.sway(q, a, k), q, beside.axes[0])
+        gains = derivatives(lambda q, a: self.machine.at(q, a, k).sways(), q, beside.axes[0])
         known = [*beside.shift[: self.n], *(wide(axis.gap.most) for axis in self.piece.axes)]
         changed = self.scale.per_length([row[: self.n] for row in gains])
         still = ([abs(arb(one)) * abs(two) for one, two in zip(row, known, strict=True)] for row in gains)

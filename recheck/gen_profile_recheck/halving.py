@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import product
 
 from flint import arb, arb_mat, arb_poly
 
-from gen_profile_recheck.boxes import Expansion, chebyshev_value, from_powers, kronecker
+from gen_profile_recheck.boxes import Expansion, chebyshev_value, from_powers, transformed
 
 MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
 
@@ -21,7 +20,7 @@ def keeps(one: Expansion, allowed: arb) -> bool:
         part = waiting.pop()
         if part.size <= allowed:
             continue
-        if not part.rest < allowed or not part.coefficients[0, 0].is_finite():
+        if not part.rest < allowed or not part.coefficients[0].is_finite():
             return False
         axis = _steepest(part)
         waiting += [_half(part, axis, side) for side in (-1, 1)]
@@ -30,16 +29,18 @@ def keeps(one: Expansion, allowed: arb) -> bool:
 
 def _steepest(one: Expansion) -> int:
     """Choose the variable whose own terms are greatest."""
-    sums = [arb(0)] * len(one.counts)
-    for degrees, entry in zip(product(*map(range, one.counts)), one.coefficients.entries(), strict=True):
-        for axis, degree in enumerate(degrees):
-            sums[axis] += abs(entry) * degree * degree
-    return max(range(len(sums)), key=lambda axis: float(sums[axis].mid()))
+    sizes, axes = [abs(entry) for entry in one.coefficients], range(len(one.counts))
+
+    def own_terms(axis: int) -> float:
+        weights = ([k * k if n == axis else 1 for k in range(count)] for n, count in enumerate(one.counts))
+        return float(transformed([arb_mat([each]) for each in weights], sizes)[0].mid())
+
+    return max(axes, key=own_terms)
 
 
 def _half(one: Expansion, axis: int, side: int) -> Expansion:
-    time, *own = (_halving(count, side * (number == axis)) for number, count in enumerate(one.counts))
-    return Expansion(time * one.coefficients * kronecker(own).transpose(), one.counts, one.rest)
+    matrices = [_halving(count, side * (number == axis)) for number, count in enumerate(one.counts)]
+    return Expansion(transformed(matrices, one.coefficients), one.counts, one.rest)
 
 
 @cache

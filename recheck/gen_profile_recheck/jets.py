@@ -13,8 +13,6 @@ from math import factorial
 from operator import mul
 from typing import Any
 
-from flint import arb
-
 Scalar = Any  # of python-flint: arb, arb_series; or a number of Python's
 SINGLE = 1 << 9  # the first of units of which no two are multiplied: all slopes at once
 
@@ -39,9 +37,11 @@ class Jet:
         if not isinstance(other, Jet):
             return Jet({key: value * other for key, value in self.parts.items()})
         parts: dict[int, Scalar] = {}
+        every = list(other.parts.items())
+        common = [part for part in every if part[0] < SINGLE]
         for one, first in self.parts.items():
-            for two, second in other.parts.items():
-                if not (one & two or (one >= SINGLE <= two)):
+            for two, second in every if one < SINGLE else common:
+                if not one & two:
                     product = first * second
                     parts[one | two] = parts[one | two] + product if one | two in parts else product
         return Jet(parts)
@@ -99,7 +99,7 @@ def sine_cosine(x: Scalar) -> tuple[Scalar, Scalar]:
         return sine, cosine
     slopes = [sine, cosine, -sine, -cosine]
     first, second = (
-        _expanded(x, (slope * (arb(1) / factorial(order)) for order, slope in enumerate(cycle(each))))
+        _expanded(x, (slope / factorial(n) if n > 1 else slope for n, slope in enumerate(cycle(each))))
         for each in (slopes, slopes[1:] + slopes[:1])
     )
     return first, second

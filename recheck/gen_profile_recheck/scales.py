@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
+from functools import cache, reduce
 from itertools import chain, product
 from math import prod
 from typing import Any
@@ -13,11 +13,12 @@ from flint import arb, arb_mat
 from gen_profile_recheck.boxes import (
     MachineState,
     MotionPiece,
+    Places,
     Values,
     chebyshev_value,
+    grid,
     interpolation,
     kronecker,
-    nodes,
     wide,
 )
 from gen_profile_recheck.machines import inner
@@ -32,11 +33,11 @@ class PolynomialMatrix:
     """A matrix of polynomials of the parameters, with so many terms in each; `most` encloses its entries."""
 
     def __init__(self, entries: Any, counts: Sequence[int]) -> None:
-        self.entries = [[[arb(x) for x in entry] for entry in row] for row in entries]
+        self.at, self.entries = cache(self._at), [[[arb(x) for x in one] for one in row] for row in entries]
         self.degrees = list(product(*map(range, counts)))
         self.most = [[wide(sum(map(abs, entry), start=arb(0))) for entry in row] for row in self.entries]
 
-    def at(self, places: Sequence[Any]) -> Matrix:
+    def _at(self, places: Places) -> Matrix:
         """Evaluate at places of the parameters."""
         basis = [prod(map(chebyshev_value, each, places), start=arb(1)) for each in self.degrees]
         return [[inner(basis, entry) for entry in row] for row in self.entries]
@@ -54,7 +55,7 @@ class ScaleMatrix:
         few = [1 if single else min(3, terms) for terms in piece.box.terms]
         counts = [1 if count == 1 else NODES for count in few]
         self.piece, self.scale = piece, PolynomialMatrix(entries, few)
-        middles = (self.scale.at(each) for each in product(*map(nodes, counts)))
+        middles = map(self.scale.at, grid(tuple(counts)))
         values = arb_mat([arb_mat(one).inv().entries() for one in middles])
         columns = [
             [one.mid() for one in row]

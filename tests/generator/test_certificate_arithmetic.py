@@ -198,8 +198,8 @@ def test_series_and_their_values_enclose_those_of_arb():
     random = np.random.default_rng(6)
     exact = random.normal(size=(2, 5, 4))
     values = chebyshev.evaluated(exact, (7, 6))
-    again = chebyshev.interpolated(values, 2)
-    assert values.rad.shape == (2, 1, 1) and values.rad.max() < 1e-12 and again.rad.max() < 1e-10
+    again, off = chebyshev.interpolated(values, 2)
+    assert values.rad.shape == (2, 1, 1) and values.rad.max() < 1e-12 and off.max() < 1e-9
     places = [[(flint.arb.pi() * (2 * j + 1) / (2 * count)).cos() for j in range(count)] for count in (7, 6)]
     for box, i, j in product(range(2), range(7), range(6)):
         terms = (
@@ -209,7 +209,12 @@ def test_series_and_their_values_enclose_those_of_arb():
         assert abs(sum(terms) - flint.arb(values.mid[box, i, j])) <= flint.arb(values.rad[box, 0, 0])
     whole = np.zeros((2, 7, 6))
     whole[:, :5, :4] = exact
-    assert (np.abs(again.mid - whole) <= again.rad).all()
+    assert (np.abs(again - whole).sum(axis=(1, 2)) <= off).all()
+    fine = np.linspace(-1.0, 1.0, 41)
+    shaken = np.where(random.random((2, 7, 6)) < 0.5, -1.0, 1.0)  # at nodes, by all of a radius of 1
+    series_, off = chebyshev.interpolated(Ball(0.0 * shaken, np.ones((2, 1, 1))), 2)
+    least = [np.abs(series.chebgrid2d(fine, fine, chebyshev.interpolate(one, 2))).max() for one in shaken]
+    assert (series_ == 0.0).all() and (least <= off).all() and off.max() < 5.0
 
 
 def test_the_greatest_value_of_a_series_is_bounded_closely():

@@ -90,6 +90,8 @@ FAULTS = [
     ("move.velocity", 6.0, r"move\.velocity: unknown key; did you mean 'limits\.velocity'\?"),
     ("robustness.L1", 0.1, r"robustness\.L1: unknown key; did you mean 'robustness\.uncertain\.L1'\?"),
     ("solver.method", "ZVD", r"solver\.method: unknown value, found text 'ZVD'; did you mean 'zvd'\?"),
+    ("solver.method", "2h-ei", r"solver\.method: .* found text '2h-ei'; did you mean '2hump-ei'\?"),
+    ("solver.method", "2 m", r"solver\.method: unknown value, found text '2 m' .known: auto, .*"),
     ("move.duration", "min", r"move\.duration: .*, found text 'min'; did you mean 'minimum'\?"),
     # numbers as people write them
     ("plant.L1", "6,0", r"plant\.L1: .*, found text '6,0'; write a decimal point: 6\.0\."),

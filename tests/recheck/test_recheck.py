@@ -11,7 +11,7 @@ import forgeries
 import numpy as np
 import pytest
 from certificates import certified, contents
-from flint import arb, arb_mat
+from flint import arb
 
 import gen_profile as gp
 from gen_profile.certificate.arithmetic.balls import ball
@@ -97,7 +97,7 @@ def test_equations_are_those_of_the_program(kind):
         a = random.uniform(0.5, 3.0, len(v))
         k = machine.constants({name: arb(value) for name, value in p.items()})
         balls = [[arb(one) for one in values.tolist()] for values in (x, a, v)]
-        ours = [*machine.rate(*balls, k), *machine.sway(balls[0][:n], balls[1], k)]
+        ours = [*machine.rate(*balls, k), *machine.at(balls[0][:n], balls[1], k).sways()]
         columns = [[ball(one) for one in values] for values in (x, a, v, p.values())]
         seen = theirs.sway(columns[0][:n], columns[1], columns[3])
         found = [row[0] for row in [*theirs.rate(*columns), *seen]]
@@ -345,7 +345,7 @@ def test_quintics_have_the_values_at_their_ends():
 
 def test_a_greatest_value_is_found_by_halves():
     # T2(t) + T1(u)/2 reaches 1.5 and no more, T2(t) T2(u) 1
-    sum_ = Expansion(arb_mat([[0, 0.5, 0], [0, 0, 0], [1, 0, 0]]), (3, 3), arb(0))
-    product = Expansion(arb_mat([[0.2, 0, 0], [0, 0, 0], [-0.4, 0, 0.7]]), (3, 3), arb(0.01))
+    sum_ = Expansion([arb(one) for one in (0, 0, 1, 0.5, 0, 0, 0, 0, 0)], (3, 3), arb(0))
+    product = Expansion([arb(one) for one in (0.2, 0, -0.4, 0, 0, 0, 0, 0, 0.7)], (3, 3), arb(0.01))
     assert keeps(sum_, arb(1.500001)) and not keeps(sum_, arb(1.499))
     assert keeps(product, arb(1.311)) and not keeps(product, arb(1.29))

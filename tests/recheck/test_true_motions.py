@@ -9,7 +9,7 @@ from certificates import certified, contents
 from flint import arb, arb_mat
 
 from gen_profile_recheck import enclosure
-from gen_profile_recheck.boxes import chebyshev_value
+from gen_profile_recheck.boxes import Places, chebyshev_value
 from gen_profile_recheck.check import Case
 from gen_profile_recheck.jets import derivatives
 from gen_profile_recheck.reading import read_json
@@ -67,7 +67,7 @@ def error_of(proof, k, place, x, positions):
     ]
     ours, true = (one[: proof.n] + machine.speed(one, a, v, k) for one in (there, x))
     off = [one - other for one, other in zip(true, ours, strict=True)]
-    scale = proof.scale.scale.at([place])
+    scale = proof.scale.scale.at(Places([place]))
     return hypot(*(float(sum((s * e for s, e in zip(row, off, strict=True)), start=arb(0))) for row in scale))
 
 
@@ -88,7 +88,7 @@ def test_errors_of_true_motions_are_bounded_and_not_by_far(tmp_path, monkeypatch
     with pytest.raises(EnoughError):
         case.prove(lambda done, boxes: None, 1)
     times, positions = case.setpoints.times, list(zip(*case.setpoints.positions, strict=True))
-    k, rate, ratios = met[0][0].piece.box.constants([arb(PLACE)]), case.machine.rate, []
+    k, rate, ratios = met[0][0].piece.box.constants(Places([arb(PLACE)])), case.machine.rate, []
     x = [arb(0)] * (2 * met[0][0].n)
     for (proof, bound), (begin, end) in zip(met, pairwise(case.proof.knots), strict=False):
         for row in range(times.index(begin), times.index(end)):

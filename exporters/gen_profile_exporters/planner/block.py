@@ -33,6 +33,7 @@ on the way, and likewise what is for zones and events where there are none.
 - ``formulas/``: modes at the live parameters, complex powers, columns that a row fills, slow zones near.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -344,13 +345,23 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cChunk": 45,  # slots that a phase takes at once
         "cFuture": FUTURE,
         "cWork": _work(c),
-        **({"cZones": ZONES} if c.zones else {}),
+        **(_zoned(c) if c.zones else {}),
         "cHoldCycles": round(HOLD / c.cycle),
         **of_search.whole(),
         "cColumnWork": _column_work(c),
         "cReaches": len(_reach_slots(c)),
         **of_sensor.whole(c.sensor, modes, len(c.axes), c.cycle),
     }
+
+
+def _zoned(c: PlannerConstants) -> dict[str, int]:
+    """Count intervals, and slots of the committed future that are held against them in one cycle."""
+    left = _work(c) - _cycle_work(c) - 8 * FUTURE - 40
+    chunk = min(FUTURE, left // (9 + 7 * ZONES))
+    cycles = math.ceil(FUTURE / chunk)
+    if 2 * len(c.axes) * cycles > _shortest_slot(c):  # rather too much in one cycle than never
+        chunk, cycles = FUTURE, 1
+    return {"cZones": ZONES, "cZoneChunk": chunk, "cZoneCycles": cycles}
 
 
 def _reach_slots(c: PlannerConstants) -> Sequence[int]:

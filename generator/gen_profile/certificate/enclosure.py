@@ -46,11 +46,17 @@ from gen_profile.certificate.scaling import Scaling, affine_entries
 from gen_profile.certificate.sway_limits import SwayBounds, WatchedSway
 
 TIME_NODES, FEW_TIME_NODES = 12, 8  # for the defect, and for what need not be as close
-MORE_NODES = 4  # than terms, in each parameter: what interpolation misses is bounded roughly
+# more nodes than terms in each parameter, as what interpolation misses is bounded roughly; fewer of few terms
+MORE_NODES, FEW_MORE_NODES, FEW_TERMS = 4, 2, 5
 ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
 PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
 HOPELESS = 0.02  # error of a motion as a share of its size, without its growth: no proof is tried
 FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
+
+
+def nodes_for(terms: int) -> int:
+    """Tell how many nodes of a parameter it takes for so many terms."""
+    return terms + (FEW_MORE_NODES if terms <= FEW_TERMS else MORE_NODES)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -110,12 +116,12 @@ class Enclosure:
     @property
     def fine(self) -> tuple[int, ...]:
         """Nodes in time and in each parameter."""
-        return TIME_NODES, *(terms + MORE_NODES for terms in self.approximation.series.shape[4:])
+        return TIME_NODES, *map(nodes_for, self.approximation.series.shape[4:])
 
     @property
     def coarse(self) -> tuple[int, ...]:
         """Nodes where fewer in time will do."""
-        return FEW_TIME_NODES, *(terms + MORE_NODES for terms in self.approximation.series.shape[4:])
+        return FEW_TIME_NODES, *map(nodes_for, self.approximation.series.shape[4:])
 
     def bounds(self, targets: Array) -> SwayBounds:
         """Carry the proof out.
@@ -290,9 +296,7 @@ class Enclosure:
             each = (
                 self._whole(rate / step - row[0], self.fine, rows) for rate, row in zip(dx, f, strict=True)
             )
-            sums = [
-                chebyshev.total(chebyshev.interpolated(one, self.variables), self.variables) for one in each
-            ]
+            sums = [chebyshev.total(*chebyshev.interpolated(one, self.variables)) for one in each]
             defects.append(np.stack(sums, axis=2))
         f = self.equations.rate.evaluated(*self._state_on_ellipses)
         shape = self._range.shape[:3]
@@ -395,9 +399,10 @@ class Enclosure:
             jacobian = self.equations.jacobian(*self._state_at(counts, rows))
             transformed = symmetric(product(product(entries(to, rows), jacobian), entries(back, rows)))
             for i, j in zip(*np.tril_indices(size), strict=True):
-                series = chebyshev.interpolated(self._whole(transformed[i][j], counts, rows), self.variables)
-                first = chebyshev.first(series.mid, self.variables)
-                rest = chebyshev.total(series, self.variables) - np.abs(first)
+                whole = self._whole(transformed[i][j], counts, rows)
+                series, off = chebyshev.interpolated(whole, self.variables)
+                first = chebyshev.first(series, self.variables)
+                rest = chebyshev.total(series, off) - np.abs(first)
                 mid[:, rows, i, j], rad[:, rows, i, j] = first, rest * ROUND_UP
         for i, j in zip(*np.tril_indices(size), strict=True):
             rad[..., i, j] += self._interpolation_error(self._missed_by_few(far[i][j]), counts)
@@ -484,10 +489,9 @@ class Enclosure:
         power = 1 if len(at_nodes) == 1 else 2
         whole, beyond = (reduce(add, (balls.power(one, power) for one in each)) for each in (at_nodes, far))
         remainder = np.broadcast_to(beyond.rad, self._range.shape[:3])[:, :, first:]
-        series = chebyshev.interpolated(whole, self.variables)
-        rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
+        series, rounding = chebyshev.interpolated(whole, self.variables)
         off = rounding + self._interpolation_error(remainder, self.fine)
         targets = np.maximum(targets, 0.0) ** power
-        bounds = [chebyshev.greatest(*one) for one in zip(series.mid, off, targets.tolist(), strict=True)]
+        bounds = [chebyshev.greatest(*one) for one in zip(series, off, targets.tolist(), strict=True)]
         largest_met = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
         return np.array(bounds) ** (1.0 / power) * ROUND_UP, largest_met ** (1.0 / power)

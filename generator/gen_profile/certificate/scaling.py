@@ -45,19 +45,19 @@ class Scaling:
     @cached_property
     def slip(self) -> Array:
         """Bound |S V − I|, or nan where it is no small number, (boxes, pieces)."""
-        product = self._product(self.series, self.inverse)
-        off = chebyshev.total(product - _identity(product), self.variables).sum(axis=(-1, -2)) * ROUND_UP
+        product, away = self._product(self.series, self.inverse)
+        off = chebyshev.total(product - _identity(product), away).sum(axis=(-1, -2)) * ROUND_UP
         return np.where(off < 0.5, off, np.nan)
 
     @cached_property
     def most(self) -> Array:
         """Bound every entry of S, (boxes, pieces, 2 n_u, 2 n_u)."""
-        return chebyshev.total(Ball(self.series, 0.0), self.variables)
+        return chebyshev.total(self.series, np.zeros(self.series.shape[:4]))
 
     @cached_property
     def inverse_most(self) -> Array:
         """Bound every entry of V, likewise."""
-        return chebyshev.total(Ball(self.inverse, 0.0), self.variables)
+        return chebyshev.total(self.inverse, np.zeros(self.inverse.shape[:4]))
 
     @property
     def slack(self) -> Array:
@@ -69,13 +69,13 @@ class Scaling:
         changed = np.ones((len(self.series), pieces))
         if self.series.shape[1] == 1:
             return changed
-        product = chebyshev.total(self._product(self.series[:, 1:], self.inverse[:, :-1]), self.variables)
+        product = chebyshev.total(*self._product(self.series[:, 1:], self.inverse[:, :-1]))
         sums = product.sum(axis=-1).max(axis=-1), product.sum(axis=-2).max(axis=-1)
         changed[:, 1:] = np.sqrt(sums[0] * sums[1]) * self.slack[:, :-1] * ROUND_UP
         return changed
 
-    def _product(self, first: Array, second: Array) -> Ball:
-        """Multiply polynomials, at as many nodes as determine their product; as a series."""
+    def _product(self, first: Array, second: Array) -> tuple[Array, Array]:
+        """Multiply polynomials, at as many nodes as determine their product; as a series, and how far off."""
         counts = [one + other - 1 for one, other in zip(first.shape[4:], second.shape[4:], strict=True)]
         a, b = (chebyshev.evaluated(series, counts) for series in (first, second))
         pairs = (a[:, :, :, k, None] * b[:, :, None, k] for k in range(a.mid.shape[2]))
@@ -113,9 +113,9 @@ def affine_entries(series: Array, rho: Array, far: Mapping[int, Array]) -> list[
     return [[entry(i, j) for j in range(series.shape[3])] for i in range(series.shape[2])]
 
 
-def _identity(like: Ball) -> Array:
+def _identity(like: Array) -> Array:
     """Give the series of the unit matrix."""
-    shape = np.shape(like.mid)
+    shape = like.shape
     series = np.zeros((*shape[2:4], int(np.prod(shape[4:]))))
     series[..., 0] = np.eye(shape[2])
     return series.reshape(shape[2:])

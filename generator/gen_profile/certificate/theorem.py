@@ -12,7 +12,7 @@ from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.axis_motion import AxisMotion, Gap, gap_between
 from gen_profile.certificate.axes.axis_track import Track, track_of
 from gen_profile.certificate.boxes import DyadicBox, Ranges
-from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure
+from gen_profile.certificate.enclosure import TIME_NODES, Approximation, Enclosure, nodes_for
 from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations
 from gen_profile.certificate.scaling import Scaling
 from gen_profile.certificate.sway_limits import SwayLimit, WatchedSway
@@ -130,7 +130,7 @@ class Theorem:
     @property
     def nodes(self) -> int:
         """Nodes of one box, over all pieces."""
-        return (len(self.axes.knots) - 1) * TIME_NODES * prod(count + MORE_NODES for count in self.terms)
+        return (len(self.axes.knots) - 1) * TIME_NODES * prod(map(nodes_for, self.terms))
 
     @cached_property
     def equations(self) -> EnclosedEquations:

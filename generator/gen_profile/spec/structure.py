@@ -14,7 +14,7 @@ import attrs
 
 from gen_profile.errors import SpecError
 from gen_profile.phrase import Phrase, placed
-from gen_profile.spec.values import NONE, Named, Words
+from gen_profile.spec.values import NONE, Named, Words, found
 from gen_profile.suggestion import suggestion
 
 Kind = Any  # an annotation
@@ -162,7 +162,9 @@ class Structurer:
         if any(type(choice) is type(value) and choice == value for choice in choices):
             return value
         hint = suggestion(str(value), map(str, choices))
-        return self._misfit(where, Words("unknown value, found {found}{hint}", hint=hint), "", value)
+        named = all(isinstance(choice, str) for choice in choices)
+        words = Words("unknown value, found {found}{hint}", found=found(value, number=not named), hint=hint)
+        return self._misfit(where, words, "", value)
 
     def _table(self, value: Any, kind: Kind, where: str) -> Any:
         """Make an instance of one of the spec's classes; fields that do not fit take their defaults."""

@@ -73,7 +73,7 @@ class Words:
 
     def of(self, value: object) -> Phrase:
         """Put it into words for a value."""
-        return Phrase(self._template, **self._values, found=found(value))
+        return Phrase(self._template, **{"found": found(value), **self._values})
 
 
 def example(toml: str) -> Words:
@@ -98,8 +98,8 @@ def between(limits: Mapping[str, float], unit: str = "") -> str:
     return stated[0] if len(stated) == 1 else Phrase("{low} and {high}", low=stated[0], high=stated[1])
 
 
-def found(value: object) -> str:
-    """Name a value in a sentence, never at length."""
+def found(value: object, number: bool = True) -> str:
+    """Name a value in a sentence, never at length, and of a text how it might be a number."""
     match value:
         case None:
             return "nothing"
@@ -110,7 +110,8 @@ def found(value: object) -> str:
         case int() | float():
             return repr(value)
         case str():
-            return Phrase("text {text}{hint}", text=repr(value[:60]), hint=number_meant(value))
+            hint = number_meant(value) if number else ""
+            return Phrase("text {text}{hint}", text=repr(value[:60]), hint=hint)
         case Mapping():
             return "a table"
         case list() | tuple():

@@ -11,6 +11,7 @@ Arrays have an axis for each variable, after others.
 
 from collections.abc import Sequence
 from functools import cache
+from math import prod
 
 import numpy as np
 
@@ -45,15 +46,25 @@ def evaluated(series: Array, counts: Sequence[int]) -> Ball:
     return Ball(_turned(matrices, series), _sum(np.abs(series), len(counts)) * off * ROUND_UP)
 
 
-def interpolated(values: Ball, variables: int) -> Ball:
-    """Interpolate values at nodes, which share a radius; coefficients do, too."""
+def interpolated(values: Ball, variables: int) -> tuple[Array, Array]:
+    """Interpolate values at nodes, which share a radius: a series, and how far off it may be anywhere.
+
+    Coefficients are off by their rounding, each of them; but a radius is made greater by no more than the
+    whole interpolation makes values.
+    """
     counts = np.shape(values.mid)[np.ndim(values.mid) - variables :]
     size = np.abs(values.mid).max(axis=tuple(range(-variables, 0)), keepdims=True)
     most = 2.0**variables  # as no row of such a matrix sums to more than 2
     matrices = [coefficients_of(count) for count in counts]
     off = 2.0 * COSINE * sum(counts) + _rounding(matrices)
-    rad = most * (values.rad + size * off) * ROUND_UP
-    return Ball(_turned(matrices, values.mid), rad)
+    rounding = prod(counts) * most * size * off
+    rad = (prod(map(_lebesgue, counts)) * values.rad + rounding) * ROUND_UP
+    return _turned(matrices, values.mid), rad.reshape(rad.shape[: rad.ndim - variables])
+
+
+def _lebesgue(count: int) -> float:
+    """Bound by how much interpolation makes values greater."""
+    return float(1.0 + 2.0 / np.pi * np.log(count))
 
 
 def interpolate(values: Array, variables: int) -> Array:
@@ -93,11 +104,10 @@ def _sum(values: Array, variables: int) -> Array:
     return np.asarray(values.sum(axis=tuple(range(-variables, 0)), keepdims=True))
 
 
-def total(series: Ball, variables: int) -> Array:
-    """Bound the absolute values of series: by the sum of their coefficients'."""
-    axes = tuple(range(-variables, 0))
-    rad = np.broadcast_to(series.rad, np.shape(series.mid))
-    return np.asarray((np.abs(series.mid).sum(axis=axes) + rad.sum(axis=axes)) * ROUND_UP)
+def total(series: Array, off: Array) -> Array:
+    """Bound the absolute values of series that may be so far off: by the sum of their coefficients'."""
+    axes = tuple(range(off.ndim, series.ndim))
+    return np.asarray((np.abs(series).sum(axis=axes) + off) * ROUND_UP)
 
 
 def weights(rho: Array, terms: Sequence[int]) -> list[Array]:
@@ -180,7 +190,7 @@ def interpolation_error(most: Array, rhos: Sequence[float], counts: Sequence[int
             4.0 * rho**-count / (1.0 - 1.0 / rho) * bound for rho, bound in zip(rhos, bounds, strict=True)
         ]
         error = error + lebesgue * np.fmin.reduce(each)
-        lebesgue *= 1.0 + 2.0 / np.pi * np.log(count)
+        lebesgue *= _lebesgue(count)
     return np.asarray(error * ROUND_UP)
 
 
