@@ -33,7 +33,6 @@ on the way, and likewise what is for zones and events where there are none.
 - ``formulas/``: modes at the live parameters, complex powers, columns that a row fills, slow zones near.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -61,7 +60,7 @@ LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
 REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
-PULSE_WORK, ZONED_WORK = 60, 7 * ZONES  # operations of each slot of a pulse that is weighed; with zones
+PULSE_WORK = 60  # operations of each slot of a pulse that is weighed
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 HOLD = 0.2  # s, in which an input that is out of range is held
 STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
@@ -313,7 +312,7 @@ def _constants(c: PlannerConstants) -> str:
 
 
 def _whole_constants(c: PlannerConstants) -> dict[str, int]:
-    modes, (rows, terms) = c.modes, c.model.shape
+    modes, (rows, terms), left = c.modes, c.model.shape, _work(c) - _cycle_work(c)
     return {
         "cAxes": len(c.axes),
         "cModes": modes,
@@ -340,28 +339,18 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cLongestKernel": _longest_kernel(c),
         "cLongKernel": min(LONG_KERNEL, _longest_kernel(c)),
         "cPulseChunk": _pulse_chunk(c),
-        "cPulseWork": PULSE_WORK + ZONED_WORK * c.zones,
+        "cPulseWork": PULSE_WORK + of_search.ZONED_WORK * c.zones,
         "cWide": WIDE,
         "cChunk": 45,  # slots that a phase takes at once
         "cFuture": FUTURE,
         "cWork": _work(c),
-        **(_zoned(c) if c.zones else {}),
+        **(of_search.zoned(left, FUTURE, len(c.axes), _shortest_slot(c)) if c.zones else {}),
         "cHoldCycles": round(HOLD / c.cycle),
         **of_search.whole(),
         "cColumnWork": _column_work(c),
         "cReaches": len(_reach_slots(c)),
         **of_sensor.whole(c.sensor, modes, len(c.axes), c.cycle),
     }
-
-
-def _zoned(c: PlannerConstants) -> dict[str, int]:
-    """Count intervals, and slots of the committed future that are held against them in one cycle."""
-    left = _work(c) - _cycle_work(c) - 8 * FUTURE - 40
-    chunk = min(FUTURE, left // (9 + 7 * ZONES))
-    cycles = math.ceil(FUTURE / chunk)
-    if 2 * len(c.axes) * cycles > _shortest_slot(c):  # rather too much in one cycle than never
-        chunk, cycles = FUTURE, 1
-    return {"cZones": ZONES, "cZoneChunk": chunk, "cZoneCycles": cycles}
 
 
 def _reach_slots(c: PlannerConstants) -> Sequence[int]:
@@ -439,7 +428,7 @@ def _longest_kernel(c: PlannerConstants) -> int:
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
     spent = _cycle_work(c) + of_errors.FINE_BEGIN + 80 + 60 * len(c.axes) + (1 + 3 * len(c.axes)) * FUTURE
-    return (_work(c) - spent) // (PULSE_WORK + ZONED_WORK * c.zones)
+    return (_work(c) - spent) // (PULSE_WORK + of_search.ZONED_WORK * c.zones)
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:

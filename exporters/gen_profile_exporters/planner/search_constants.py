@@ -1,7 +1,32 @@
 """How a planner block searches for a plan: constants of its interior-point method and its first guesses."""
 
+import math
+
+from gen_profile_exporters.planner.axis_declarations import ZONES
+
+ZONED_WORK = 7 * ZONES  # operations for a place that is held against them
 SEARCH_ITERATIONS = 13  # for which there is time where the axis moves already
 GIVES_UP = 4.0  # slow periods beyond the time to react, in which no motion is found for a command (3)
+
+
+def zoned(left: int, future: int, axes: int, slot: int) -> dict[str, int]:
+    """Count intervals, and slots of the committed future that are held against them in one cycle.
+
+    Parameters
+    ----------
+    left : int
+        Operations that a cycle may spend on it.
+    future : int
+        Slots of a committed future.
+    axes : int
+    slot : int
+        Cycles of the shortest slot.
+    """
+    chunk = min(future, (left - 8 * future - 40) // (9 + ZONED_WORK))
+    cycles = math.ceil(future / chunk)
+    if 2 * axes * cycles > slot:  # rather too much in one cycle than never
+        chunk, cycles = future, 1
+    return {"cZones": ZONES, "cZoneChunk": chunk, "cZoneCycles": cycles}
 
 
 def whole() -> dict[str, int]:

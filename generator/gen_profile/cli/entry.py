@@ -10,7 +10,7 @@ from io import TextIOWrapper
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.outcome import print_error
+from gen_profile.cli.outcome import print_error, unprinted
 
 
 def main() -> None:
@@ -34,7 +34,18 @@ def main() -> None:
         if debug:
             raise
         # what is interrupted while compiled code runs may end in an error of that code's own
-        sys.exit(print_error(click.Abort() if interruptions else error, as_json))
+        sys.exit(print_error(click.Abort() if interruptions else _refusal() or error, as_json))
+
+
+def _refusal() -> Exception | None:
+    """Tell that stdout does not take what click printed itself, such as help."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:  # a reader that left early
+        return None
+    except OSError as error:
+        return unprinted(error)
+    return None
 
 
 def _open_streams() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import sys
@@ -40,7 +41,21 @@ def print_outcome(document: dict[str, Any], text: str) -> None:
     except BrokenPipeError:  # a reader that left early, which click knows
         raise
     except OSError as error:
-        raise OutputError(f"Cannot print the outcome: {error.strerror}.") from error
+        raise unprinted(error) from error
+
+
+def unprinted(error: OSError) -> OutputError:
+    """Say why stdout did not take what was printed, and have what it still holds go nowhere."""
+    lead_nowhere(1)
+    return OutputError(f"Cannot print the outcome: {error.strerror}.")
+
+
+def lead_nowhere(*streams: int) -> None:
+    """Have what streams of these numbers still hold go nowhere: Python tries again as it ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for number in streams:
+        os.dup2(nowhere, number)
+    os.close(nowhere)
 
 
 def warn(check: Check | Proof | None) -> None:

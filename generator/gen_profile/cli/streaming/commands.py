@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +18,7 @@ from gen_profile.cli.options import (
     spec_options,
     with_options,
 )
-from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.outcome import lead_nowhere, print_outcome
 from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
 from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words
@@ -220,10 +219,8 @@ def _conclude(outcome: StreamOutcome, table: Path | None) -> None:
     refusals = [refusal for refusal in said if refusal is not None]
     if refusals and not code:
         raise refusals[0]
-    if refusals:  # else Python would try again at its end, and end in a code of its own
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        for number in (1, 2):
-            os.dup2(nowhere, number)
+    if refusals:
+        lead_nowhere(1, 2)
     if code:
         sys.exit(code)
 
