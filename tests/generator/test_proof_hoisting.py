@@ -122,7 +122,7 @@ def test_what_errors_of_the_rope_leave_does_not_add_up_from_motion_to_motion(hoi
     with ClosedLoop(spec, text, Histories.of(spec)) as loop:
         run = loop.run(history)
     assert run.stands > 0
-    assert run.residual.max() < 0.003
+    assert run.residual.max() < 0.005
 
 
 @pytest.mark.slow
