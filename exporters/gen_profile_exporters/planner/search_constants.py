@@ -22,7 +22,7 @@ def zoned(left: int, future: int, axes: int, slot: int) -> dict[str, int]:
     slot : int
         Cycles of the shortest slot.
     """
-    chunk = min(future, (left - 8 * future - 40) // (9 + ZONED_WORK))
+    chunk = max(1, min(future, (left - 8 * future - 40) // (9 + ZONED_WORK)))
     cycles = math.ceil(future / chunk)
     if 2 * axes * cycles > slot:  # rather too much in one cycle than never
         chunk, cycles = future, 1
