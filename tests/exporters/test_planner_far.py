@@ -137,3 +137,9 @@ def test_the_time_to_a_farther_target_counts_the_way_that_is_committed_already(t
     done, begun = np.argmax(out["bDone"]), round(8.0 / CYCLE)
     left = (done - np.arange(begun, done)) * CYCLE
     assert (np.abs(out["fTimeToGo"][begun:done] - left) < 0.25 * left + 0.5).all()
+
+
+def test_a_stick_from_rest_is_planned_for_after_half_a_slot(text):
+    """A whole slot was waited for, a twentieth of the slowest period: it took 3.9 s."""
+    driver = Driver(text, fActPosition=10.0).hold(4.0, bVelocity=1).hold(3.6, fVelocityCommand=0.22)
+    assert driver.outputs["fVelocity"][-1] > 0.9 * 0.22
