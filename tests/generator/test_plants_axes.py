@@ -26,7 +26,11 @@ def fault_of(preset, *overrides):
 @pytest.mark.parametrize(
     ("preset", "override", "sentence"),
     [
-        ("gantry-crane", "move.distance=3", "move.distance: must hold one number per axis (x, y), found 1."),
+        (
+            "gantry-crane",
+            "move.distance=3",
+            "move.distance: must hold one number per axis (x, y), such as [3, 0], found 1.",
+        ),
         ("gantry-crane", "move.distance=[0, 0]", "move.distance: must not be zero on every axis."),
         (
             "single-pendulum-crane",

@@ -112,8 +112,12 @@ FAULTS = [
     ("plant.L1", datetime.date(2024, 1, 1), r"plant\.L1: must be a number .*, found a date or time\."),
     ("move.target", ["far"], r"move\.target: must be a finite number, found text 'far'\."),
     ("move.target", [float("-inf")], r"move\.target: must be a finite number, found -inf\."),
-    ("move.target", [0.1, 0.2], r"move\.target: must hold one number per axis .cart., found 2\."),
-    ("move.target", [], r"move\.target: must hold one number per axis .cart., found 0\."),
+    (
+        "move.target",
+        [0.1, 0.2],
+        r"move\.target: must hold one number per axis .cart., such as \[0\.1\], found 2\.",
+    ),
+    ("move.target", [], r"move\.target: must hold one number per axis .cart., such as \[0\], found 0\."),
     (
         "move.target",
         [1e6],
