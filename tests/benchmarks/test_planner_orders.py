@@ -23,6 +23,7 @@ PAPER = (
 )
 MACHINES = {
     "bay, 4 ms": ("bay-crane", ()),
+    "bay, 4 ms, quick controller": ("bay-crane", ("planner.operations=60000",)),
     "bay, 20 ms": ("bay-crane", ("export.cycle_time=0.02",)),
     "paper, 1 ms": ("paper", PAPER),
 }
