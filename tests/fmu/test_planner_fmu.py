@@ -99,6 +99,7 @@ def test_each_step_of_a_cycle_issues_the_blocks_setpoint(instance):
     assert np.ptp(due[:, 0]) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instance", [True], indirect=True)
 def test_each_cycle_is_an_event_of_model_exchange(instance):
     following = [START]

@@ -268,6 +268,7 @@ def test_the_check_is_of_what_was_read_back(tables):
         tables["new"].check(altered, lambda *_: None)
 
 
+@pytest.mark.slow
 def test_a_library_is_deployed_and_any_motion_of_it_that_sways_too_much_stops_that(libraries):
     block, (old, new) = fresh(libraries), (libraries["old"], libraries["new"])
     spec = preset_spec("paper", [*VARIABLES, "move.distance=0.2", "plant.L1=0.9"])
@@ -313,6 +314,7 @@ def test_a_planner_is_proved_by_what_was_read_back_and_never_switched_while_enab
     assert used(block, planners) == "new"
 
 
+@pytest.mark.slow
 def test_a_planner_that_is_built_otherwise_is_refused(planners, tmp_path):
     table = read_table(exported_planner(tmp_path, "planner.zones=true"))
     status = attrs.evolve(

@@ -96,6 +96,7 @@ def test_what_no_parameter_explains_widens_the_range():
     assert torn.half_range["L0"] > 20.0 * clean.half_range["L0"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("plant", "rope", "axes"), [(CRANE, "L1", (0.0,)), (HOIST, "L0", (0.0, 4.0))])
 def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monkeypatch, plant, rope, axes):
     """They took more than ten minutes for 6,000 rows of a gyroscope that drifts."""

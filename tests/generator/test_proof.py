@@ -81,6 +81,7 @@ def test_a_history_against_other_equations(spec, text):
     assert run.residual.max() > 1e-4
 
 
+@pytest.mark.slow
 def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, text):
     move = (Command(time=0.5, command="position", values=(4.0,), live={}),)
     history = History(

@@ -158,6 +158,7 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     assert not faults(sound, fSwayEstimated=0.2, bSensorUsed=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jump", [0.05, 0.055, 0.06])
 def test_a_jump_that_counts_as_an_offset_leaves_the_axis_at_rest(spec, text, jump):
     histories, half = Histories.of(spec), 2**31
