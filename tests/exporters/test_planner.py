@@ -211,7 +211,7 @@ def test_no_machine_takes_more_operations(preset):
         *MACHINES[preset],
     ]
     text = planner_block(preset_spec(preset, changes)).text
-    assert len(text) < 156_500
+    assert len(text) < 158_500
     library, *_ = compiled = compile_counting(text)
     assert library.size() < 72 * 1024
     block = CountedBlock(compiled, fActPosition=0.0)

@@ -143,3 +143,41 @@ def test_a_stick_from_rest_is_planned_for_after_half_a_slot(text):
     """A whole slot was waited for, a twentieth of the slowest period: it took 3.9 s."""
     driver = Driver(text, fActPosition=10.0).hold(4.0, bVelocity=1).hold(3.6, fVelocityCommand=0.22)
     assert driver.outputs["fVelocity"][-1] > 0.9 * 0.22
+
+
+SLOW = "limits={velocity=2.0, acceleration=0.2, jerk=0.5, travel=[0.0, 150.0]}"
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return planner_block(parse_spec(BAY, [SLOW])).text
+
+
+@pytest.mark.parametrize(("speed", "within"), [(0.4, 6.5), (-0.4, 6.5), (1.0, 8.0)])
+def test_a_slow_drive_is_planned_to_a_stick_s_velocity_too(slow, speed, within):
+    """Pulses alone took 7.7 and 9.3 s to 90 % of it."""
+    driver = (
+        Driver(slow, fL1=6.0, fm2=2000.0, fActPosition=75.0)
+        .hold(4.0, bVelocity=1)
+        .hold(within, fVelocityCommand=speed)
+    )
+    assert abs(driver.outputs["fVelocity"][-1]) > 0.9 * abs(speed)
+    out = driver.hold(10.0).outputs
+    assert np.ptp(out["fVelocity"][-round(8.0 / CYCLE) :]) < 1e-3
+    assert out["bInVelocity"][-round(8.0 / CYCLE) :].all()
+    out = driver.hold(20.0, fVelocityCommand=0.0).outputs
+    require_limits(out, limits=(2.0, 0.2, 0.5, 150.0))
+    assert not out["bBusy"][-1]
+    assert residual(out, frequencies(6.0, 2000.0)) < 1e-8
+    assert out["operations"].max() <= 3000
+
+
+@pytest.mark.parametrize("speed", [0.4, 2.0])
+def test_a_slow_drive_that_goes_to_a_target_is_stopped_by_a_stick_the_other_way(slow, speed):
+    """Where pulses followed the stick beside the plan it went on for 15 s."""
+    driver = Driver(slow, fActPosition=75.0).hold(4.0).hold(6.0, bExecute=1, fTarget=40.0)
+    place, begun = driver.outputs["fPosition"][-1], driver.outputs["fVelocity"][-1]
+    assert begun < -0.4
+    out = driver.hold(14.0, bExecute=0, bVelocity=1).hold(25.0, fVelocityCommand=speed).outputs
+    assert out["fPosition"].min() > place - 8.0
+    assert out["fVelocity"][-1] == pytest.approx(speed)

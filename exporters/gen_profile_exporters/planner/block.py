@@ -336,6 +336,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cLongest": LONGEST,
         "cLongestOnWay": 72,  # where the axis moves already
         "cKernelFirst": 18,
+        "cMostSteps": KERNEL_SLOTS + 1,  # of a kernel, and of the pulses that a stick's plan declines by
         "cLongestKernel": _longest_kernel(c),
         "cLongKernel": min(LONG_KERNEL, _longest_kernel(c)),
         "cPulseChunk": _pulse_chunk(c),

@@ -42,7 +42,7 @@ WAY = "on the way"  # a target that is given while an axis moves
 ON_AVERAGE = {POSITION: 0.8, WAY: 0.9, VELOCITY: 1.2, STOP: 1.0}  # (0.72, 0.65, 1.1 of a tank, 0.92)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
 ENABLED = 2.2  # s, which a block takes more to get ready (2.1, of a damped crane at 4 ms)
-IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached
+IN_VELOCITY = 1.001e-3  # share of the greatest velocity, by which one counts as reached; the block: 0.001
 
 
 @attrs.frozen(kw_only=True)

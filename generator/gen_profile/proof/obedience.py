@@ -341,7 +341,9 @@ def _reactions(
     for order in followed.orders:
         if order.begin not in reactions:
             continue
-        reacted_after, before = reactions[order.begin], motion.velocity[:, order.begin]
+        reacted_after, until = reactions[order.begin], order.begin + followed.after(followed.reaction)
+        before = np.abs(motion.velocity[:, order.begin : until]).max(axis=1)  # what is committed goes on
+        before *= motion.velocity[:, order.begin] != 0.0
         allowed = followed.reaction + calmed(followed) * followed.period
         if before.any():
             allowed = followed.reaction + slowing(followed, before, RUN_OUT)

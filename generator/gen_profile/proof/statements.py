@@ -36,7 +36,7 @@ from gen_profile.proof.orders import (
 )
 from gen_profile_exporters.planner.error_constants import SPREAD
 
-BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
+BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
 TAKES_OVER = 0.1  # periods beyond the stated reaction, at which a plan that was found then takes over (0.04)
