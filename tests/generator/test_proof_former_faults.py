@@ -28,6 +28,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
         (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
         (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
+        (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
