@@ -87,3 +87,11 @@ def test_a_stick_that_is_let_go_of_is_held_to_the_stated_ends(cycle, short, fail
     for name in ("fStopHigh", "fStopDistance"):
         let_go.issued[name][cycle] -= short
     assert kinds(let_go) == ({kind_of(WORDS["ends"])} if fails else set())
+
+
+def test_nothing_is_promised_while_what_was_measured_is_damped():
+    damps = obedient()
+    damps.issued["bDamping"] = np.where(np.arange(CYCLES) < 200, 1.0, 0.0)
+    assert kind_of(WORDS["kept"]) in kinds(damps)
+    damps.issued["bPromise"][:200], damps.issued["nPromise"][:200] = 0.0, 6.0
+    assert kind_of(WORDS["kept"]) not in kinds(damps)

@@ -156,7 +156,7 @@ def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from never("lost", (why == 3.0) & ready)
     stated = followed.issued.get("fSwayLeft", np.zeros(followed.cycles))
     yield from never("lost", (why == ADDED_UP) & (stated <= followed.sway_limit))
-    yield from never("kept", promise & (stated > followed.sway_limit))
+    yield from never("kept", promise & ((stated > followed.sway_limit) | followed.sensed("bDamping")))
     may_be, must_be = _unknown(followed, motion)
     yield from never("lost", (why == 2.0) & ~may_be)
     yield from never("kept", promise & must_be)
