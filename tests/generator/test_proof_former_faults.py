@@ -18,6 +18,11 @@ FORMER = {  # machine: how many are drawn, seed, number
         (300, 12, 23),  # judged by the rope of its beginning, while it planned for another one
         (200, 2, 134),  # a stop 0.1 s late, sought along the motion of an axis that turns round
         (200, 4, 4),  # no fault: judged by the time that it was in a slow interval, too
+        (
+            1000,
+            7001,
+            490,
+        ),  # no fault: a slow interval's limit holds three slots before it, where the target was
     ],
     "slow": [
         (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
