@@ -119,3 +119,26 @@ def test_a_slow_drive_stops_soon_after_it_has_begun_to_speed_up(seconds):
     given["bStop"] = 1.0
     out = block.call(np.tile([*given.values()], (800, 1)))
     assert not out[-1, block.outputs.index("bBusy")]
+
+
+@pytest.mark.parametrize(
+    ("rope", "load", "stick"),
+    [
+        (8.65, 1983.0, [(0.68, 0.61), (1.1, 8.43), (-1.1, 3.27)]),  # 0.43 m
+        (7.7, 946.0, [(-1.1, 8.12), (1.1, 0.66), (-1.1, 0.51)]),  # 0.22 m
+        (6.51, 1597.0, [(-1.1, 2.33), (-1.0, 0.63), (0.87, 0.65)]),  # 0.62 m
+    ],
+)
+def test_a_stick_that_was_let_go_of_leads_nowhere_beyond_the_ends_stated_then(text, rope, load, stick):
+    """They were those of a stop; a stick's stop was planned twice, and farther, or led beyond them."""
+    driver = Driver(text, fActPosition=20.0, fL1=rope, fm2=load).hold(4.0)
+    for velocity, seconds in stick:
+        driver.hold(seconds, bVelocity=1, fVelocityCommand=velocity)
+    before = driver.parts[-1]["fPosition"][-1]
+    driver.hold(30.0, bVelocity=1, fVelocityCommand=0.0)
+    place, low, high = (driver.parts[-1][name] for name in ("fPosition", "fStopLow", "fStopHigh"))
+    acted = slice(round(0.4 / CYCLE), None)  # the slot in which it was let go of, and a little
+    lowest, highest = (most.accumulate(place[::-1])[::-1] for most in (np.minimum, np.maximum))
+    assert (low[acted] - 1e-9 <= lowest[acted]).all()
+    assert (highest[acted] <= high[acted] + 1e-9).all()
+    assert np.abs(place - before).max() > 0.1

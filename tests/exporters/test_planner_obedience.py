@@ -296,13 +296,14 @@ def test_a_stick_turns_a_motion_that_has_just_begun_near_the_end_of_the_travel(t
     require_limits(driver.outputs, limits=LIMITS)
 
 
-def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text):
+@pytest.mark.parametrize("later", [1.0, 1.05])
+def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text, later):
     ends = []
     for phase in np.arange(0.0, 0.3, 0.05):
         driver = standing(text, 10.0).hold(6.0 + phase, bVelocity=1, fVelocityCommand=0.5)
-        driver.hold(0.06, fVelocityCommand=-0.5).hold(1.0 - phase, fVelocityCommand=0.5)
+        driver.hold(0.06, fVelocityCommand=-0.5).hold(later - phase, fVelocityCommand=0.5)
         ends.append(last(driver.hold(12.0, fVelocityCommand=0.0), "fPosition"))
-    assert np.ptp(ends) < 7e-3  # less than two cycles, by rounding
+    assert np.ptp(ends) < 9e-3  # little more than two cycles
 
 
 def test_a_stick_that_is_deflected_at_power_up_counts_once_it_was_at_zero(text):

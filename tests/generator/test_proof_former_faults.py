@@ -18,6 +18,11 @@ FORMER = {  # machine: how many are drawn, seed, number
         (300, 12, 23),  # judged by the rope of its beginning, while it planned for another one
         (200, 2, 134),  # a stop 0.1 s late, sought along the motion of an axis that turns round
         (200, 4, 4),  # no fault: judged by the time that it was in a slow interval, too
+        (
+            1000,
+            7001,
+            490,
+        ),  # no fault: a slow interval's limit holds three slots before it, where the target was
     ],
     "slow": [
         (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
@@ -28,6 +33,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
         (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
         (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
+        (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded

@@ -5,13 +5,25 @@ from types import SimpleNamespace
 import attrs
 import numpy as np
 import pytest
-from generator.test_proof_obedience import MOVE, REACTIONS, REST, STICKS, STOPS, obedient, with_orders
+from generator.test_proof_obedience import (
+    CYCLES,
+    MOVE,
+    REACTIONS,
+    REST,
+    STICKS,
+    STOPPED,
+    STOPS,
+    kinds,
+    obedient,
+    order,
+    with_orders,
+)
 
 from gen_profile.proof.followed import WAY
 from gen_profile.proof.numbering import DRAWS, SEARCH
-from gen_profile.proof.obedience import LATER, measured
+from gen_profile.proof.obedience import LATER, WORDS, measured
 from gen_profile.proof.orders import POSITION, STOP, VELOCITY
-from gen_profile.proof.verdict import Proof, late_on_average
+from gen_profile.proof.verdict import Proof, kind_of, late_on_average
 
 ONE_LOAD = {"payload": 0.05}
 
@@ -58,3 +70,28 @@ def test_how_late_commands_are_carried_out_is_counted_from_what_limits_take():
     again = with_orders(REST, attrs.evolve(MOVE, end=250), attrs.evolve(MOVE, begin=250), STICKS, STOPS)
     limits = 1.1 * (5.0 - 0.25 * 1.3**2) + (1.0 + 0.65) / 0.5 + 0.1
     assert late(again)[LATER[WAY]] == pytest.approx((8.2 - 2.5 - limits) / 2.0)
+
+
+@pytest.mark.parametrize(
+    ("cycle", "short", "fails"),
+    [
+        (STOPPED - 1, 0.15, False),  # two slots of 0.1 s at 0.8 m/s may be led on
+        (STOPPED - 1, 0.17, True),
+        (STOPPED + 10, 0.15, False),
+        (STOPPED + 30, 0.01, True),  # they are over
+    ],
+)
+def test_a_stick_that_is_let_go_of_is_held_to_the_stated_ends(cycle, short, fails):
+    let_go = with_orders(REST, MOVE, STICKS, order(STOPPED, CYCLES, VELOCITY, 0.0))
+    let_go.issued["bInVelocity"][4220:] = 1.0
+    for name in ("fStopHigh", "fStopDistance"):
+        let_go.issued[name][cycle] -= short
+    assert kinds(let_go) == ({kind_of(WORDS["ends"])} if fails else set())
+
+
+def test_nothing_is_promised_while_what_was_measured_is_damped():
+    damps = obedient()
+    damps.issued["bDamping"] = np.where(np.arange(CYCLES) < 200, 1.0, 0.0)
+    assert kind_of(WORDS["kept"]) in kinds(damps)
+    damps.issued["bPromise"][:200], damps.issued["nPromise"][:200] = 0.0, 6.0
+    assert kind_of(WORDS["kept"]) not in kinds(damps)

@@ -22,6 +22,7 @@ from gen_profile.proof.orders import (
     ReceivedOrders,
     TimedOrder,
 )
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
@@ -34,6 +35,7 @@ TO_STICK = 3.4  # to its velocity, as a motion to a target is stopped first (3.2
 AHEAD = 1.5  # before an end of the way, or a slow interval, in which a stick's velocity need not be reached
 MORE_AXES = 1.7  # for each further axis, as they are planned one after the other (1.5)
 TO_STOP = 2.8  # (2.75)
+BEFORE_SLOW = 3.0  # slots at full speed, in which a slow interval's limit holds, too
 TO_SLOW = 2.2  # below a new velocity limit: a new target is planned, or a motion stopped, first (1.5)
 TO_TURN = 1.9  # (1.6)
 RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
@@ -301,7 +303,8 @@ def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder)
     slowest = 0.0
     for k, ((begin, end, v), top, own) in enumerate(zip(moves, order.tops, followed.limits, strict=True)):
         rise = (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
-        slow = followed.slow_parts(k, begin, end, abs(v) * (rise + followed.period))
+        slows = BEFORE_SLOW * own.velocity * followed.period / SLOTS_PER_PERIOD
+        slow = followed.slow_parts(k, begin, end, max(slows, abs(v) * (rise + followed.period)))
         time = abs(end - begin) / top + sum(way * max(0.0, 1.0 / limit - 1.0 / top) for way, limit in slow)
         legs = len(slow) * (rise + FROM_REST * followed.period)
         slowest = max(slowest, FAR * time / usable + rise + legs)

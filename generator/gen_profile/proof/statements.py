@@ -34,6 +34,7 @@ from gen_profile.proof.orders import (
     Flags,
     TimedOrder,
 )
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.error_constants import SPREAD
 
 BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
@@ -50,6 +51,7 @@ EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
+ACTS = 2.0  # slots, in which what a stick asked for is led to
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
 TAKEN_UP = 2  # cycles, in which a blocked interval is
@@ -154,7 +156,7 @@ def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from never("lost", (why == 3.0) & ready)
     stated = followed.issued.get("fSwayLeft", np.zeros(followed.cycles))
     yield from never("lost", (why == ADDED_UP) & (stated <= followed.sway_limit))
-    yield from never("kept", promise & (stated > followed.sway_limit))
+    yield from never("kept", promise & ((stated > followed.sway_limit) | followed.sensed("bDamping")))
     may_be, must_be = _unknown(followed, motion)
     yield from never("lost", (why == 2.0) & ~may_be)
     yield from never("kept", promise & must_be)
@@ -254,12 +256,13 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if order.kind in (POSITION, VELOCITY) and not followed.reserve:  # else it may be calmed beyond
             yield from _within_travel(followed, motion, slice(order.begin, order.end))
         begin = max(
-            0, order.begin - (order.kind == STOP)
+            0, order.begin - (order.kind in (STOP, VELOCITY))
         )  # the ends that an interlock saw as it stopped the axis
         own = slice(begin, order.end)
         if order.kind == POSITION:
             targets.append(order.values)
-        if order.kind not in (STOP, QUICK_STOP):
+        let_go = order.kind == VELOCITY and not any(order.values)
+        if not let_go and order.kind not in (STOP, QUICK_STOP):
             continue
         place = motion.position[:, own]
         lowest, highest = (
@@ -270,7 +273,9 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         ):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in followed.limits)
-            yield from greatest("ends", leaves, STATED + calms, begin)
+            yield from greatest("ends", leaves - _asked(followed, order, own), STATED + calms, begin)
+        if let_go:
+            continue
         if order.kind == QUICK_STOP:
             after = begin + np.flatnonzero(motion.stands[begin:])[:1]  # it brakes on when another order comes
             rest = motion.position[:, [*after, order.end - 1][0]][:, None]
@@ -287,6 +292,19 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
+
+
+def _asked(followed: Followed, order: TimedOrder, own: slice) -> Array:
+    """Tell how far a stick that is let go of may lead on, by what it asked for last, (axes, cycles)."""
+    lasts = ACTS * followed.period / SLOTS_PER_PERIOD
+    since, until = (order.begin + sign * followed.after(lasts) for sign in (-1, 1))
+    asked = np.zeros((len(followed.axes), own.stop - own.start))
+    for last in followed.orders:
+        if order.kind == last.kind == VELOCITY and since < last.end and last.begin < order.begin:
+            speeds = np.minimum(np.abs(last.values), last.tops)
+            np.maximum(asked, lasts * speeds[:, None], out=asked)
+    asked[:, max(0, until - own.start) :] = 0.0
+    return asked
 
 
 def _within_travel(followed: Followed, motion: IssuedMotion, own: slice) -> Iterator[Allowance]:
