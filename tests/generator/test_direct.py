@@ -6,12 +6,12 @@ import pytest
 from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
-from gen_profile.designs import suggestions
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
 from gen_profile.problem.cost import SwayCost
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import suggestions
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.refinement import bisected, switching

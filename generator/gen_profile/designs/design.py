@@ -13,11 +13,11 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, artefact_of, parse_manifest, versions
 from gen_profile.artefacts.writing import Kept, Staging, staged
-from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress
+from gen_profile.solvers.plan import Plan, plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.summary import Drawable

@@ -134,7 +134,7 @@ def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
     plant, until = spec.machine(), _watched_until(spec, motion)
     named = [machine.parameters for machine in scenarios(spec)]
     swing = PlantSimulation(plant, motion, named, until, spec.move.initial)
-    inside = machines_inside(problem_of(spec), spec.checked_ranges())
+    inside = machines_inside(problem_of(spec))
     known, inside_rows = (parameter_rows(plant, rows) for rows in (named, inside))
     same = np.isclose(inside_rows[:, None], known, 1e-9)
     others = [values for values, rows in zip(inside, same, strict=True) if not rows.all(axis=1).any()]

@@ -90,7 +90,7 @@ def linearize(
     >>> gp.linearize(spec.machine(), spec.plant.parameters).frequencies.round(2)  # rad/s
     array([3.64, 9.02])
     """
-    for name in plant.nominal():
+    for name in (parameter.name for parameter in plant.parameters):
         if not math.isfinite(parameters.get(name, math.nan)):
             raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")
     axes = [0.0] * len(plant.actuated) if q_a is None else q_a
@@ -196,9 +196,7 @@ def _terms(plant: Plant) -> tuple[Function, Function, list[float | None]]:
     moving = sym.column([d.q_u, d.dq_u, d.dq_a])
     at_rest = [sym.at_zero(terms, moving) for terms in (motion, sway)]
     depends = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
-    places = [
-        None if matters else place for matters, place in zip(depends, plant.probe_places(), strict=True)
-    ]
+    places = [None if matters else place for matters, place in zip(depends, plant.probe()[0], strict=True)]
     return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway), places
 
 

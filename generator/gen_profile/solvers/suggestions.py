@@ -12,14 +12,14 @@ from typing import Any, TypeVar
 
 import attrs
 
-from gen_profile.designs import transient_sway
-from gen_profile.designs.draft import Draft, drafted, suggested
 from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion
 from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE, rounded_up
-from gen_profile.problem.problem import problem_of
+from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import Relaxation, least_duration, time_dependent_limits
+from gen_profile.solvers.draft import Draft, drafted, suggested
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import LONGER, Solution, Status
@@ -136,7 +136,7 @@ def remedy(
             known = remedy(spec.changed(method), spread, in_time=in_time, options=options)
             return attrs.evolve(known, suggestions=beside(method, known.suggestions))
         return Remedy()
-    relaxation = _relaxation(spec, spread)
+    relaxation = _relaxation(problem_of(spec), spread)
     problem = relaxation.problem
     needed, longer, others = None, None, list[Suggestion | None]()
     stated = problem.limits.stated()
@@ -174,7 +174,7 @@ def beside(values: Mapping[str, Any], suggestions: Iterable[Suggestion]) -> tupl
 
 def sufficient_duration(spec: Spec) -> Suggestion | None:
     """Find the least duration in s, no less than a spec's, that works, in most of the work that is left."""
-    relaxation = _relaxation(spec, 1.0)
+    relaxation = _relaxation(problem_of(spec))
     needed = _in_time(partial(least_duration, relaxation), USUAL.fraction_later)
     if not needed:
         return None
@@ -190,32 +190,29 @@ def tried(spec: Spec, *, coarse: bool = False, options: SuggestionOptions = USUA
         return choice.given_up(problem)
     if spec.solver.solver != "direct" and problem.worst_case is None:
         smooth = afford(partial(choice.attempt, problem, "indirect"), options.at_once)
-        if smooth is not None and (smooth.status is Status.INFEASIBLE or _kept(spec, smooth)):
+        if smooth is not None and (smooth.status is Status.INFEASIBLE or _kept(smooth)):
             return smooth
     if coarse:  # whether there is a motion does not depend on what it costs
         problem = attrs.evolve(problem, sway_weight=0.0)
-    solution = transient_sway.kept_by_all(spec, problem, "direct", coarse=coarse)
-    if solution.optimum is None or transient_sway.keeps_sway(spec, solution, SWAY_TOLERANCE):
+    solution = transient_sway.kept_by_all(problem, "direct", coarse=coarse)
+    if solution.optimum is None or transient_sway.keeps_sway(solution, SWAY_TOLERANCE):
         return solution
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
-def _kept(spec: Spec, solution: Solution) -> bool:
-    return choice.keeps_limits(solution) and transient_sway.keeps_sway(
-        spec, solution, transient_sway.ACCEPTED
-    )
+def _kept(solution: Solution) -> bool:
+    return choice.keeps_limits(solution) and transient_sway.keeps_sway(solution, transient_sway.ACCEPTED)
 
 
-def _relaxation(spec: Spec, spread: float) -> Relaxation:
-    known = spread if spread > 1.0 else usual_spread(spec)
-    return Relaxation(attrs.evolve(problem_of(spec), sway_spread=known))
+def _relaxation(problem: Problem, spread: float = 1.0) -> Relaxation:
+    known = spread if spread > 1.0 else usual_spread(problem)
+    return Relaxation(attrs.evolve(problem, sway_spread=known))
 
 
-def usual_spread(spec: Spec) -> float:
+def usual_spread(problem: Problem) -> float:
     """Tell how many times as much the worst machine sways on the way in a motion with wider limits."""
-    problem = problem_of(spec)
-    nearest = choice.least_violation(problem) if transient_sway.limited(spec, problem) else None
-    return 1.0 if nearest is None else transient_sway.spread(spec, nearest.solution)
+    nearest = choice.least_violation(problem) if transient_sway.limited(problem) else None
+    return 1.0 if nearest is None else transient_sway.spread(nearest.solution)
 
 
 def least_change(

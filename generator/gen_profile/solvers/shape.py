@@ -5,7 +5,6 @@ from functools import partial
 
 import attrs
 
-from gen_profile.designs.transient_sway import sways
 from gen_profile.errors import Code, InfeasibleProblem, Reason
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Profile, grid_duration
@@ -16,6 +15,7 @@ from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.shaped_move import ShapedMove, shaped_move, too_short
 from gen_profile.solvers.search import Search, least
+from gen_profile.solvers.transient_sway import sways
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import FAST
 
@@ -109,5 +109,5 @@ def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
-    nominal, worst = sways(spec, problem_of(spec), motion)
+    nominal, worst = sways(problem_of(spec), motion)
     return breaches(spec.limits, command, max(nominal, worst / SWAY_TOLERANCE))
