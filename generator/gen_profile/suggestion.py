@@ -14,7 +14,7 @@ MIN_SIMILARITY = 0.65  # difflib's ratio from which on a word is a misspelling o
 @cache
 def _synonyms() -> dict[str, list[str]]:
     """Read other words for what is called so here, in the languages and products that users come from."""
-    lines = Path(__file__).with_name("synonyms.txt").read_text("utf-8").splitlines()
+    lines = (Path(__file__).parent / "lists" / "synonyms.txt").read_text("utf-8").splitlines()
     return {name: words.split() for name, _, words in (line.partition(": ") for line in lines)}
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array
+from gen_profile.motion.profile import Array
 from gen_profile.suggestion import number_meant
 
 KEPT = 16
 COLUMNS = ("time_s", "code", "value")
-_LINES = Path(__file__).with_name("events.txt").read_text("utf-8").splitlines()
+_LINES = (Path(__file__).parents[1] / "lists" / "events.txt").read_text("utf-8").splitlines()
 # by code; {:g} is the event's value
 WORDS = {int(code): words for code, _, words in (line.partition(" ") for line in _LINES)}
 

@@ -20,7 +20,7 @@ from gen_profile.spec.values import Bounds
 from gen_profile.units import RATES
 
 REACH = 4.0  # times the value to begin with, up to which a slider goes, and down to which share of it
-_TABLES = tomllib.loads(Path(__file__).with_name("knobs.toml").read_text("utf-8"))
+_TABLES = tomllib.loads((Path(__file__).parents[1] / "lists" / "knobs.toml").read_text("utf-8"))
 UNITS: Mapping[str, str] = _TABLES["units"]
 USUAL: Mapping[str, float] = _TABLES["usual"]
 
