@@ -7,9 +7,10 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Mechanics, Plant
 from gen_profile.problem import symbolic as sym
-from gen_profile.problem.symbolic import Array, Function, Symbol
+from gen_profile.problem.symbolic import Function, Symbol
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_rows
-from gen_profile.problem.symbolic import Array, Function
+from gen_profile.problem.symbolic import Function
 
 SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
 

@@ -17,11 +17,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import eigenvalues_at
 from gen_profile.problem.problem import Problem
 from gen_profile.problem.sampling import halton
-from gen_profile.problem.symbolic import Array
 
 Ranges = Mapping[str, tuple[float, float]]  # least and greatest values of parameters
 Phases = Callable[[Array], Array]  # of every mode in rad at the end of the motion, (places, modes)
