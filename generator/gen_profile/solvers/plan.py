@@ -10,7 +10,6 @@ from gen_profile.motion.profile import Profile
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.draft import Draft, solved
-from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.shortest import shortest
 from gen_profile.solvers.solution import SIMPLER, Solution, Status, no_motion
 from gen_profile.solvers.suggestions import explained, remedy
@@ -119,7 +118,7 @@ def judged(drafted: Draft, progress: Progress = no_progress) -> Plan:
     if drafted.motion is None:
         assert drafted.solution is not None  # a shaper has a motion, or raises
         progress(EXPLAINING)
-        drafted = attrs.evolve(drafted, motion=optimal_profile(explained(spec, drafted.solution)))
+        explained(spec, drafted.solution).raise_for_status()
     if drafted.broken:
         progress(EXPLAINING)
         better = remedy(spec)

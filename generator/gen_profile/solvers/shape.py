@@ -5,11 +5,11 @@ from functools import partial
 
 import attrs
 
-from gen_profile.errors import Code, InfeasibleProblem, Reason
+from gen_profile.errors import Code, InfeasibleProblem, Reason, rounded_up
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Profile, grid_duration
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
+from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.base_moves import BASES
@@ -73,7 +73,7 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
         sentences, reasons = [one.sentence() for one in broken], [one.reason() for one in broken]
         shortest = shortest_duration(spec, shaped)
         if shortest is not None:
-            least = float(rounded_up(shortest, digits=4))
+            least = rounded_up(shortest, digits=4)
             sentences.append(Phrase("With this shaper the move takes at least {least:g} s.", least=least))
             reasons.append(too_short(move.duration, least))
         raise InfeasibleProblem(*sentences, reasons=reasons)

@@ -5,9 +5,8 @@ from contextlib import suppress
 
 import attrs
 
-from gen_profile.errors import Code, InfeasibleProblem, Reason, SolverDiverged
+from gen_profile.errors import Code, InfeasibleProblem, Reason, SolverDiverged, rounded_up
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
@@ -161,4 +160,4 @@ def _drafted(spec: Spec, relaxed: Relaxed) -> Draft:
 
 def _slow(spec: Spec, problem: Problem) -> Spec:
     """Give a spec so much time that it is not the time that it lacks."""
-    return lasting(spec, float(rounded_up(SLOW * choice.usual_duration(problem))))
+    return lasting(spec, rounded_up(SLOW * choice.usual_duration(problem)))

@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 
 import attrs
 
-from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion
+from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion, rounded_up
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import SWAY_TOLERANCE, rounded_up
+from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers import transient_sway
@@ -290,7 +290,7 @@ def _longer(
     """Find the least duration that works, in s, rounded up to three digits."""
 
     def change(factor: float) -> Mapping[str, Any]:
-        return {"move.duration": float(rounded_up(factor * needed))}
+        return {"move.duration": rounded_up(factor * needed)}
 
     most = options.most if time_dependent_limits(relaxation.problem) else options.most_later
     options = attrs.evolve(options, most=most, farther=options.farther_later)
@@ -354,7 +354,7 @@ def _in_time(find: Callable[[], Found], fraction: float) -> Found | None:
 def _times(value: Any, factor: float) -> Any:
     """Widen a limit so many times, travel by as much at either end; rounded outwards."""
     if not isinstance(value, tuple):
-        return float(rounded_up(factor * value))
+        return rounded_up(factor * value)
     low, high = value
-    more = float(rounded_up((factor - 1.0) * (high - low)))
+    more = rounded_up((factor - 1.0) * (high - low))
     return (float(f"{low - more:.9g}"), float(f"{high + more:.9g}"))
