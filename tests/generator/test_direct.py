@@ -16,6 +16,7 @@ from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
@@ -87,9 +88,9 @@ def test_a_limit_costs():
 
 
 def test_auto_takes_the_indirect_method_where_no_limit_binds():
-    assert choice.attempt(limited(acceleration=1.0)).method == indirect.METHOD
+    assert choice.attempt(limited(acceleration=1.0)).method == INDIRECT
     assert choice.attempt(limited(acceleration=0.5)).method == direct.METHOD
-    assert choice.attempt(limited(acceleration=0.5), "indirect").method == indirect.METHOD
+    assert choice.attempt(limited(acceleration=0.5), "indirect").method == INDIRECT
     assert choice.attempt(limited(), "direct").method == direct.METHOD
 
 

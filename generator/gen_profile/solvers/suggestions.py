@@ -20,7 +20,7 @@ from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import Relaxation, least_duration, time_dependent_limits
 from gen_profile.solvers.draft import Draft, drafted, suggested
-from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import LONGER, Solution, Status
 from gen_profile.spec.model import Spec
@@ -102,7 +102,7 @@ def solve(spec: Spec) -> Solution:
 
 def explained(spec: Spec, solution: Solution) -> Solution:
     """Find out what would help where a solve failed, unless the indirect method knows."""
-    known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.advice != LONGER
+    known = solution.method == INDIRECT and not spec.limits.stated() and solution.advice != LONGER
     if solution.optimum is not None:
         return solution
     if known:

@@ -18,7 +18,7 @@ from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct.relaxation import Relaxed
-from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution, Status
@@ -84,7 +84,7 @@ def kept_by_all(
         return choice.attempt(problem, method, coarse=coarse)  # the indirect method knows no limits
     if coarse or problem.worst_case is None:
         solution = _kept(problem, partial(choice.attempt, method=method, coarse=True))
-        if coarse or solution.optimum is None or solution.method == indirect.METHOD:
+        if coarse or solution.optimum is None or solution.method == INDIRECT:
             return solution
         problem = attrs.evolve(problem, sway_spread=solution.problem.sway_spread)
     # where it finds a motion, so does "auto", and it is the quicker to fail
