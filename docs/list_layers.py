@@ -1,6 +1,6 @@
 """Print the table of docs/architecture.md, made from the import layers and the packages' first lines.
 
-python docs/draw_layers.py
+python docs/list_layers.py
 """
 
 import ast

@@ -6,10 +6,11 @@ only when its format is asked for.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 from gen_profile.errors import ExportError, SpecError
@@ -68,62 +69,8 @@ class Format(NamedTuple):
     holds_block: bool = False
 
 
-BUILT_IN: dict[str, Format] = {
-    "can": Format(
-        module="gen_profile_exporters.can.export.exporter",
-        summary="CiA 402 setpoints and SYNCs as candump log, ASC and BLF, with DBC and start-up list",
-        proof="read back",
-        suffix=".log",
-    ),
-    "codesys": Format(
-        module="gen_profile_exporters.vendors.codesys",
-        summary="playback block, SoftMotion wrapper and XYVA cam in a PLCopen XML project for CODESYS",
-        proof="schema-checked",
-        suffix=".codesys.xml",
-        holds_block=True,
-    ),
-    "csv": Format(
-        module="gen_profile_exporters.csv_table",
-        summary="table of time, position, velocity, acceleration and jerk (RFC 4180, and vendors' dialects)",
-        proof="read back",
-        suffix=".csv",
-        may_end_at_speed=True,
-    ),
-    "plc": Format(
-        module="gen_profile_exporters.playback.structured_text",
-        summary="playback function block in portable IEC 61131-3 Structured Text",
-        proof="executed",
-        suffix=".st",
-        holds_block=True,
-    ),
-    "plcopen-xml": Format(
-        module="gen_profile_exporters.vendors.plcopen_xml",
-        summary="playback function block as PLCopen XML (TC6 v2.01) for Beremiz and OpenPLC",
-        proof="schema-checked",
-        suffix=".xml",
-        holds_block=True,
-    ),
-    "rockwell-l5x": Format(
-        module="gen_profile_exporters.vendors.rockwell_l5x",
-        summary="CAM arrays for MCCP and MATC in an L5X import for Logix controllers",
-        proof="parsed",
-        suffix=".L5X",
-    ),
-    "siemens-scl": Format(
-        module="gen_profile_exporters.vendors.siemens_scl",
-        summary="playback block, wrapper and cam points as SCL sources for TIA Portal",
-        proof="untested",
-        suffix=".scl",
-        holds_block=True,
-    ),
-    "twincat": Format(
-        module="gen_profile_exporters.vendors.twincat",
-        summary="playback block, NC wrapper and motion function points for TwinCAT 3",
-        proof="parsed",
-        suffix=".TcPOU",
-        holds_block=True,
-    ),
-}
+_ROWS = tomllib.loads(Path(__file__).with_name("formats.toml").read_text("utf-8"))
+BUILT_IN = {name: Format(**row) for name, row in _ROWS.items()}
 OTHER_NAMES = {"st": "plc"}
 GROUP = "gen_profile.exporters"
 

@@ -8,7 +8,6 @@ from .comparison.robustness import robustness as robustness
 from .designs.design import Design as Design
 from .designs.design import design as design
 from .designs.fmu import export_fmu as export_fmu
-from .designs.plan import plan as plan
 from .designs.planner import deploy_planner as deploy_planner
 from .errors import CertificateError as CertificateError
 from .errors import CheckFailed as CheckFailed
@@ -31,6 +30,7 @@ from .motion.profile import SampledProfile as SampledProfile
 from .motion.profile import sample as sample
 from .planner.planner import Planner as Planner
 from .problem.linearization import linearize as linearize
+from .solvers.plan import plan as plan
 from .spec.model import Spec as Spec
 from .spec.reading import evolve_spec as evolve_spec
 from .spec.reading import make_spec as make_spec

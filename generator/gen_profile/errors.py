@@ -21,6 +21,7 @@ file and line), and what to do about it. Why there is no motion stands in values
 a code, and by suggestions that were tried.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, ClassVar, NamedTuple
@@ -156,6 +157,18 @@ class Suggestion(NamedTuple):
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
         return {"values": dict(self.values), "share": self.fraction, "passes": self.passes}
+
+
+def rounded_up(value: float, digits: int = 3) -> float:
+    """Keep some digits of a positive number, rounded up: what is called enough must be enough."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return float(f"{math.ceil(value / unit) * unit:.{digits}g}")
+
+
+def rounded_down(value: float, digits: int = 3) -> float:
+    """Keep some digits of a positive number, rounded down: what is called few enough must be."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return float(f"{math.floor(value / unit) * unit:.{digits}g}")
 
 
 def _written(value: Any) -> str:

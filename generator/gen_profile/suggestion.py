@@ -2,56 +2,20 @@
 
 import re
 from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
 
 from gen_profile.phrase import Phrase
 
 MOST = 3  # names to suggest
 MIN_SIMILARITY = 0.65  # difflib's ratio from which on a word is a misspelling of another
-# other words for what is called so here, in the languages and the products that users come from
-SYNONYMS = {
-    "velocity": "v vmax v_max max_velocity speed geschwindigkeit",
-    "acceleration": "a amax a_max max_acceleration beschleunigung",
-    "jerk": "j jmax j_max max_jerk ruck",
-    "travel": "range stroke position weg verfahrweg",
-    "distance": "dist length stroke weg fahrweg strecke",
-    "duration": "t time t_end tf zeit dauer fahrzeit",
-    "target": "end goal ziel",
-    "cycle_time": "cycle sample_time ts tick zykluszeit takt",
-    "residual_sway": "residual sway tolerance restpendeln",
-    "uncertain": "uncertainty tolerance toleranz",
-    "sway_weight": "beta weight",
-    "tau": "lag time_constant zeitkonstante",
-    "sensitivity": "robust desensitised desensitized",
-    "minimum": "min shortest fastest auto",
-    "L": "length rope rope_length seil seillaenge seillänge",
-    "L1": "length rope rope_length seil seillaenge seillänge",
-    "m": "mass load payload last masse",
-    "m1": "mass hook masse",
-    "m2": "mass load payload last masse",
-    "plant": "machine crane maschine kran",
-    "move": "motion bewegung",
-    "actuator": "drive motor antrieb",
-    "robustness": "uncertainty uncertainties uncertain robust tolerance",
-    "limits": "limit constraints grenzen grenzwerte",
-    "export": "output",
-    "design": "export plan solve generate",
-    "double-pendulum-crane": "crane bridge-crane overhead-crane kran brueckenkran brückenkran",
-    "gantry-crane": "crane bridge-crane overhead-crane kran portalkran brueckenkran brückenkran",
-    "single-pendulum-crane": "crane kran",
-    "tower-crane": "crane kran turmdrehkran",
-    "slosh-tank": "slosh sloshing liquid tank",
-    "plc": "iec iec61131 61131 structured-text structured_text txt",
-    "codesys": "codesys3 wago schneider festo",
-    "plcopen-xml": "xml plcopen",
-    "rockwell-l5x": "rockwell allen-bradley logix studio5000",
-    "siemens-scl": "siemens tia tia-portal step7 s7 s7-1200 s7-1500",
-    "twincat": "beckhoff twincat3 tc3 tcpou",
-    "csv": "excel xlsx xls table",
-    "can": "canopen cia402 candump",
-    "mm": "millimeter millimetre",
-    "um": "µm μm micron",
-    "deg": "° degree degrees grad",
-}
+
+
+@cache
+def _synonyms() -> dict[str, list[str]]:
+    """Read other words for what is called so here, in the languages and products that users come from."""
+    lines = (Path(__file__).parent / "lists" / "synonyms.txt").read_text("utf-8").splitlines()
+    return {name: words.split() for name, _, words in (line.partition(": ") for line in lines)}
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
@@ -73,7 +37,7 @@ def meant(word: str, known: Iterable[str]) -> list[str]:
     """Find the names, `MOST` at most, that a person may mean: by meaning, by a part, or misspelt."""
     names, word = list(known), str(word).strip().lower()  # from Python, it may be no text
     same = [name for name in names if name.lower() == word]
-    by_meaning = [name for name in names if word in SYNONYMS.get(name, "").split()]
+    by_meaning = [name for name in names if word in _synonyms().get(name, ())]
     by_part = [
         name
         for name in names

@@ -7,7 +7,7 @@ import numpy as np
 from end_to_end.studios import studio
 from headless import browser
 
-from gen_profile.designs.plan import draft
+from gen_profile.solvers.plan import draft
 from gen_profile.studio.orders import Question
 from gen_profile.studio.state import StudioState, preset_start
 from gen_profile.studio.views import picture

@@ -9,9 +9,9 @@ from command_line import run_here
 from gen_profile.cli import words
 from gen_profile.comparison.candidates import candidates
 from gen_profile.comparison.compare import compare
-from gen_profile.designs.transient_sway import sways
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
+from gen_profile.solvers.transient_sway import sways
 from gen_profile.spec.reading import preset_spec
 
 FEW = ("--set", "robustness={}")
@@ -213,5 +213,5 @@ def test_other_machines_compare_the_spec_s_own_motion_as_optimal():
 def test_variants_keep_the_limit_of_the_sway_on_every_machine():
     spec = preset_spec("paper-beta0", ["limits.sway=0.024"])
     (variant,) = [one for one in candidates(spec) if one.method == "optimal-range"]
-    _, worst = sways(spec, problem_of(spec), variant.design())
+    _, worst = sways(problem_of(spec), variant.design())
     assert 0.99 * 0.024 < worst <= 1.01 * 0.024

@@ -14,13 +14,13 @@ from command_line import run_here
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from gen_profile.designs.plan import plan
 from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.evaluation.scenarios import further_scenarios, scenarios
 from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import SampledProfile, sample
 from gen_profile.progress import no_progress
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
 from gen_profile.verification.check import _verdict, check_artefact
 from gen_profile.verification.monte_carlo import standstill

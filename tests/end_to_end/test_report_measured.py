@@ -7,11 +7,11 @@ import pytest
 from command_line import run_here
 from scipy.integrate import solve_ivp
 
-from gen_profile.designs.plan import plan
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.motion_evaluation import evaluate
 from gen_profile.report.log import MeasuredLog
 from gen_profile.report.measured import compare_measured
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
 
 STEP = 0.01

@@ -9,10 +9,10 @@ from command_line import run_here
 from pictures import colours
 
 from gen_profile.comparison.robustness import Robustness, error_grid, robustness
-from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.metrics import peak
+from gen_profile.solvers.shape import shaped_motion
 from gen_profile.spec.reading import preset_spec
 
 SPEC = preset_spec("paper")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.designs.plan import plan
-from gen_profile.designs.shortest import timed
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS
+from gen_profile.solvers.plan import plan
+from gen_profile.solvers.shortest import timed
 from gen_profile.spec.model import SolverSpec
 from gen_profile.spec.reading import preset_spec
 from gen_profile.spec.values import ShaperName

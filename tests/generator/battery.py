@@ -18,8 +18,8 @@ import attrs
 sys.path.insert(0, str(Path(__file__).parent))
 from random_specs import random_spec
 
-from gen_profile.designs.plan import plan
 from gen_profile.errors import GenProfileError, NoMotion, SpecError
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import overridden, spec_from_dict
 
 KILLED_AFTER = 60  # s of processor

@@ -6,16 +6,17 @@ import pytest
 from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
-from gen_profile.designs import suggestions
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
 from gen_profile.problem.cost import SwayCost
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import suggestions
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
@@ -87,9 +88,9 @@ def test_a_limit_costs():
 
 
 def test_auto_takes_the_indirect_method_where_no_limit_binds():
-    assert choice.attempt(limited(acceleration=1.0)).method == indirect.METHOD
+    assert choice.attempt(limited(acceleration=1.0)).method == INDIRECT
     assert choice.attempt(limited(acceleration=0.5)).method == direct.METHOD
-    assert choice.attempt(limited(acceleration=0.5), "indirect").method == indirect.METHOD
+    assert choice.attempt(limited(acceleration=0.5), "indirect").method == INDIRECT
     assert choice.attempt(limited(), "direct").method == direct.METHOD
 
 

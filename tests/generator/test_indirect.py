@@ -10,12 +10,12 @@ import pytest
 from generator.crane_problems import crane_problem
 from scipy.integrate import solve_ivp
 
-from gen_profile.designs.plan import plan
 from gen_profile.errors import InfeasibleProblem, SolverDiverged
 from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.plan import plan
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.reading import preset_spec
 

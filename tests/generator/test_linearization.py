@@ -1,7 +1,5 @@
 """The linear model against finite differences and analytic frequencies."""
 
-from types import SimpleNamespace
-
 import attrs
 import numpy as np
 import pytest
@@ -91,7 +89,8 @@ def test_a_mode_may_depend_on_where_the_axes_stand():
 )
 def test_places_of_axes_count_where_the_equations_feel_them(type_):
     plant = find_plant(type_)
-    machine, here = SimpleNamespace(**plant.nominal()), np.array(plant.probe_places())
+    places, machine = plant.probe()
+    here = np.array(places)
 
     def law(q_a):
         q_u, still = np.full(len(plant.unactuated), 1e-3), np.zeros_like(here)

@@ -9,12 +9,12 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
-from gen_profile.designs import shortest as searching
-from gen_profile.designs.plan import draft
 from gen_profile.errors import CosimulationError
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import shortest as searching
 from gen_profile.solvers.direct import relaxation
+from gen_profile.solvers.plan import draft
 from gen_profile.solvers.search import least
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
@@ -212,7 +212,7 @@ def test_a_motion_that_no_machine_can_follow_is_passed_over(monkeypatch):
     def flung(*_):
         raise CosimulationError("The motion cannot be integrated beyond 2.565 s.")
 
-    monkeypatch.setattr("gen_profile.designs.draft.evaluate", flung)
+    monkeypatch.setattr("gen_profile.solvers.draft.evaluate", flung)
     assert drafted.excess_sway == math.inf
 
 

@@ -9,8 +9,8 @@ import zlib
 import numpy as np
 import pytest
 
-from gen_profile.designs.plan import plan
 from gen_profile.errors import SpecError
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, spec_from_dict
 from gen_profile.studio.depth import depth
 from gen_profile.studio.knobs import knobs

@@ -9,8 +9,8 @@ from command_line import run_here
 from generator.free_swings import states
 
 from gen_profile.charts.figure import Figure, Line, Panel
-from gen_profile.designs.plan import draft
 from gen_profile.report.log import parse_log
+from gen_profile.solvers.plan import draft
 from gen_profile.spec.reading import preset_spec, spec_from_dict
 from gen_profile.studio.curves_json import MOST, curves_json
 from gen_profile.studio.logs import log

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_profile.designs.suggestions import IN_VAIN
 from gen_profile.errors import NoMotion, SpecError, Suggestion
 from gen_profile.phrase import Phrase
 from gen_profile.solvers.solution import LATER, LONGER, WIDER, Status
+from gen_profile.solvers.suggestions import IN_VAIN
 from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.spec.reading import preset_spec, presets, spec_from_dict
 from gen_profile.studio.knobs import knobs

@@ -8,15 +8,15 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.designs import suggestions, transient_sway
-from gen_profile.designs.draft import lasting
-from gen_profile.designs.plan import plan
-from gen_profile.designs.shortest import timed
 from gen_profile.errors import InfeasibleProblem, LimitViolation, NoMotion
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import suggestions, transient_sway
 from gen_profile.solvers.direct import relaxation
 from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.draft import lasting
+from gen_profile.solvers.plan import plan
+from gen_profile.solvers.shortest import timed
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.reading import preset_spec
 from gen_profile.work import OutOfWork, budget, spend
@@ -47,7 +47,7 @@ def refused(preset, *overrides):
 def works(preset, *overrides):
     spec = preset_spec(preset, overrides)
     solution = transient_sway.attempt(spec)
-    return choice.keeps_limits(solution) and transient_sway.keeps_sway(spec, solution, 1.01)
+    return choice.keeps_limits(solution) and transient_sway.keeps_sway(solution, 1.01)
 
 
 def nearer(preset, overrides, change, share):
@@ -327,7 +327,7 @@ def test_where_no_duration_will_do_the_limit_to_blame_is_named():
 @pytest.mark.parametrize("others", [[], ["limits.velocity=0.05"]])
 def test_cures_leave_room_for_the_machine_that_sways_most_whatever_else_is_infeasible(others):
     spec = preset_spec("paper", ["limits.sway=0.02", *others])
-    assert suggestions.usual_spread(spec) == pytest.approx(1.19, abs=0.03)
+    assert suggestions.usual_spread(problem_of(spec)) == pytest.approx(1.19, abs=0.03)
 
 
 def test_a_limit_of_the_sway_that_is_named_is_kept_by_every_machine():

@@ -43,14 +43,13 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner import error_constants as of_errors
 from gen_profile_exporters.planner import search_constants as of_search
 from gen_profile_exporters.planner import sensor_constants as of_sensor
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants, axis_interface, axis_words
 from gen_profile_exporters.playback.structured_text import block_name, literal
-
-Array = NDArray[np.float64]
 
 FUTURE = 140  # slots of a committed future
 LONGEST = 132  # of a plan; farther targets are approached by pulses, as a stick would

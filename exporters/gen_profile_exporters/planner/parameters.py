@@ -20,21 +20,8 @@ import attrs
 from gen_profile.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.planner.block import narrow, with_while_loops
+from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.playback.block import TEMPLATE
-from gen_profile_exporters.playback.buffers import (
-    ALTERED,
-    HEAD,
-    LAYOUT_NAMES,
-    PATIENCE,
-    PLANNER,
-    TABLE,
-    VARIABLES,
-    buffer_texts,
-    declared,
-    filled,
-    state_length,
-    with_head,
-)
 from gen_profile_exporters.text_parts import text_parts
 
 OURS = "OfBuffer"  # behind names that the block has already
@@ -45,9 +32,9 @@ _FRACTION = re.compile(r" *\(\* A double as whole numbers.*?(?= *nCheckRow := nC
 _ROUND = "        nCheckRow := nCheckRow + 1;"
 _NUMBER = re.compile(r"c[A-Z]\w*")
 _MEMBERS = {
-    "DINT": (*VARIABLES["DINT"], "nCheck", "nCheckRow", "nHead", "nUpper", "nWord"),
-    "LREAL": (*VARIABLES["LREAL"], "fValue", "fMantissa", "fWord", "fSum"),
-    "BOOL": (*VARIABLES["BOOL"], "bChecked", "bIntact", "bForget", "bMayEnable"),
+    "DINT": (*buffers.VARIABLES["DINT"], "nCheck", "nCheckRow", "nHead", "nUpper", "nWord"),
+    "LREAL": (*buffers.VARIABLES["LREAL"], "fValue", "fMantissa", "fWord", "fSum"),
+    "BOOL": (*buffers.VARIABLES["BOOL"], "bChecked", "bIntact", "bForget", "bMayEnable"),
 }
 _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 
@@ -74,9 +61,9 @@ def constant_planner(source: BlockSource) -> BlockSource:
     ExportError
         The block is none that `buffered_planner` gives.
     """
-    texts = iter(buffer_texts(source)[len(HEAD) :])
+    texts = iter(buffers.buffer_texts(source)[len(buffers.HEAD) :])
     there = {one.name for one in source.variables}
-    names = [one.name for one in declared([], 0, 1, _MEMBERS, cKind=0, cLayout=0, cPatience=0)]
+    names = [one.name for one in buffers.declared([], 0, 1, _MEMBERS, cKind=0, cLayout=0, cPatience=0)]
     ours = {f"{name}{OURS}" if f"{name}{OURS}" in there else name for name in names}
     try:
         variables = [
@@ -96,7 +83,7 @@ def constant_planner(source: BlockSource) -> BlockSource:
         back = attrs.evolve(back, body=body.replace("bMayEnable", "bEnable"))
         same = buffered_planner(back).program() == source.program()
     except (StopIteration, ValueError, KeyError) as error:
-        raise ExportError(ALTERED) from error
+        raise ExportError(buffers.ALTERED) from error
     if not same:
         raise ExportError(
             "The block does not take its numbers from its buffers as it should: it was altered; export it "
@@ -134,15 +121,15 @@ def _own(
     """Declare what is added, and give what renames it in statements where the block has such names."""
     cycle = float(_initial(numbers, "cCycle"))
     content = [text if "." in text else f"{text}.0" for one in numbers for text in _elements(one)]
-    texts = with_head(content, cycle)
-    own = declared(
+    texts = buffers.with_head(content, cycle)
+    own = buffers.declared(
         texts,
         len(texts),
         int(_initial(numbers, "cAxes")),
         _MEMBERS,
         cKind=_kind(source, numbers),
-        cLayout=LAYOUT_NAMES.index(PLANNER),
-        cPatience=ceil(PATIENCE / cycle),
+        cLayout=buffers.LAYOUT_NAMES.index(buffers.PLANNER),
+        cPatience=ceil(buffers.PATIENCE / cycle),
     )
     taken = {one.name.lower() for one in source.variables}
     renamed = {one.name: f"{one.name}{OURS}" for one in own if one.name.lower() in taken}
@@ -172,30 +159,30 @@ def _around(
     check = "\n".join(
         (_SHARED["checked_value"], _FRACTION.findall(TEMPLATE)[0].rstrip(), _ROUND, _SHARED["checked_end"])
     )
-    text = filled(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
-    text = distinct(text + filled(f"{_SHARED['planner_check']}\n", checked=check))
-    text = filled(
+    text = buffers.filled(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
+    text = distinct(text + buffers.filled(f"{_SHARED['planner_check']}\n", checked=check))
+    text = buffers.filled(
         text.replace("@moves", f"(bEnable OR (nState <> cDisabled){moving})")
         .replace("@plays", "(nState <> cDisabled)")
         .replace("cCycleTime", "cCycle"),
         taken="\n".join(f"        {line}" for line in _taken(numbers, *map(distinct, ("nBase", "nCheck")))),
         begun="\n".join(f"            {line}" for line in _begun(source, distinct("nCheck"))),
     )
-    state = distinct(_SHARED["planner_state"]).replace("@last", str(state_length(axes) - 1))
+    state = distinct(_SHARED["planner_state"]).replace("@last", str(buffers.state_length(axes) - 1))
     return narrow(with_while_loops(text)), narrow(with_while_loops(f"{state}\n"))
 
 
 def _taken(numbers: list[BlockVariable], base: str, counter: str) -> Iterator[str]:
     """Take the numbers over from the buffer in use."""
-    place = len(HEAD)
+    place = len(buffers.HEAD)
     for one in numbers:
         convert = "LREAL_TO_DINT({})" if _type(one) == "DINT" else "{}"
         count = len(_elements(one))
         if one.array:
-            value = convert.format(f"{TABLE}[{base} + {counter} + {place}]")
+            value = convert.format(f"{buffers.TABLE}[{base} + {counter} + {place}]")
             yield from _loop(counter, count, f"{one.name}[{counter}] := {value};")
         else:
-            yield f"{one.name} := {convert.format(f'{TABLE}[{base} + {place}]')};"
+            yield f"{one.name} := {convert.format(f'{buffers.TABLE}[{base} + {place}]')};"
         place += count
 
 

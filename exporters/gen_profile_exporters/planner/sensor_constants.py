@@ -4,12 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.playback.structured_text import literal
-
-Array = NDArray[np.float64]
 
 LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
 LARGEST_PULSE = 4.0  # by what the greatest acceleration makes in a slot: a larger one keeps the next ones out

@@ -2,34 +2,17 @@
 
 from typing import Any
 
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.text_parts import FOLDER, text_parts
 
-# Name, type (``~``: one of every axis), initial value and comment. All enter the checksum, in this order.
-CONSTANTS = (
-    ("cIdle", "DINT", "0", ""),
-    ("cWaiting", "DINT", "1", ""),
-    ("cMoving", "DINT", "2", ""),
-    ("cDone", "DINT", "3", ""),
-    ("cAborted", "DINT", "4", ""),
-    ("cFailed", "DINT", "5", ""),
-    ("cAxes", "DINT", "$axes", ""),
-    ("cLast", "DINT", "@last", "cycle of the end"),
-    ("cRows", "DINT", "@row_count", "of the table"),
-    ("cChecks", "DINT", "@checks", "values that enter the checksum in a cycle"),
-    ("cPlayOn", "DINT", "@play_on", "cycle from which the motion ends before its own peaks could stop it"),
-    ("cCycleTime", "LREAL", "@cycle_time", "s"),
-    ("cSlope", "LREAL", "@slope", "1/s, greatest of the rate"),
-    ("cSlopeRate", "LREAL", "@slope_rate", "1/s2"),
-    ("cRoom", "LREAL~", "@room", "1/s, peak acceleration over peak velocity"),
-    ("cInverse", "LREAL~", "@inverse", "1 over the peak velocity"),
-    ("cStopJerk", "LREAL~", "@stop_jerk", "@units/s3"),
-    ("cStart", "LREAL~", "@start", "@units"),
-    ("cTarget", "LREAL~", "@target", "@units"),
-    ("cLeastScale", "LREAL~", "@least_scale", "least fScale that the machine allows"),
-    ("cMirrors", "BOOL~", "@mirrors", "bMirror is allowed"),
-    ("cShifts", "BOOL~", "@shifts", "fStartOffset is allowed"),
-)
 
+def _constant(line: str) -> tuple[str, str, str, str]:
+    """Read name, type (``~``: one of every axis), initial value and comment."""
+    name, type_, initial, *comment = line.split(maxsplit=3)
+    return name, type_, initial, "".join(comment)
+
+
+# all enter the checksum, in this order
+CONSTANTS = tuple(map(_constant, (FOLDER / "playback/text/constants.txt").read_text("ascii").splitlines()))
 NO_PARTS = dict.fromkeys(("start", "segment", "counts_declaration", "counts_output"), "")
 
 

@@ -2,8 +2,9 @@
 
 import ctypes
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import AbstractContextManager
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
-from typing import Any, Self
+from typing import Any
 
 import attrs
 import numpy as np
@@ -234,7 +235,7 @@ class _Outcome(Structure):
     ]
 
 
-class BlockFollower:
+class BlockFollower(AbstractContextManager["BlockFollower"]):
     """A plant FMU in memory that follows blocks, one run after the other; a context manager.
 
     Parameters
@@ -255,9 +256,6 @@ class BlockFollower:
         self._loop = _loop()
         self._instance = instance(fmu)
         self._messages = self._instance.messages
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._instance.give_back()

@@ -1,9 +1,8 @@
 """Co-simulation of a plant FMU that follows setpoints: by FMPy, or by FMPy's instance in a compiled loop."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, sizeof
-from typing import Self
 
 import attrs
 import numpy as np
@@ -61,7 +60,7 @@ class _Steps(Structure):
     ]
 
 
-class PlantCosimulation:
+class PlantCosimulation(AbstractContextManager["PlantCosimulation"]):
     """A plant FMU in memory, to be run as often as wanted; a context manager.
 
     Parameters
@@ -86,9 +85,6 @@ class PlantCosimulation:
         self._setpoints = unsigned(variables.references("INPUTS"))
         self._outputs = unsigned(variables.references(*_OBSERVED))
         self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in _OBSERVED])[:-1]
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

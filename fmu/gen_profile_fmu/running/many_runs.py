@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class _Plan(Structure):
     ]
 
 
-class ManyRuns:
+class ManyRuns(AbstractContextManager["ManyRuns"]):
     """An FMU in memory, for runs that differ in their parameters or inputs; a context manager.
 
     Parameters
@@ -58,9 +59,6 @@ class ManyRuns:
         self._variables, self._loop = fmu.variables, _loop()
         self._workers = [instance(fmu) for _ in range(workers)]
         self._threads = ThreadPoolExecutor(workers)  # which start when they are needed
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._threads.shutdown()

@@ -141,7 +141,7 @@ def draw_machine(plant: Plant, parameters: Mapping[str, float], path: Path, titl
 def views(plant: Plant, parameters: Mapping[str, float]) -> list[MachineView]:
     """Look at a machine from every side that shows something."""
     still = np.zeros((1, len(plant.unactuated)))
-    at_probe = np.array([plant.probe_places()])
+    at_probe = np.array([plant.probe()[0]])
     reach = float(np.abs(pose_of(plant, parameters, at_probe, still, 0.0).loads()[1]).max()) or 1.0
     places = [
         TURN if axis.unit == "rad" else np.clip(reach, axis.lower, axis.upper) for axis in plant.actuated

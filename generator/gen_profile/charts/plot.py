@@ -17,12 +17,12 @@ from gen_profile.charts.robustness import robustness_figure
 from gen_profile.comparison.compare import Comparison
 from gen_profile.comparison.robustness import Robustness
 from gen_profile.designs.design import Design
-from gen_profile.designs.plan import Plan
 from gen_profile.designs.planner import Deployment
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import number
 from gen_profile.identification.identify import Identification
 from gen_profile.motion.profile import Profile
+from gen_profile.solvers.plan import Plan
 from gen_profile.spec.model import Spec
 from gen_profile.verification.check import Judgement
 from gen_profile.verification.verdict import Check

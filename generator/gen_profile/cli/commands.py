@@ -22,6 +22,7 @@ from gen_profile.cli.options import (
     complete_presets,
     export_option,
     folder_option,
+    histories_option,
     output_options,
     plot_option,
     repeatable,
@@ -56,7 +57,7 @@ def cli() -> None:
 
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
 @spec_options
-@export_option("Format to write")
+@export_option("Format to write (see gen-profile formats)")
 @folder_option
 @click.option("--cycle-time", metavar="SECONDS", help="Cycle of the controller, and SYNC period of the bus.")
 @click.option("--plc-layout", metavar="LAYOUT", help="Table of a PLC block: segments, samples or counts.")
@@ -206,11 +207,7 @@ def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, *
 @click.option("--csv", "table_path", type=OutputFile(), help="Write all scenarios as a table, one row each.")
 @certify_option
 @click.option("--certificate", type=InputFile(), help="Check a certificate again, and nothing else.")
-@click.option(
-    "--histories",
-    type=Count(1, 1_000_000),
-    help="Prove a planner block on N histories of commands.",
-)
+@histories_option("Prove a planner block on N histories of commands.")
 @click.option("--history", metavar="N", type=int, help="Run only this history of a planner block's proof.")
 @scheduler_option("run a planner block's histories")
 @block_plot_option

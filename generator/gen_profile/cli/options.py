@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 DEFAULT_PRESET = "paper"
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
 class Count(click.IntRange):
@@ -253,17 +254,24 @@ def scheduler_option(work: str) -> Callable[..., Any]:
     )
 
 
-def export_option(what: str) -> Callable[[Command], Command]:
+def export_option(
+    what: str, default: str = "csv", complete: Completion = _complete_formats
+) -> Callable[[Command], Command]:
     """Add the choice of formats, and say what becomes of each."""
     return click.option(
         "--export",
         "formats",
         metavar="FORMAT",
         multiple=True,
-        default=("csv",),
-        shell_complete=_complete_formats,
-        help=f"{what} (see gen-profile formats). Repeatable; csv by default.",
+        default=(default,),
+        shell_complete=complete,
+        help=f"{what}. Repeatable; {default} by default.",
     )
+
+
+def histories_option(text: str) -> Callable[[Command], Command]:
+    """Take a number of histories of commands, on which a planner block is proved."""
+    return click.option("--histories", type=Count(1, 1_000_000), help=text)
 
 
 def require_formats(names: Iterable[str]) -> None:

@@ -15,14 +15,15 @@ from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
-    Count,
     InputFile,
     OutputFile,
     PathType,
     SpecChoice,
     block_plot_option,
     completed,
+    export_option,
     folder_option,
+    histories_option,
     output_options,
     repeatable,
     scheduler_option,
@@ -59,21 +60,9 @@ def planner() -> None:
 
 @planner.command(epilog="Example: gen-profile planner --preset bay-crane --export siemens-scl --out deploy")
 @spec_options
-@click.option(
-    "--export",
-    "formats",
-    metavar="FORMAT",
-    multiple=True,
-    default=("plc",),
-    shell_complete=_complete_forms,
-    help="Form of the block: plc, another that holds one, c, linux or openplc. Repeatable; plc by default.",
-)
+@export_option("Form of the block: plc, another that holds one, c, linux or openplc", "plc", _complete_forms)
 @folder_option
-@click.option(
-    "--histories",
-    type=Count(1, 1_000_000),
-    help="Prove it on N histories of commands; on 200 by default.",
-)
+@histories_option("Prove it on N histories of commands; on 200 by default.")
 @scheduler_option("run the histories")
 @click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     "What the page shall also say, as Customer=ACME; without a value, a line to sign.",
     into="fields",
 )
-@export_option("Format whose file is checked and named by its hash")
+@export_option("Format whose file is checked and named by its hash (see gen-profile formats)")
 @click.option(
     "--measured",
     "log",

@@ -35,7 +35,7 @@ from gen_profile.cli.progress import progress
     help="A key of the spec and its values: N from LO to HI, or KEY=VALUE,VALUE,… Repeatable: all "
     "combinations; the last one is solved along.",
 )
-@export_option("Format to write")
+@export_option("Format to write (see gen-profile formats)")
 @click.option(
     "--out",
     "folder",

@@ -6,16 +6,16 @@ from typing import Any
 
 import attrs
 
-from gen_profile.designs import suggestions, transient_sway
-from gen_profile.designs.shape import shaped_motion
-from gen_profile.designs.shortest import timed
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile, require_motion
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
+from gen_profile.solvers import suggestions, transient_sway
 from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.shape import shaped_motion
+from gen_profile.solvers.shortest import timed
 from gen_profile.spec.model import Spec
 from gen_profile.spec.values import NONE
 
@@ -150,7 +150,7 @@ def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) ->
     command = lag_compensated(motion, spec.actuator.tau)
     taken = max(greatest(command, 2, axis) for axis in range(command.axes))
     problem = problem_of(attrs.evolve(spec, limits=attrs.evolve(spec.limits, acceleration=taken)))
-    solution = transient_sway.kept_by_all(spec, problem, "direct")
+    solution = transient_sway.kept_by_all(problem, "direct")
     if solution.optimum is None:
         unit = spec.machine().actuated[0].unit
         raise InfeasibleProblem(

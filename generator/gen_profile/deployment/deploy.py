@@ -7,18 +7,8 @@ from typing import Any, Literal
 
 import attrs
 
-from gen_profile.deployment.mailbox import (
-    IDLE,
-    IN_USE,
-    RIGHT,
-    WRONG,
-    BlockRefusedError,
-    BlockStatus,
-    LinkLostError,
-    Mailbox,
-    differing,
-    require_same,
-)
+from gen_profile.deployment import mailbox
+from gen_profile.deployment.mailbox import BlockRefusedError, BlockStatus, LinkLostError, Mailbox
 from gen_profile.deployment.table import BlockTable, table_hash
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 from gen_profile.motion.profile import Array
@@ -98,9 +88,11 @@ def deploy(
     try:
         before = box.status()
         require_fit(table, before)
-        same = before.checksum == table.checksum and before.checked != WRONG
-        in_use = same and not _differs(table, box, IN_USE)
-        judgement = _proved(table, box, IN_USE if in_use else IDLE, rollback or in_use, progress)
+        same = before.checksum == table.checksum and before.checked != mailbox.WRONG
+        in_use = same and not _differs(table, box, mailbox.IN_USE)
+        judgement = _proved(
+            table, box, mailbox.IN_USE if in_use else mailbox.IDLE, rollback or in_use, progress
+        )
         if not in_use:
             progress("switching")
             in_force = EITHER
@@ -139,11 +131,11 @@ def _proved(
         )
     progress("reading the table back")
     values = box.read(buffer, len(table.values))
-    require_same(values, table.values)
+    mailbox.require_same(values, table.values)
     judgement = table.check(values, progress)
     if not judgement.check.passed:
         raise CheckFailed(*judgement.check.reasons())
-    require_same(box.read(buffer, len(table.values)), table.values)
+    mailbox.require_same(box.read(buffer, len(table.values)), table.values)
     return judgement
 
 
@@ -151,7 +143,7 @@ def _confirmed(
     table: BlockTable, box: Mailbox, before: BlockStatus, *, in_use: bool
 ) -> tuple[Array, BlockStatus]:
     """Read what is used now; go back to the former table where that is not what was proved."""
-    held, after = box.read(IN_USE, len(table.values)), box.settled()
+    held, after = box.read(mailbox.IN_USE, len(table.values)), box.settled()
     try:
         _require_held(held, table, after)
     except CheckFailed as error:
@@ -181,7 +173,7 @@ def verify(table: BlockTable, box: Mailbox) -> BlockStatus:
     try:
         status = box.settled()
         require_fit(table, status)
-        held = box.read(IN_USE, len(table.values))
+        held = box.read(mailbox.IN_USE, len(table.values))
     except LinkLostError as error:
         raise DeploymentError(f"The connection broke ({error}); run this again.") from error
     _require_held(held, table, status)
@@ -234,17 +226,17 @@ def require_fit(table: BlockTable, status: BlockStatus) -> None:
 
 
 def _differs(table: BlockTable, box: Mailbox, buffer: int) -> bool:
-    return bool(differing(box.read(buffer, len(table.values)), table.values))
+    return bool(mailbox.differing(box.read(buffer, len(table.values)), table.values))
 
 
 def _require_held(held: Array, table: BlockTable, status: BlockStatus) -> None:
-    places = differing(held, table.values)
+    places = mailbox.differing(held, table.values)
     if places:
         raise CheckFailed(
             f"The controller does not use {table.path}: {len(places)} of {len(held)} values differ, first "
             f"number {places[0]}. Deploy it, or find out what is in use (deployments.json)."
         )
-    if status.checked != RIGHT:
+    if status.checked != mailbox.RIGHT:
         raise CheckFailed(
             f"The controller holds {table.path}, but works out another checksum, and so starts nothing: its "
             "memory is at fault, or was a moment ago; restart it."

@@ -1,1 +1,1 @@
-"""The main job: a motion planned, exported, checked and delivered, or what to change; FMUs written."""
+"""The main job: a motion exported, checked and delivered; FMUs and planner blocks written."""

@@ -13,17 +13,18 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, artefact_of, parse_manifest, versions
 from gen_profile.artefacts.writing import Kept, Staging, staged
-from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
+from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress
+from gen_profile.solvers.plan import Plan, plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.summary import Drawable
-from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
-from gen_profile.verification.external_fmu import judge_external
-from gen_profile.verification.monte_carlo import CHECKING, with_further
+from gen_profile.verification.cosimulation import judged_from
+from gen_profile.verification.judging import verdict
+from gen_profile.verification.monte_carlo import CHECKING
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
@@ -259,27 +260,19 @@ def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, 
     checks = []
     for setpoints in replayed:
         worst, tried = worst_machines(spec, setpoints, known, progress)
-        rows = [*known, *worst]
-        if spec.check.foreign is not None:
-            check = judge_external(spec, spec.check.foreign, setpoints, rows)
-        else:
-            check = _judged(planned, setpoints, rows, by_fmpy=by_fmpy, progress=progress)
+        rows, reference = [*known, *worst], partial(_continuous, planned, setpoints)
+        check = verdict(spec, setpoints, rows, reference, by_fmpy=by_fmpy, progress=progress)
         checks.append(attrs.evolve(check, searched=tried))
     return max(checks, key=lambda check: check.demand)
 
 
-def _judged(
-    planned: Plan, setpoints: SampledProfile, rows: Sequence[Scenario], *, by_fmpy: bool, progress: Progress
-) -> Check:
-    """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
-    spec, evaluation = planned.spec, planned.evaluation
-    machines, spacing = [row for row in rows if row.followed], sample_spacing(spec, setpoints)
-    responses = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, progress=progress)
-    compared = responses[0].times[responses[0].times >= judged_from(spec, setpoints)]
-    expected = evaluation.followed(compared, machines[len(evaluation.machines) :])
-    check = judge(spec, setpoints, machines, responses, expected)
-    further = [row for row in rows if not row.followed]
-    return with_further(spec, setpoints, check, further, progress)
+def _continuous(
+    planned: Plan, setpoints: SampledProfile, machines: Sequence[Scenario], responses: Sequence[Response]
+) -> Sequence[Sway]:
+    """How machines, of which the evaluation's are the first, move by the motion before it was sampled."""
+    times, evaluation = responses[0].times, planned.evaluation
+    compared = times[times >= judged_from(planned.spec, setpoints)]
+    return evaluation.followed(compared, machines[len(evaluation.machines) :])
 
 
 def _after_earlier_ones(manifest: Manifest, earlier: bytes | None) -> Manifest:

@@ -10,13 +10,13 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.writing import deliver
-from gen_profile.designs.plan import plan
 from gen_profile.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
 from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion

@@ -5,9 +5,8 @@ from collections.abc import Callable
 
 import attrs
 
-from gen_profile.errors import GenProfileError, Suggestion
+from gen_profile.errors import GenProfileError, Suggestion, rounded_down, rounded_up
 from gen_profile.planner.machine import planned_axes
-from gen_profile.problem.limits import rounded_down, rounded_up
 from gen_profile.proof.obedience import WORDS
 from gen_profile.proof.verdict import TAKEN_BACK, Proof, kind_of
 from gen_profile.solvers.search import Search, least
@@ -69,21 +68,19 @@ def _tried(
 def _slower(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated, axes = spec.limits.stated(), planned_axes(spec)
     places = dict.fromkeys(spec.limits.place(axis, name) for axis in axes for name in RATES)
-    values = {place: float(rounded_down(factor * stated[place], digits=2)) for place in places}
+    values = {place: rounded_down(factor * stated[place], digits=2) for place in places}
     return spec.changed(values), values
 
 
 def _surer(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated = spec.robustness.uncertain if spec.check.uncertain is None else spec.check.uncertain
-    errors = {name: float(rounded_down(factor * error, digits=2)) for name, error in stated.items()}
+    errors = {name: rounded_down(factor * error, digits=2) for name, error in stated.items()}
     values = {f"check.uncertain.{name}": error for name, error in errors.items()}
     return spec.changed({"check.uncertain": errors}), values
 
 
 def _more_allowed(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
-    sway = {
-        load: float(rounded_up(most / factor, digits=2)) for load, most in spec.check.residual_sway.items()
-    }
+    sway = {load: rounded_up(most / factor, digits=2) for load, most in spec.check.residual_sway.items()}
     values = {f"check.residual_sway.{load}": most for load, most in sway.items()}
     if len(set(sway.values())) == 1:
         values = {"check.residual_sway": next(iter(sway.values()))}

@@ -7,7 +7,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.errors import InfeasibleProblem, SpecError, rounded_down
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Sway
@@ -15,7 +15,6 @@ from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.motion.profile import Array, Profile, require_motion
 from gen_profile.problem.dynamics import parameter_rows
-from gen_profile.problem.limits import rounded_down
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of
 from gen_profile.spec.model import Spec
@@ -134,7 +133,7 @@ def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
     plant, until = spec.machine(), _watched_until(spec, motion)
     named = [machine.parameters for machine in scenarios(spec)]
     swing = PlantSimulation(plant, motion, named, until, spec.move.initial)
-    inside = machines_inside(problem_of(spec), spec.checked_ranges())
+    inside = machines_inside(problem_of(spec))
     known, inside_rows = (parameter_rows(plant, rows) for rows in (named, inside))
     same = np.isclose(inside_rows[:, None], known, 1e-9)
     others = [values for values, rows in zip(inside, same, strict=True) if not rows.all(axis=1).any()]
@@ -196,11 +195,11 @@ def _require_room(spec: Spec, until: float) -> None:
     for axis, target, at in zip(spec.machine().actuated, move.target, beyond, strict=True):
         if not axis.lower <= at <= axis.upper:
             room = (axis.upper if at > target else axis.lower) - target
-            fast = rounded_down(abs(room) / (until - move.duration)) if room else "0"
+            fast = rounded_down(abs(room) / (until - move.duration)) if room else 0.0
             raise InfeasibleProblem(
                 f"move.final_velocity: {axis.name} would be at {at:.3g} {axis.unit} while the sway is "
                 f"watched, and its range is {axis.lower:g} to {axis.upper:g} {axis.unit}; "
-                f"end at {'-' if at < target else ''}{fast} {axis.unit}/s or slower."
+                f"end at {'-' if at < target else ''}{fast:.3g} {axis.unit}/s or slower."
             )
 
 

@@ -1,11 +1,11 @@
 """What a motion is tried on: machines at the ends and corners of their ranges, drives, random draws."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
 
 import attrs
 import numpy as np
 
+from gen_profile.problem.parameter_box import MOST_TRACED, corners, ends
 from gen_profile.problem.sampling import latin_hypercube
 from gen_profile.spec.model import Spec
 
@@ -21,7 +21,6 @@ GROUPS = {
 }
 NOMINAL = "nominal"
 LAG = "lag"
-MOST_TRACED = 3  # ranges whose machines are all followed in full, which takes much longer than peaks alone
 FEWEST_TIMINGS = 20  # draws of uneven times
 
 
@@ -60,14 +59,8 @@ def scenarios(spec: Spec) -> tuple[Scenario, ...]:
 
     Corners of many ranges are left to `further_scenarios`, but for the two extreme ones.
     """
-    ranges = spec.checked_ranges()
-    ends = _corners(ranges)
-    if len(ranges) > MOST_TRACED:
-        ends = [ends[0], ends[-1]]
-    if len(ranges) > 1:
-        ends += [{name: end} for name in ranges for end in (1, 0)]
     nominal = Scenario(name=NOMINAL, parameters=spec.plant.parameters)
-    return _numbered([nominal, *_off_nominal(spec, ends)])
+    return _numbered([nominal, *_off_nominal(spec, ends(spec.checked_ranges()))])
 
 
 def extremes(spec: Spec) -> tuple[int, ...]:
@@ -90,7 +83,7 @@ def further_scenarios(spec: Spec, machines: Sequence[Scenario]) -> tuple[Scenari
     ranges = spec.checked_ranges()
     if len(ranges) > MOST_TRACED:
         others += [
-            attrs.evolve(corner, group="corners") for corner in _off_nominal(spec, _corners(ranges)[1:-1])
+            attrs.evolve(corner, group="corners") for corner in _off_nominal(spec, corners(ranges)[1:-1])
         ]
     if path.alters_setpoints:
         for lag in dict.fromkeys(path.lag or (None,)):
@@ -112,19 +105,11 @@ def _numbered(rows: Sequence[Scenario], first: int = 0) -> tuple[Scenario, ...]:
     return tuple(attrs.evolve(row, row=first + index) for index, row in enumerate(rows))
 
 
-def _corners(ranges: Mapping[str, object]) -> list[dict[str, int]]:
-    """List the corners of some ranges by the ends (1 upper, 0 lower) that meet there; none of no ranges."""
-    corners = (dict(zip(ranges, ends, strict=True)) for ends in product((1, 0), repeat=len(ranges)))
-    return [corner for corner in corners if corner]
-
-
-def _off_nominal(spec: Spec, corners: Sequence[Mapping[str, int]]) -> Iterator[Scenario]:
-    """Put parameters to the lower (0) or upper (1) ends of their ranges."""
-    ranges, nominal = spec.checked_ranges(), spec.plant.parameters
-    for corner in corners:
-        shifted = {name: ranges[name][end] for name, end in corner.items()}
+def _off_nominal(spec: Spec, shifts: Sequence[Mapping[str, float]]) -> Iterator[Scenario]:
+    """Give some parameters other values, and machines their names."""
+    for shifted in shifts:
         words = [named(spec, name, value) for name, value in shifted.items()]
-        yield Scenario(name=", ".join(words), parameters={**nominal, **shifted})
+        yield Scenario(name=", ".join(words), parameters={**spec.plant.parameters, **shifted})
 
 
 def named(spec: Spec, name: str, value: float, digits: int = 6) -> str:

@@ -104,20 +104,20 @@ class PlantSimulation:
         accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
         self.plant, self.initial, self._profile = plant, initial, profile
+        motion = motion_of(profile)
         self._p = p = parameter_rows(plant, machines)
-        start, motion = initial_state(plant, initial).reshape(2, -1), motion_of(profile)
-        ends = [profile.start, profile.target]
+        start, ends = initial_state(plant, initial).reshape(2, -1), [profile.start, profile.target]
         rates = np.array(eigenvalues_at(plant, p, ends))
         fastest = float(np.abs(rates).max())
         for growing in np.flatnonzero((rates.real > GROWTH * fastest).any(axis=(0, 2))).tolist():
             linearize(plant, machines[growing], profile.target.tolist())  # which says what is wrong
-        _require_pace(plant, fastest, until)
         first, last = (linear_terms(plant, p, q_a) for q_a in ends)
         constant = all(map(np.array_equal, first, last))
 
         def linear(time: float) -> tuple[Array, Array]:
             return first if constant else linear_terms(plant, p, motion(np.array([time]))[0, : profile.axes])
 
+        _require_pace(plant, fastest, until)
         self._solution = integrate(
             _accelerations(plant, p, motion),
             linear,

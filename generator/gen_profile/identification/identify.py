@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 
 from gen_profile.artefacts.writing import staged
-from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.errors import InfeasibleProblem, SpecError, rounded_up
 from gen_profile.identification.estimation import CONFIDENCE, INITIAL_RESIDUAL_RATIO, Estimate, estimate
 from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
@@ -359,7 +359,9 @@ def _identified(spec: Spec, estimated: Estimate) -> Spec:
     robustness = spec.robustness
     robust = robustness.method if robustness.uncertain else "sensitivity"
     stated = robustness.uncertain  # what a rope does in service: that it was measured once narrows nothing
-    widened = {name: max(_rounded_up(share), stated.get(name, 0.0)) for name, share in shares.items()}
+    widened = {
+        name: max(rounded_up(share, digits=2), stated.get(name, 0.0)) for name, share in shares.items()
+    }
     uncertain = {**stated, **widened}
     order = [name for name in spec.plant.parameters if name in uncertain]
     return spec.changed(
@@ -375,9 +377,3 @@ def _identified(spec: Spec, estimated: Estimate) -> Spec:
 def _rounded(value: float, uncertainty: float) -> float:
     """Leave out the digits that are worth less than a hundredth of the uncertainty."""
     return round(value, 2 - math.floor(math.log10(uncertainty)))
-
-
-def _rounded_up(fraction: float) -> float:
-    """Keep two digits of a share, rounded up."""
-    digits = 1 - math.floor(math.log10(fraction))
-    return math.ceil(fraction * 10.0**digits) / 10.0**digits

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gen_profile.motion.profile import Array
 
 STRAIGHT = 1e-6  # relative difference of two slopes that counts as none
 

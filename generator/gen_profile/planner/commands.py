@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array
+from gen_profile.motion.profile import Array
 from gen_profile.planner.events import COLUMNS, events_of
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import SENSED, BlockAxis, live_inputs, sensed_axes

@@ -8,9 +8,10 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
+from gen_profile.motion.profile import Array
 from gen_profile.one_thread import one_thread
 from gen_profile.phrase import Phrase, placed
-from gen_profile.planner.chebyshev import Array, same_terms
+from gen_profile.planner.chebyshev import same_terms
 from gen_profile.planner.machine import (
     LiveModes,
     corners,

@@ -11,7 +11,7 @@ import fmpy
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.planner.chebyshev import Array
+from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import ISSUED, STATES, BlockAxis, block_axes
 from gen_profile_exporters.st_to_c import FAULTS, Translation, translate
 from gen_profile_fmu.building.build import compile_texts

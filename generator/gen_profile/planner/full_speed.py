@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from gen_profile.planner.chebyshev import Array
+from gen_profile.motion.profile import Array
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.planner.machine import planned_axes
 from gen_profile.planner.planner import Planner

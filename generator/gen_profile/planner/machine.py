@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array, Interpolant, bend, interpolate
+from gen_profile.motion.profile import Array
+from gen_profile.planner.chebyshev import Interpolant, bend, interpolate
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.problem.linearization import Linearization, linearize
 from gen_profile.spec.model import Spec

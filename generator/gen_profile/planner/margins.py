@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from gen_profile.planner.chebyshev import Array
+from gen_profile.motion.profile import Array
 from gen_profile.planner.machine import (
     SensedDirection,
     linearized,

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
+from gen_profile.motion.profile import Array
+from gen_profile.planner.chebyshev import Interpolant, interpolate
 from gen_profile.planner.machine import (
     DEGREES,
     MOST_TERMS,

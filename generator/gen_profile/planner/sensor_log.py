@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array
+from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
 
 TIME, VALUE = "time_s", "value"

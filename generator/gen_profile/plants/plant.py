@@ -197,6 +197,10 @@ class Plant:
         """Nominal value of every parameter, by name."""
         return {parameter.name: parameter.nominal for parameter in self.parameters}
 
-    def probe_places(self) -> list[float]:
-        """Where the axes can stand for a trial of the equations: off zero, where a radius may vanish."""
-        return [min(max(1.0, axis.lower), axis.upper) for axis in self.actuated]
+    def probe(self) -> tuple[list[float], SimpleNamespace]:
+        """Tell with which places of the axes and parameters the equations can be tried.
+
+        Off zero, where a radius may vanish.
+        """
+        places = [min(max(1.0, axis.lower), axis.upper) for axis in self.actuated]
+        return places, SimpleNamespace(**self.nominal())

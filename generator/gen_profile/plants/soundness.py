@@ -3,7 +3,6 @@
 import re
 from collections import Counter
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -52,8 +51,7 @@ def _form(plant: Plant) -> Iterator[str]:
 def _values(plant: Plant) -> Iterator[str]:
     """Evaluate the equations at rest, with the nominal parameters."""
     n_u, m, loads = len(plant.unactuated), len(plant.actuated), len(plant.loads)
-    p = SimpleNamespace(**plant.nominal())
-    probe = plant.probe_places()
+    probe, p = plant.probe()
     try:
         with np.errstate(all="ignore"):
             terms = plant.equations([0.0] * n_u, [0.0] * n_u, probe, [0.0] * m, p)

@@ -26,10 +26,9 @@ SWING, RATE, PUSH = 0.2, 0.5, 1.0  # greatest coordinates, rates and acceleratio
 
 def equation_inconsistencies(plant: Plant) -> Iterator[str]:
     """Say, a clause each, where a machine's equations contradict its bodies; it must have bodies."""
-    p = SimpleNamespace(**plant.nominal())
+    probe, p = plant.probe()
     n_u, m = len(plant.unactuated), len(plant.actuated)
     random = np.random.default_rng(1)
-    probe = np.array(plant.probe_places())
     wrong, gaining = False, False
     for _ in range(STATES):
         q = np.concatenate([random.uniform(-SWING, SWING, n_u), probe])
@@ -53,8 +52,7 @@ def end_load_is_a_body(plant: Plant) -> bool:
     To first order about rest, each of its sways must be how far one of the bodies goes in some horizontal
     direction. A liquid's surface rises as no mass moves.
     """
-    p, n_u = SimpleNamespace(**plant.nominal()), len(plant.unactuated)
-    q_a = list(plant.probe_places())
+    (q_a, p), n_u = plant.probe(), len(plant.unactuated)
 
     def differences(values: Callable[[list[float]], Array]) -> Array:
         ways = [(values(step.tolist()), values((-step).tolist())) for step in NEARBY * np.eye(n_u)]

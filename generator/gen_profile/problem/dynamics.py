@@ -7,9 +7,10 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Mechanics, Plant
 from gen_profile.problem import symbolic as sym
-from gen_profile.problem.symbolic import Array, Function, Symbol
+from gen_profile.problem.symbolic import Function, Symbol
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -115,8 +116,8 @@ def _require_symbols(plant: Plant, made: Dynamics) -> None:
     """
     inputs = {name: getattr(made, name) for name in ("q_u", "dq_u", "q_a", "dq_a", "ddq_a", "p")}
     rest = {name: np.zeros((1, symbols.shape[0])) for name, symbols in inputs.items()}
-    rest["q_a"] = np.array([plant.probe_places()])
-    rest["p"] = parameter_rows(plant, [plant.nominal()])
+    places, parameters = plant.probe()
+    rest |= {"q_a": np.array([places]), "p": parameter_rows(plant, [vars(parameters)])}
     at_rest = Function("at_rest", inputs, sym.column([made.ddq_u, made.outputs]))(*rest.values())
     if np.isnan(at_rest).any():
         raise SpecError(

@@ -1,6 +1,5 @@
 """Whether a motion keeps the limits of its spec."""
 
-import math
 from collections.abc import Iterator
 
 import attrs
@@ -56,18 +55,6 @@ def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tup
     return tuple(
         breach for breach in _demands(limits, command, transient_sway) if breach.found > breach.allowed
     )
-
-
-def rounded_up(value: float, digits: int = 3) -> str:
-    """Write some digits, rounded up: what is called enough must be enough."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
-    return f"{math.ceil(value / unit) * unit:.{digits}g}"
-
-
-def rounded_down(value: float, digits: int = 3) -> str:
-    """Write some digits of a positive number, rounded down: what is called few enough must be."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
-    return f"{math.floor(value / unit) * unit:.{digits}g}"
 
 
 def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_rows
-from gen_profile.problem.symbolic import Array, Function
+from gen_profile.problem.symbolic import Function
 
 SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
 
@@ -90,7 +91,7 @@ def linearize(
     >>> gp.linearize(spec.machine(), spec.plant.parameters).frequencies.round(2)  # rad/s
     array([3.64, 9.02])
     """
-    for name in plant.nominal():
+    for name in (parameter.name for parameter in plant.parameters):
         if not math.isfinite(parameters.get(name, math.nan)):
             raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")
     axes = [0.0] * len(plant.actuated) if q_a is None else q_a
@@ -196,9 +197,7 @@ def _terms(plant: Plant) -> tuple[Function, Function, list[float | None]]:
     moving = sym.column([d.q_u, d.dq_u, d.dq_a])
     at_rest = [sym.at_zero(terms, moving) for terms in (motion, sway)]
     depends = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
-    places = [
-        None if matters else place for matters, place in zip(depends, plant.probe_places(), strict=True)
-    ]
+    places = [None if matters else place for matters, place in zip(depends, plant.probe()[0], strict=True)]
     return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway), places
 
 

@@ -17,15 +17,17 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import eigenvalues_at
 from gen_profile.problem.problem import Problem
 from gen_profile.problem.sampling import halton
-from gen_profile.problem.symbolic import Array
 
+Ranges = Mapping[str, tuple[float, float]]  # least and greatest values of parameters
 Phases = Callable[[Array], Array]  # of every mode in rad at the end of the motion, (places, modes)
 Shares = Callable[[Array], Array]  # of their limits that several figures take up, (places, figures)
 
+MOST_TRACED = 3  # ranges whose machines are all followed in full, which takes much longer than peaks alone
 TURN = 0.6  # rad by which phases may differ between neighbours on a line
 FEWEST = 9  # places on a line
 FINE = 513  # places at which a line's phases are found
@@ -73,7 +75,7 @@ class Box:
 
     plant: Plant
     nominal: Mapping[str, float]
-    ranges: Mapping[str, tuple[float, float]]
+    ranges: Ranges
     ends: Sequence[Sequence[float]]
     duration: float
 
@@ -110,7 +112,7 @@ def _frequencies(plant: Plant, machines: bytes, ends: tuple[tuple[float, ...], .
     return np.asarray(np.mean(frequencies, axis=0))
 
 
-def box_of(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> Box | None:
+def box_of(problem: Problem, ranges: Ranges) -> Box | None:
     """State the box of some ranges, least and greatest values, for a problem's move; none where none is wide.
 
     Parameters
@@ -130,16 +132,30 @@ def box_of(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> Box |
     )
 
 
-def machines_inside(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> list[dict[str, float]]:
-    """List the parameters of machines all over some ranges, for a problem's move; none of no ranges.
+def ends(ranges: Ranges) -> list[dict[str, float]]:
+    """List the corners of some ranges, of many the two extreme ones, and the ends of each range by itself."""
+    meeting = corners(ranges)
+    if len(ranges) > MOST_TRACED:
+        meeting = [meeting[0], meeting[-1]]
+    alone = [{name: end} for name, (low, high) in ranges.items() for end in (high, low)]
+    return [*meeting, *alone] if len(ranges) > 1 else meeting
 
-    Parameters
-    ----------
-    problem : Problem
-    ranges : mapping of str to (float, float)
-        Least and greatest values.
-    """
-    box = box_of(problem, ranges)
+
+def corners(ranges: Ranges) -> list[dict[str, float]]:
+    """List the corners of some ranges, from all upper ends to all lower ones; none of no ranges."""
+    meeting = product(*((high, low) for low, high in ranges.values()))
+    return [dict(zip(ranges, corner, strict=True)) for corner in meeting if corner]
+
+
+def machines_of(problem: Problem) -> list[dict[str, float]]:
+    """List the parameters of machines at the ends of a problem's ranges and within, the nominal one first."""
+    nominal = dict(problem.parameters)
+    return [nominal, *({**nominal, **shifted} for shifted in ends(problem.ranges)), *machines_inside(problem)]
+
+
+def machines_inside(problem: Problem) -> list[dict[str, float]]:
+    """List the parameters of machines all over a problem's ranges, for its move; none of no ranges."""
+    box = box_of(problem, problem.ranges)
     return [] if box is None else box.parameters(start(box.phases, len(box.ranges), FEW).places)
 
 

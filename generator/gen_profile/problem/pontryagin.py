@@ -22,12 +22,13 @@ from functools import cached_property, lru_cache
 import attrs
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import Dynamics, dynamics
 from gen_profile.problem.problem import Effort
 from gen_profile.problem.sensitivities import swing_equations
-from gen_profile.problem.symbolic import Array, Function, Symbol
+from gen_profile.problem.symbolic import Function, Symbol
 
 SNAP_TIME = 0.02  # s; weighs snap against jerk: ½ (j² + (0.02 s · snap)²)
 

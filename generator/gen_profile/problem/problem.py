@@ -60,6 +60,8 @@ class Problem:
     sway_spread : float
         How many times the nominal machine's sway on the way the worst one's is, for which the limit holds.
     worst_case : WorstCase or None
+    ranges : mapping of str to (float, float)
+        Least and greatest values of the parameters of all machines for which the limit of sway holds.
     initial : mapping of str to float
         What swings at the start: unactuated coordinates by name, and their rates as ``NAME.rate``. It is what
         was measured, so no parameter changes it, and its sensitivities are zero.
@@ -81,6 +83,7 @@ class Problem:
     limits: LimitsSpec = attrs.field(factory=LimitsSpec)
     sway_spread: float = 1.0
     worst_case: WorstCase | None = None
+    ranges: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
     initial: Mapping[str, float] = attrs.field(factory=dict)
     final_velocity: tuple[float, ...] = attrs.field()
 
@@ -126,6 +129,7 @@ def problem_of(spec: Spec) -> Problem:
         order=robustness.order,
         limits=spec.limits,
         worst_case=worst_case,
+        ranges=spec.checked_ranges(),
         effort=spec.cost.effort,
         sway_weight=spec.cost.sway_weight,
         sway_scale=spec.cost.sway_scale,

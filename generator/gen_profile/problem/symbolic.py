@@ -14,9 +14,9 @@ from typing import Any
 import attrs
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gen_profile.motion.profile import Array
+
 Symbol = Any  # casadi.SX
 
 if hasattr(casadi.GlobalOptions, "setNumpyMode"):

@@ -7,10 +7,9 @@ import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 
-from gen_profile.errors import Code, InfeasibleProblem, Reason
+from gen_profile.errors import Code, InfeasibleProblem, Reason, rounded_up
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import rounded_up
 from gen_profile.shapers.base_moves import QUINTIC, BaseMove
 from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
 
@@ -66,7 +65,7 @@ class ShapedMove:
 
     def too_short(self, duration: float, least: float) -> InfeasibleProblem:
         """Say that a duration in s leaves too little time to move in, and what the least is."""
-        least = float(rounded_up(least, digits=4))
+        least = rounded_up(least, digits=4)
         template = (
             "move.duration: the {name} shaper's delay is {delay:.4g} s for this machine, so "
             "{duration:g} s leaves too little time to move. No less than {least:g} s can do, and the check "

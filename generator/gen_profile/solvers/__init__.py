@@ -1,1 +1,1 @@
-"""Optimal motions: which method solves which problem, and how least values are searched."""
+"""From a spec to a motion, optimal or shaped: methods, search for least values, and what else would do."""

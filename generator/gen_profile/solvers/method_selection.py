@@ -19,7 +19,7 @@ from gen_profile.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.search import Search
-from gen_profile.solvers.solution import WIDER, Solution, Status
+from gen_profile.solvers.solution import SIMPLER, WIDER, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.values import SolverName
 from gen_profile.work import afford
@@ -69,8 +69,7 @@ def attempt(
 
 def given_up(problem: Problem) -> Solution:
     """Tell that a problem takes too much work."""
-    advice = "See whether all numbers of the spec are in its units; else change the duration or limits."
-    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, advice=advice)
+    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, advice=SIMPLER)
 
 
 def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution:

@@ -1,6 +1,7 @@
 """What every solver returns: the optimal motion, or the reason why there is none."""
 
 import math
+from collections.abc import Iterable
 from enum import Enum
 
 import attrs
@@ -13,6 +14,7 @@ from gen_profile.summary import Summarised
 LONGER = "Allow more time (move.duration), or shorten the move."
 WIDER = "Allow more time (move.duration), or wider limits."
 LATER = "Allow more time (move.duration)."
+SIMPLER = "See whether all numbers of the spec are in its units; else change the duration or limits."
 HORIZONTAL = math.pi / 2.0  # rad; beyond, a rope would go slack
 
 
@@ -144,10 +146,12 @@ class Solution(Summarised):
             With the status's sentence and what to change.
         """
         if self.optimum is None:
-            error: type[NoMotion] = SolverDiverged if self.status in UNKNOWN else InfeasibleProblem
-            raise error(
-                *filter(None, [self.status.value, self.advice]),
-                reasons=[Reason(code=Code[self.status.name])],
-                suggestions=self.suggestions,
-            )
+            raise no_motion(self.status, self.advice, self.suggestions)
         return self.optimum
+
+
+def no_motion(status: Status, advice: str, suggestions: Iterable[Suggestion] = ()) -> NoMotion:
+    """Say how a solve ended that found no motion, and what to change."""
+    error: type[NoMotion] = SolverDiverged if status in UNKNOWN else InfeasibleProblem
+    sentences = filter(None, [status.value, advice])
+    return error(*sentences, reasons=[Reason(code=Code[status.name])], suggestions=suggestions)

@@ -1,7 +1,7 @@
 """The machine that simulated drives move: its FMU, behind the drives' port `Load`."""
 
 from collections.abc import Sequence
-from typing import Self
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gen_profile_exporters.can.sensor_frame import frame_of
 from gen_profile_fmu.running.stepping import SteppedPlant
 
 
-class CraneLoad:
+class CraneLoad(AbstractContextManager["CraneLoad"]):
     """The nominal machine of a spec, at rest at the start of its move; a context manager.
 
     Parameters
@@ -53,9 +53,6 @@ class CraneLoad:
             max_step=max_step(spec, machines[0]),
             progress=progress,
         )
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._fmu.close()

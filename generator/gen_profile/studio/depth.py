@@ -11,9 +11,9 @@ from gen_profile.charts.robustness import curves_figure, maps_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import ComparedMethod, Comparison, compare
 from gen_profile.comparison.robustness import error_grid, robustness_of
-from gen_profile.designs.plan import plan
 from gen_profile.errors import GenProfileError
 from gen_profile.motion.profile import Profile
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.orders import Question

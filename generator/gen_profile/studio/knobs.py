@@ -4,7 +4,9 @@ A knob's words are looked up by its key in ``assets/words.json``; only a machine
 """
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -18,32 +20,9 @@ from gen_profile.spec.values import Bounds
 from gen_profile.units import RATES
 
 REACH = 4.0  # times the value to begin with, up to which a slider goes, and down to which share of it
-UNITS = {
-    "move.duration": "s",
-    "actuator.tau": "s",
-    "cost.sway_scale": "1/m",
-    "limits.sway": "m",
-    "check.residual_sway": "m",
-    "check.path.latency": "s",
-    "check.path.jitter": "s",
-    "check.path.quantum": "m",
-    "check.wind.force": "N",
-    "export.cycle_time": "s",
-    "planner.quick_stop": "m/s²",
-    "planner.quick_stop_jerk": "m/s³",
-    "can.bitrate": "bit/s",
-    "can.sync_period": "s",
-    "can.torque_per_acceleration": "‰ s²/m",
-    "can.timeout": "s",
-    "can.start_tolerance": "m",
-    "can.following_error": "m",
-    "can.quick_stop": "m/s²",
-}
-USUAL = {"cost.sway_weight": 50.0, "actuator.tau": 0.1, "cost.sway_scale": 50.0, "check.samples": 100.0}
-USUAL |= {"planner.quick_stop": 1.0, "planner.quick_stop_jerk": 10.0, "can.torque_per_acceleration": 1.0}
-USUAL |= {"can.timeout": 0.02, "can.following_error": 0.01, "can.quick_stop": 1.0}
-LEFT_OUT = {"can.vendor", "can.product"}  # numbers of one drive, which are no knobs
-LEFT_OUT |= {"check.foreign", "check.default", "check.uncertain", "check.path.lag", "export.csv_columns"}
+_TABLES = tomllib.loads((Path(__file__).parents[1] / "lists" / "knobs.toml").read_text("utf-8"))
+UNITS: Mapping[str, str] = _TABLES["units"]
+USUAL: Mapping[str, float] = _TABLES["usual"]
 
 
 @attrs.frozen(kw_only=True)
@@ -159,7 +138,7 @@ def _fields(table: Any, place: str, *, words: str = "", name: str = "") -> Itera
     kinds: Any = type(table)
     for key, kind in kinds_of(kinds).items():
         knob = _field(kind)
-        if knob is None or f"{place}.{key}" in LEFT_OUT:
+        if knob is None or f"{place}.{key}" in _TABLES["left_out"]:
             continue
         label = f"{words or place}.{key}"
         usual = {"unit": UNITS.get(label, ""), "usual": USUAL.get(label)}

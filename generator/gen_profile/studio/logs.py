@@ -10,7 +10,6 @@ import numpy as np
 
 from gen_profile.charts.figure import Figure
 from gen_profile.charts.identification import identification_figure
-from gen_profile.designs.plan import draft
 from gen_profile.errors import GenProfileError, InfeasibleProblem, OutputError
 from gen_profile.evaluation.motion_evaluation import sketch
 from gen_profile.identification.estimation import CONFIDENCE
@@ -20,6 +19,7 @@ from gen_profile.identification.measurements import SwingLog, cut_swing
 from gen_profile.report.log import MeasuredLog, column_meanings, parse_log
 from gen_profile.report.measured import compare_measured
 from gen_profile.report.measured_section import measured_section, measured_verdict
+from gen_profile.solvers.plan import draft
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json

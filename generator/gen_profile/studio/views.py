@@ -13,7 +13,6 @@ import numpy as np
 
 from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.comparison.candidates import own_method
-from gen_profile.designs.plan import Plan, draft, judged
 from gen_profile.errors import GenProfileError, NoMotion, SpecError
 from gen_profile.evaluation.demands import demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
@@ -23,6 +22,7 @@ from gen_profile.phrase import PLACED, Phrase
 from gen_profile.problem.limits import ROUNDING
 from gen_profile.report.animation import animation
 from gen_profile.solvers.method_selection import ANSWER
+from gen_profile.solvers.plan import Plan, draft, judged
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import plausibility_warnings

@@ -16,15 +16,15 @@ from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
+from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec, spec_from_dict
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable
-from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
-from gen_profile.verification.external_fmu import judge_external
-from gen_profile.verification.monte_carlo import with_further
+from gen_profile.verification.cosimulation import cosimulate, sample_spacing
+from gen_profile.verification.judging import verdict
 from gen_profile.verification.setpoint_path import lag_of, path_taken
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
@@ -280,24 +280,18 @@ def _verdict(
 
     Holding velocity over a cycle errs with the cycle's square, so setpoints of twice the cycle tell how much.
     """
-    resolution = float(setpoints.resolution.max())
-    if spec.check.foreign is not None:
-        check = judge_external(spec, spec.check.foreign, setpoints, rows)
-        return attrs.evolve(check, error_bound=check.error_bound + resolution)
-    further = [row for row in rows if not row.followed]
-    # where a single scenario is asked for, the nominal machine tells what cycles err by
-    machines = [row for row in rows if row.followed] or scenarios(spec)[:1]
-    spacing = sample_spacing(spec, setpoints)
     followed = _of_even_cycles(setpoints, spec)
-    responses = cosimulate(spec, followed, machines, output_step=spacing, progress=progress)
     # every second setpoint, the first and the last among them
     coarser = attrs.evolve(followed, cycle_time=2.0 * followed.cycle_time, position=followed.position[::2])
-    expected = cosimulate(spec, coarser, machines, output_step=spacing, by_fmpy=False)
-    check = judge(spec, setpoints, machines, responses, expected, followed=followed)
-    check = attrs.evolve(check, error_bound=check.error_bound + resolution)
-    if len(rows) == len(further):
-        check = attrs.evolve(check, findings=())
-    return with_further(spec, setpoints, check, further, progress)
+
+    def half_as_often(machines: Sequence[Scenario], _: Sequence[Response]) -> Sequence[Sway]:
+        spacing = sample_spacing(spec, setpoints)
+        return cosimulate(spec, coarser, machines, output_step=spacing, by_fmpy=False)
+
+    resolution = float(setpoints.resolution.max())
+    return verdict(
+        spec, setpoints, rows, half_as_often, followed=followed, resolution=resolution, progress=progress
+    )
 
 
 def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -15,20 +16,9 @@ from gen_profile.suggestion import suggestion
 # what is no hardware of this computer: who looks for its channels has to ask the network, or finds any number
 NOT_HARDWARE = {"virtual", "udp_multicast", "socketcand"}
 
-SERIAL = "install pyserial: pip install 'python-can[serial]'"
-NEEDS = {  # what python-can's interfaces take, beside their hardware
-    "socketcan": "bring it up as Linux knows it: ip link set {channel} up type can bitrate 500000 "
-    "(to try things out: ip link add dev vcan0 type vcan, ip link set vcan0 up)",
-    "pcan": "install PEAK's PCAN-Basic library (channels are called PCAN_USBBUS1, …)",
-    "kvaser": "install Kvaser's CANlib (channels are 0, 1, …)",
-    "vector": "install Vector's XL Driver Library, on Windows (channels are 0, 1, …)",
-    "ixxat": "install HMS Ixxat's VCI driver, on Windows (channels are 0, 1, …)",
-    "slcan": SERIAL,
-    "serial": SERIAL,
-    "seeedstudio": SERIAL,
-    "robotell": SERIAL,
-    "gs_usb": "install its library: pip install 'python-can[gs-usb]'",
-}
+_LINES = Path(__file__).with_name("interfaces.txt").read_text("utf-8").splitlines()
+# what python-can's interfaces take, beside their hardware
+NEEDS = {name: words for name, _, words in (line.partition(": ") for line in _LINES)}
 UNKNOWN_NEEDS = "see python-can's documentation for what it needs"
 
 

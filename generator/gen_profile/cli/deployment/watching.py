@@ -14,14 +14,8 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gen_profile.deployment.block_state import (
-    AT_VELOCITY,
-    MOVING,
-    TO_POSITION,
-    BlockState,
-    MotionState,
-    PlannerState,
-)
+from gen_profile.deployment import block_state
+from gen_profile.deployment.block_state import BlockState, MotionState, PlannerState
 from gen_profile.deployment.table import PlannerTable
 from gen_profile.deployment.watching.judge import Watched
 from gen_profile.deployment.watching.run_so_far import so_far
@@ -131,7 +125,7 @@ def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
 
 
 def _moves(state: BlockState) -> bool:
-    return state.phase == MOVING or bool((state.velocity != 0.0).any())
+    return state.phase == block_state.MOVING or bool((state.velocity != 0.0).any())
 
 
 @contextmanager
@@ -184,7 +178,7 @@ def _head(figures: dict[str, Any]) -> str:
         head = f", {figures['time']:.2f} of {figures['duration']:.2f} s, rate {figures['rate']:.3g}"
         return f"{head}, timing changed" if figures["changed"] else head
     commanded = ", ".join(f"{value:.6g}" for value in figures["commanded"])
-    words = {TO_POSITION: f", to {commanded}", AT_VELOCITY: f", stick at {commanded}"}
+    words = {block_state.TO_POSITION: f", to {commanded}", block_state.AT_VELOCITY: f", stick at {commanded}"}
     head = words.get(figures["command"], "")
     if figures["to_go"] > 0.0:
         head += f", {figures['to_go']:.1f} s to go"

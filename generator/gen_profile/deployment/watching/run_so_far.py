@@ -6,15 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gen_profile.deployment.block_state import (
-    AT_VELOCITY,
-    DISABLED,
-    MOVING,
-    NO_COMMAND,
-    TO_POSITION,
-    MotionState,
-    PlannerState,
-)
+from gen_profile.deployment import block_state
+from gen_profile.deployment.block_state import MotionState, PlannerState
 from gen_profile.deployment.table import BlockTable, PlannerTable
 from gen_profile.motion.profile import Array
 
@@ -60,7 +53,7 @@ class MotionSoFar:
             self._begun = (state.runs, state.motion)
             self._begin(state.motion)
         cycle: int = min(state.cycle, len(self.times) - 1)
-        if state.phase == MOVING:
+        if state.phase == block_state.MOVING:
             self.seen[:, cycle] = state.position, state.velocity
         return {
             "changed": state.off_nominal,
@@ -101,13 +94,13 @@ class PlannerSoFar:
             values[:] = np.roll(values, -gone, axis=1)
             values[:, len(self.times) - gone :] = np.nan
         self.seen[:, -1] = state.position, state.velocity
-        command = state.command if state.phase != DISABLED else NO_COMMAND
-        self.planned[0, -1] = state.target if command == TO_POSITION else np.nan
-        self.planned[1, -1] = state.speed if command == AT_VELOCITY else np.nan
+        command = state.command if state.phase != block_state.DISABLED else block_state.NO_COMMAND
+        self.planned[0, -1] = state.target if command == block_state.TO_POSITION else np.nan
+        self.planned[1, -1] = state.speed if command == block_state.AT_VELOCITY else np.nan
         return {
             "promise": state.promise,
             "command": command,
-            "commanded": (state.target if command == TO_POSITION else state.speed).tolist(),
+            "commanded": (state.target if command == block_state.TO_POSITION else state.speed).tolist(),
             "to_go": state.time_to_go,
         }
 

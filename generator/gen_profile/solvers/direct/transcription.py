@@ -24,17 +24,15 @@ from functools import cached_property
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gen_profile.motion.profile import Array
 from gen_profile.problem.motion_equations import MotionEquations
-from gen_profile.solvers.collocation import GAUSS, STAGES
+from gen_profile.solvers.collocation import GAUSS, STAGES, IntArray
 from gen_profile.solvers.direct.bezier import Piece
 from gen_profile.solvers.direct.condensing import AxesMap, IntervalMaps, interval_maps
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
 
-IntArray = NDArray[np.intp]
 QUINTIC_PEAKS = np.array([1.0, 1.9, 5.8, 60.0])  # of position, velocity, acceleration and jerk
 
 

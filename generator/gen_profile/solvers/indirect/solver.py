@@ -31,7 +31,7 @@ from gen_profile.solvers.indirect.boundary_value_problem import (
     with_sway_cost,
     without,
 )
-from gen_profile.solvers.indirect.extremal import METHOD, failure, judged, too_steep
+from gen_profile.solvers.indirect.extremal import failure, judged, too_steep
 from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
 from gen_profile.solvers.indirect.refinement import refine
 from gen_profile.solvers.indirect.simplified_newton import solve_simplified
@@ -41,6 +41,7 @@ INTERVALS = 30  # at least
 RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
 COARSER = 2.5  # times as long are intervals to begin with
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
+MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 
 
 def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
@@ -79,11 +80,6 @@ def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
     if refined.solution is None or weighted.greatest_angle(refined.solution) > HORIZONTAL:
         return failure(problem, blamed, iterations, LONGER)
     return judged(problem, weighted, refined.solution, iterations, refined.residual or costed.residual)
-
-
-__all__ = ["METHOD", "solve"]
-
-MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 
 
 @one_thread()

@@ -11,15 +11,14 @@ from functools import partial
 
 import attrs
 
-from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.motion.profile import Profile
-from gen_profile.problem.parameter_box import machines_inside
+from gen_profile.problem.parameter_box import machines_of
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct.relaxation import Relaxed
-from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution, Status
@@ -58,50 +57,46 @@ def attempt(
     problem = attrs.evolve(problem_of(spec), sway_spread=spread)
     if near is not None and spec.solver.solver != "indirect":
         begun = partial(choice.attempt, method="direct", near=near)
-        return _kept(spec, problem, begun, NEARLY_ACCEPTED, progress)
-    return kept_by_all(spec, problem, spec.solver.solver, progress)
+        return _kept(problem, begun, NEARLY_ACCEPTED, progress)
+    return kept_by_all(problem, spec.solver.solver, progress)
 
 
 def kept_by_all(
-    spec: Spec,
     problem: Problem,
     method: SolverName,
     progress: Progress = no_progress,
     *,
     coarse: bool = False,
 ) -> Solution:
-    """Solve a problem again with less sway of the nominal machine, until all of a spec's keep the limit.
+    """Solve a problem again with less sway of the nominal machine, until all in its ranges keep the limit.
 
     How much less is measured on motions on few intervals first.
 
     Parameters
     ----------
-    spec : Spec
     problem : Problem
-        Of that spec, or with other limits, another duration, or whatever else it asks for.
     method : str
     progress : Progress
     coarse : bool
         On few intervals only.
     """
-    if not limited(spec, problem) or (method == "indirect" and problem.worst_case is None):
+    if not limited(problem) or (method == "indirect" and problem.worst_case is None):
         return choice.attempt(problem, method, coarse=coarse)  # the indirect method knows no limits
     if coarse or problem.worst_case is None:
-        solution = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
-        if coarse or solution.optimum is None or solution.method == indirect.METHOD:
+        solution = _kept(problem, partial(choice.attempt, method=method, coarse=True))
+        if coarse or solution.optimum is None or solution.method == INDIRECT:
             return solution
         problem = attrs.evolve(problem, sway_spread=solution.problem.sway_spread)
     # where it finds a motion, so does "auto", and it is the quicker to fail
-    return _kept(spec, problem, partial(choice.attempt, method="direct"), NEARLY_ACCEPTED, progress)
+    return _kept(problem, partial(choice.attempt, method="direct"), NEARLY_ACCEPTED, progress)
 
 
-def limited(spec: Spec, problem: Problem) -> bool:
+def limited(problem: Problem) -> bool:
     """Whether a limit of the sway on the way holds for machines that may sway more than the nominal one."""
-    return problem.limits.sway is not None and bool(spec.checked_ranges())
+    return problem.limits.sway is not None and bool(problem.ranges)
 
 
 def _kept(
-    spec: Spec,
     problem: Problem,
     solve: Callable[[Problem], Solution],
     accepted: float = ACCEPTED,
@@ -115,9 +110,9 @@ def _kept(
             progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
         solution = solve(attrs.evolve(problem, sway_spread=spread))
         solutions.append(solution)
-        if solution.optimum is None or not limited(spec, problem):
+        if solution.optimum is None or not limited(problem):
             return -math.inf  # where no motion sways so little, none sways less
-        nominal, worst = sways(spec, problem, optimal_profile(solution))
+        nominal, worst = sways(problem, optimal_profile(solution))
         if _is_accepted(problem, nominal, worst, accepted):
             return -math.inf
         if worst == math.inf:
@@ -134,27 +129,24 @@ def _is_accepted(problem: Problem, nominal: float, worst: float, accepted: float
     return worst <= max(accepted * (problem.limits.sway or 0.0), nominal) < math.inf
 
 
-def keeps_sway(spec: Spec, solution: Solution, accepted: float) -> bool:
-    """Whether no machine of a spec's ranges sways more on the way than so many times the limit."""
+def keeps_sway(solution: Solution, accepted: float) -> bool:
+    """Whether no machine of its problem's ranges sways more on the way than so many times the limit."""
     problem = solution.problem
-    return not limited(spec, problem) or _is_accepted(
-        problem, *sways(spec, problem, optimal_profile(solution)), accepted
-    )
+    return not limited(problem) or _is_accepted(problem, *sways(problem, optimal_profile(solution)), accepted)
 
 
-def spread(spec: Spec, solution: Solution) -> float:
+def spread(solution: Solution) -> float:
     """Tell how many times as much as the nominal machine the worst one sways in a motion; 1 where unknown."""
-    if not limited(spec, solution.problem) or solution.optimum is None:
+    if not limited(solution.problem) or solution.optimum is None:
         return 1.0
-    nominal, worst = sways(spec, solution.problem, optimal_profile(solution))
+    nominal, worst = sways(solution.problem, optimal_profile(solution))
     return worst / nominal if 0.0 < nominal <= worst < math.inf else 1.0
 
 
-def sways(spec: Spec, problem: Problem, motion: Profile) -> tuple[float, float]:
+def sways(problem: Problem, motion: Profile) -> tuple[float, float]:
     """Find the greatest sway of the end load during a motion in m: nominal, and of the worst machine."""
-    inside = machines_inside(problem, spec.checked_ranges())
-    machines = [*(row.parameters for row in scenarios(spec)), *inside]
+    machines = machines_of(problem)
     greatest = greatest_sway(
-        spec.machine(), motion, machines, spec.move.initial, accuracy=ACCURACY, samples=SAMPLES
+        problem.plant, motion, machines, problem.initial, accuracy=ACCURACY, samples=SAMPLES
     )
     return float(greatest[0]), float(greatest.max())

@@ -5,17 +5,17 @@ from functools import partial
 
 import attrs
 
-from gen_profile.designs.transient_sway import sways
-from gen_profile.errors import Code, InfeasibleProblem, Reason
+from gen_profile.errors import Code, InfeasibleProblem, Reason, rounded_up
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Profile, grid_duration
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
+from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.shaped_move import ShapedMove, shaped_move, too_short
 from gen_profile.solvers.search import Search, least
+from gen_profile.solvers.transient_sway import sways
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import FAST
 
@@ -73,7 +73,7 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
         sentences, reasons = [one.sentence() for one in broken], [one.reason() for one in broken]
         shortest = shortest_duration(spec, shaped)
         if shortest is not None:
-            least = float(rounded_up(shortest, digits=4))
+            least = rounded_up(shortest, digits=4)
             sentences.append(Phrase("With this shaper the move takes at least {least:g} s.", least=least))
             reasons.append(too_short(move.duration, least))
         raise InfeasibleProblem(*sentences, reasons=reasons)
@@ -109,5 +109,5 @@ def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
-    nominal, worst = sways(spec, problem_of(spec), motion)
+    nominal, worst = sways(problem_of(spec), motion)
     return breaches(spec.limits, command, max(nominal, worst / SWAY_TOLERANCE))

@@ -4,17 +4,15 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.designs.draft import Draft, solved
-from gen_profile.designs.shortest import shortest
-from gen_profile.designs.suggestions import explained, remedy
 from gen_profile.errors import LimitViolation
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Profile
-from gen_profile.problem.problem import problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.draft import Draft, solved
+from gen_profile.solvers.shortest import shortest
+from gen_profile.solvers.solution import SIMPLER, Solution, Status, no_motion
+from gen_profile.solvers.suggestions import explained, remedy
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.summary import Drawable
@@ -87,9 +85,8 @@ def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
     try:
         with budget(*choice.ANSWER):
             return judged(draft(spec, progress), progress)
-    except OutOfWork:
-        choice.given_up(problem_of(spec)).raise_for_status()
-        raise
+    except OutOfWork as error:
+        raise no_motion(Status.GIVEN_UP, SIMPLER) from error
 
 
 def draft(spec: Spec, progress: Progress = no_progress) -> Draft:
@@ -121,7 +118,7 @@ def judged(drafted: Draft, progress: Progress = no_progress) -> Plan:
     if drafted.motion is None:
         assert drafted.solution is not None  # a shaper has a motion, or raises
         progress(EXPLAINING)
-        drafted = attrs.evolve(drafted, motion=optimal_profile(explained(spec, drafted.solution)))
+        explained(spec, drafted.solution).raise_for_status()
     if drafted.broken:
         progress(EXPLAINING)
         better = remedy(spec)

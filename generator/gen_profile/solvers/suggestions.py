@@ -12,15 +12,15 @@ from typing import Any, TypeVar
 
 import attrs
 
-from gen_profile.designs import transient_sway
-from gen_profile.designs.draft import Draft, drafted, suggested
-from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion
+from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion, rounded_up
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import SWAY_TOLERANCE, rounded_up
-from gen_profile.problem.problem import problem_of
+from gen_profile.problem.limits import SWAY_TOLERANCE
+from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import Relaxation, least_duration, time_dependent_limits
-from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.draft import Draft, drafted, suggested
+from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import LONGER, Solution, Status
 from gen_profile.spec.model import Spec
@@ -102,7 +102,7 @@ def solve(spec: Spec) -> Solution:
 
 def explained(spec: Spec, solution: Solution) -> Solution:
     """Find out what would help where a solve failed, unless the indirect method knows."""
-    known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.advice != LONGER
+    known = solution.method == INDIRECT and not spec.limits.stated() and solution.advice != LONGER
     if solution.optimum is not None:
         return solution
     if known:
@@ -136,7 +136,7 @@ def remedy(
             known = remedy(spec.changed(method), spread, in_time=in_time, options=options)
             return attrs.evolve(known, suggestions=beside(method, known.suggestions))
         return Remedy()
-    relaxation = _relaxation(spec, spread)
+    relaxation = _relaxation(problem_of(spec), spread)
     problem = relaxation.problem
     needed, longer, others = None, None, list[Suggestion | None]()
     stated = problem.limits.stated()
@@ -174,7 +174,7 @@ def beside(values: Mapping[str, Any], suggestions: Iterable[Suggestion]) -> tupl
 
 def sufficient_duration(spec: Spec) -> Suggestion | None:
     """Find the least duration in s, no less than a spec's, that works, in most of the work that is left."""
-    relaxation = _relaxation(spec, 1.0)
+    relaxation = _relaxation(problem_of(spec))
     needed = _in_time(partial(least_duration, relaxation), USUAL.fraction_later)
     if not needed:
         return None
@@ -190,32 +190,29 @@ def tried(spec: Spec, *, coarse: bool = False, options: SuggestionOptions = USUA
         return choice.given_up(problem)
     if spec.solver.solver != "direct" and problem.worst_case is None:
         smooth = afford(partial(choice.attempt, problem, "indirect"), options.at_once)
-        if smooth is not None and (smooth.status is Status.INFEASIBLE or _kept(spec, smooth)):
+        if smooth is not None and (smooth.status is Status.INFEASIBLE or _kept(smooth)):
             return smooth
     if coarse:  # whether there is a motion does not depend on what it costs
         problem = attrs.evolve(problem, sway_weight=0.0)
-    solution = transient_sway.kept_by_all(spec, problem, "direct", coarse=coarse)
-    if solution.optimum is None or transient_sway.keeps_sway(spec, solution, SWAY_TOLERANCE):
+    solution = transient_sway.kept_by_all(problem, "direct", coarse=coarse)
+    if solution.optimum is None or transient_sway.keeps_sway(solution, SWAY_TOLERANCE):
         return solution
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
-def _kept(spec: Spec, solution: Solution) -> bool:
-    return choice.keeps_limits(solution) and transient_sway.keeps_sway(
-        spec, solution, transient_sway.ACCEPTED
-    )
+def _kept(solution: Solution) -> bool:
+    return choice.keeps_limits(solution) and transient_sway.keeps_sway(solution, transient_sway.ACCEPTED)
 
 
-def _relaxation(spec: Spec, spread: float) -> Relaxation:
-    known = spread if spread > 1.0 else usual_spread(spec)
-    return Relaxation(attrs.evolve(problem_of(spec), sway_spread=known))
+def _relaxation(problem: Problem, spread: float = 1.0) -> Relaxation:
+    known = spread if spread > 1.0 else usual_spread(problem)
+    return Relaxation(attrs.evolve(problem, sway_spread=known))
 
 
-def usual_spread(spec: Spec) -> float:
+def usual_spread(problem: Problem) -> float:
     """Tell how many times as much the worst machine sways on the way in a motion with wider limits."""
-    problem = problem_of(spec)
-    nearest = choice.least_violation(problem) if transient_sway.limited(spec, problem) else None
-    return 1.0 if nearest is None else transient_sway.spread(spec, nearest.solution)
+    nearest = choice.least_violation(problem) if transient_sway.limited(problem) else None
+    return 1.0 if nearest is None else transient_sway.spread(nearest.solution)
 
 
 def least_change(
@@ -293,7 +290,7 @@ def _longer(
     """Find the least duration that works, in s, rounded up to three digits."""
 
     def change(factor: float) -> Mapping[str, Any]:
-        return {"move.duration": float(rounded_up(factor * needed))}
+        return {"move.duration": rounded_up(factor * needed)}
 
     most = options.most if time_dependent_limits(relaxation.problem) else options.most_later
     options = attrs.evolve(options, most=most, farther=options.farther_later)
@@ -357,7 +354,7 @@ def _in_time(find: Callable[[], Found], fraction: float) -> Found | None:
 def _times(value: Any, factor: float) -> Any:
     """Widen a limit so many times, travel by as much at either end; rounded outwards."""
     if not isinstance(value, tuple):
-        return float(rounded_up(factor * value))
+        return rounded_up(factor * value)
     low, high = value
-    more = float(rounded_up((factor - 1.0) * (high - low)))
+    more = rounded_up((factor - 1.0) * (high - low))
     return (float(f"{low - more:.9g}"), float(f"{high + more:.9g}"))

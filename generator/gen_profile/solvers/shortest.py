@@ -5,18 +5,17 @@ from contextlib import suppress
 
 import attrs
 
-from gen_profile.designs import transient_sway
-from gen_profile.designs.draft import Draft, drafted, in_cycles, lasting, solved
-from gen_profile.designs.shape import shaped_motion
-from gen_profile.designs.suggestions import beside, remedy, sufficient_duration
-from gen_profile.errors import Code, InfeasibleProblem, Reason, SolverDiverged
+from gen_profile.errors import Code, InfeasibleProblem, Reason, SolverDiverged, rounded_up
 from gen_profile.phrase import Phrase
-from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed, refined
+from gen_profile.solvers.draft import Draft, drafted, in_cycles, lasting, solved
 from gen_profile.solvers.search import Search, least, slope_of
+from gen_profile.solvers.shape import shaped_motion
+from gen_profile.solvers.suggestions import beside, remedy, sufficient_duration
 from gen_profile.spec.model import Spec
 from gen_profile.work import OutOfWork, budget, left, spend
 
@@ -60,12 +59,13 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
     if spec.solver.shaper is not None:
         motion = shaped_motion(spec, spec.solver.shaper)
         return Draft(spec=lasting(spec, motion.duration), solution=None, motion=motion)
+    problem = problem_of(spec)
     try:
         with budget(SEARCHING):
-            least = _within_sway(spec, *_within_limits(spec, progress), progress)
+            least = _within_sway(spec, *_within_limits(spec, problem, progress), progress)
     except OutOfWork as error:
         spend(0.0)
-        longer = sufficient_duration(_slow(spec))
+        longer = sufficient_duration(_slow(spec, problem))
         raise SolverDiverged(
             Phrase("move.duration: the search for the shortest duration was given up, for it took too long."),
             Phrase("State a duration in s, or fewer limits."),
@@ -83,21 +83,20 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
     return least
 
 
-def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
+def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Problem, Relaxed]:
     """Find the shortest motion within the limits, and the problem with the spread that machines have then."""
-    problem = problem_of(spec)
-    swayed = transient_sway.limited(spec, problem)
+    swayed = transient_sway.limited(problem)
     least = choice.minimum_time(problem, progress, search=ROUGHLY if swayed else SHORTEST)
     with suppress(OutOfWork), budget(SPREADING * left()):
         for _ in range(SPREADS):
             if least is None or not swayed:
                 break
-            more = transient_sway.spread(spec, least.solution)
+            more = transient_sway.spread(least.solution)
             swayed = abs(more - problem.sway_spread) > NEARLY * more
             problem = attrs.evolve(problem, sway_spread=more)
             least = choice.minimum_time(problem, progress, least)
     if least is None:
-        slow = _slow(spec)
+        slow = _slow(spec, problem)
         duration = {"move.duration": slow.move.duration}
         better = beside(duration, remedy(slow, in_time=True).suggestions)
         advice = Phrase("Widen the limits, or see whether all numbers of the spec are in its units.")
@@ -159,6 +158,6 @@ def _drafted(spec: Spec, relaxed: Relaxed) -> Draft:
     return drafted(lasting(spec, in_cycles(spec, relaxed.duration)), relaxed.solution)
 
 
-def _slow(spec: Spec) -> Spec:
+def _slow(spec: Spec, problem: Problem) -> Spec:
     """Give a spec so much time that it is not the time that it lacks."""
-    return lasting(spec, float(rounded_up(SLOW * choice.usual_duration(problem_of(spec)))))
+    return lasting(spec, rounded_up(SLOW * choice.usual_duration(problem)))

@@ -8,15 +8,15 @@ from typing import Any
 
 import attrs
 
-from gen_profile.designs import transient_sway
-from gen_profile.designs.shape import shaped_motion
-from gen_profile.errors import Code, CosimulationError, InfeasibleProblem, Suggestion
+from gen_profile.errors import Code, CosimulationError, InfeasibleProblem, Suggestion, rounded_up
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
 from gen_profile.motion.profile import Profile, grid_duration
-from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
+from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches
 from gen_profile.progress import Progress, no_progress
+from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import Relaxed
 from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.shape import shaped_motion
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 
@@ -103,7 +103,7 @@ def _shaped(spec: Spec, shaper: str) -> Draft:
         least = error.least_duration
         if least is not None:
             limited = any(one.code is Code.LIMIT_BROKEN for one in error.reasons)
-            duration = float(rounded_up(least if limited else ROOM * least, digits=4))
+            duration = rounded_up(least if limited else ROOM * least, digits=4)
             if duration > spec.move.duration:
                 error.suggestions = _longer_shaped(lasting(spec, duration), shaper)
         raise
