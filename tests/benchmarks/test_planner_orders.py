@@ -21,10 +21,12 @@ PAPER = (
     "planner.live={L1=[0.3, 0.6]}",
     "check.residual_sway=0.01",
 )
+SLOW = "limits={velocity=2.0, acceleration=0.2, jerk=0.5, travel=[0.0, 80.0]}"
 MACHINES = {
     "bay, 4 ms": ("bay-crane", ()),
     "bay, 4 ms, quick controller": ("bay-crane", ("planner.operations=60000",)),
     "bay, 20 ms": ("bay-crane", ("export.cycle_time=0.02",)),
+    "slow drive, 4 ms": ("bay-crane", (SLOW,)),
     "paper, 1 ms": ("paper", PAPER),
 }
 
@@ -88,7 +90,7 @@ def _orders(axis, random):
         axis.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
         starts = axis.hold(3.0 * period, fVelocityCommand=speed)
         soonest = quickest(axis.promise, state, speed=speed, travel=limits.travel)
-        if soonest:
+        if soonest and starts["bInVelocity"].any():
             reached = np.argmax(starts["bInVelocity"] > 0.0) * axis.cycle
             yield f"stick to {speed / limits.velocity:.0%}", reached / soonest[0], 1.0
         axis.hold(6.0 * period, bVelocity=0.0, bStop=1.0)

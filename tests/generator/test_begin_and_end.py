@@ -16,7 +16,7 @@ from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
 
 SWUNG = {"theta1": 0.06, "theta2": -0.04, "theta1.rate": -0.1, "theta2.rate": 0.15}
-SOLVERS = pytest.mark.parametrize("solver", [indirect, direct], ids=lambda module: module.METHOD)
+SOLVERS = pytest.mark.parametrize("solver", [indirect, direct], ids=["indirect", "direct"])
 
 
 def sways(motion, p, initial, watch=2.0, step=2.5e-3):
