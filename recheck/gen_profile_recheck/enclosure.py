@@ -60,9 +60,9 @@ def prove(
     NotProvedError
     """
     least, span = min(claim.bound for claim in claims), sum((2 * one.half for one in pieces), start=arb(0))
-    for missed, growth in (ROUGH, FINE):
+    for share, growth in (ROUGH, FINE):
         taken = {name: pieces[0].few_terms() for name in ("defect", "growth", "sway")}
-        effort = Effort(missed * least, growth / span, missed * least / span, taken)
+        effort = Effort(share * least, growth / span, share * least / span, taken)
         try:
             error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
             for number, piece in enumerate(pieces):
@@ -110,7 +110,10 @@ class PieceProof:
         ------
         NotProvedError
         """
-        fits, taken = lambda missed: bool(self.scale.length(missed) < self.room), self.effort.taken["defect"]
+        fits, taken = (
+            lambda residual: bool(self.scale.length(residual) < self.room),
+            self.effort.taken["defect"],
+        )
         found = self.piece.bounded(self._defect, fits, taken)
         defect = self.beside.in_rates(list(map(wide, found)), -1)
         lengths = (self.scale.length(self.beside.in_rates(one)) for one in [defect, *self.beside.terms])
@@ -136,7 +139,7 @@ class PieceProof:
         if not room > 0 or square(self.beside.state)[0] <= room * room:
             return bool(room > 0)
         most, taken = self.effort.sway * claim.bound, self.effort.taken["sway"]
-        (sway,) = self.piece.enclosed(square, lambda missed: bool(missed[0] < most), taken)
+        (sway,) = self.piece.enclosed(square, lambda residual: bool(residual[0] < most), taken)
         return keeps(sway, (room * room).lower())
 
     def _step(self, error: arb, source: arb) -> tuple[arb, arb, list[arb]]:
@@ -170,7 +173,9 @@ class PieceProof:
             return [(changed[i][j] + changed[j][i]) * half for i in indices for j in indices if j <= i]
 
         most, taken = self.effort.growth / (2 * n), self.effort.taken["growth"]
-        found = iter(self.piece.enclosed(symmetric, lambda missed: all(one < most for one in missed), taken))
+        found = iter(
+            self.piece.enclosed(symmetric, lambda residual: all(one < most for one in residual), taken)
+        )
         entry = {(i, j): next(found) for i in indices for j in indices if j <= i}
         sides = ([entry[max(i, j), min(i, j)].size for j in indices if j != i] for i in indices)
         greatest = reduce(arb.max, (sum(row, start=entry[i, i].upper) for i, row in enumerate(sides)))

@@ -75,7 +75,7 @@ class ScaleMatrix:
             return [one - less * (i == j) for i, row in enumerate(rows) for j, one in enumerate(row)]
 
         taken = self.piece.few_terms()
-        found = self.piece.enclosed(times, lambda missed: all(one < MISSED for one in missed), taken)
+        found = self.piece.enclosed(times, lambda residual: all(one < MISSED for one in residual), taken)
         return _norm([[one.size for one in found[row : row + n]] for row in range(0, n * n, n)])
 
     def changed(self, lower: Matrix, places: Places) -> Matrix:
