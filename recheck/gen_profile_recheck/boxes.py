@@ -10,8 +10,8 @@ derivative of T_k is greater on [−1, 1] than at 1. One such series tells how m
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from dataclasses import dataclass, field
+from functools import cache, cached_property, reduce
 from itertools import chain, product
 from math import log, pi
 from types import SimpleNamespace
@@ -24,6 +24,9 @@ from gen_profile_recheck.jets import along, moved, parts_of
 from gen_profile_recheck.machines import INNER, Machine, Posture, carried
 
 Values = list[Any]
+Function = Callable[["MachineState"], Values]
+Fits = Callable[[list[arb]], bool]  # tells whether what series miss, one of each function, is little
+FEW_TERMS, MOST_TERMS = 3, 20  # of a variable
 
 
 class Places(tuple[Any, ...]):
@@ -125,9 +128,9 @@ def _anywhere(count: int, variable: int | None, terms: int) -> Places:
 
 @cache
 def node_values(terms: tuple[int, ...], counts: tuple[int, ...]) -> arb_mat:
-    """Matrix with the products of Chebyshev's polynomials of all parameters at all nodes, (terms, nodes)."""
+    """Matrix with the products of Chebyshev's polynomials of all parameters at all nodes, (nodes, terms)."""
     return kronecker(
-        arb_mat([[chebyshev_value(k, x) for x in nodes(count)] for k in range(size)])
+        arb_mat([[chebyshev_value(k, x) for k in range(size)] for x in nodes(count)])
         for size, count in zip(terms, counts, strict=True)
     )
 
@@ -144,7 +147,7 @@ def _greatest(counts: tuple[int, ...], variable: int | None, terms: int) -> arb_
 @cache
 def interpolation(count: int) -> arb_mat:
     """Matrix from values at nodes to coefficients."""
-    return node_values((count,), (count,)).inv().transpose()
+    return node_values((count,), (count,)).inv()
 
 
 def kronecker(matrices: Any) -> arb_mat:
@@ -198,10 +201,13 @@ class MotionPiece:
     half: arb
     axes: Sequence[AxisPiece]
     series: Sequence[arb_mat]
+    sizes: Sequence[arb_mat]  # their absolute values
+    _taken: dict[int, tuple[int, MachineState]] = field(default_factory=dict)
 
     @cached_property
-    def _sizes(self) -> list[arb_mat]:
-        return [arb_mat([[abs(one) for one in row] for row in series.tolist()]) for series in self.series]
+    def _powers(self) -> list[arb_mat]:
+        """Give series in powers of time, (parameter × time terms)."""
+        return [(in_powers(one.nrows()) * one).transpose() for one in self.series]
 
     def _axes(self, at: Callable[[arb_poly], Any]) -> list[Values]:
         values, polynomials = [], [one.smooth for one in self.axes]
@@ -213,11 +219,10 @@ class MotionPiece:
     def at_nodes(self, counts: tuple[int, ...], terms: int) -> Iterator[MachineState]:
         """Take series of time at every node of the parameters."""
         ctx.cap, n = terms + 1, len(self.series) // 2  # a slope takes a term
-        at = [in_powers(one.nrows()) * one * node_values(self.box.terms, counts) for one in self.series]
-        columns = [one.transpose().tolist() for one in at]
+        at = [(node_values(self.box.terms, counts) * one).tolist() for one in self._powers]
         axes = self._axes(lambda poly: arb_series(poly.coeffs(), terms + 1))
         for number, places in enumerate(grid(counts)):
-            x = [arb_series(column[number], terms + 1) for column in columns]
+            x = [arb_series(rows[number], terms + 1) for rows in at]
             k = self.box.constants(places)
             here = self.box.machine.at(x[:n], axes[0], k)
             y = x[:n] + carried(x[n:], here.inputs, axes[1])
@@ -233,7 +238,7 @@ class MotionPiece:
         time = arb_mat([[1] * times, [k * k for k in range(times)]])
         if variable == 0:
             time = in_powers(times, 1, terms + 1)
-        for sizes, series in zip(self._sizes, self.series, strict=True):
+        for sizes, series in zip(self.sizes, self.series, strict=True):
             found = (time * sizes * parameters).tolist()
             value, rate = [row[0] for row in found][:terms], [n * row[0] for n, row in enumerate(found)][1:]
             if variable != 0:
@@ -256,26 +261,67 @@ class MotionPiece:
         slope = slope[:n] + [along(one, INNER) for one in speed]
         return MachineState(x, y, slope, self.box.machine.at(x[:n], a, k), axes, k, places)
 
-    def enclosed(
-        self, function: Callable[[MachineState], Values], fits: Callable[[list[arb]], bool], most: int = 20
-    ) -> list[Expansion]:
-        """Enclose functions of the motions, with as many terms of each variable as what they miss fits."""
-        counts, rests, amplified = list[int](), [], arb(1)
-        for variable in [*range(1, 1 + len(self.box.terms)), 0]:  # time is the last one
-            late = [_coefficients(one, most + 1) for one in function(self.around(variable, most + 1))]
-            for count in range(1, most + 1):
-                factor = amplified * (arb(2) ** (1 - count) if variable else 1)
-                if fits(residual := [abs(one[count]) * factor for one in late]):
-                    break
-            counts.append(count)
-            rests.append(residual)
-            amplified *= 1 + 2 / pi * log(count) + 1e-9
+    def few_terms(self) -> list[int]:
+        """Give as many terms of each variable as may be tried first; time is the last one."""
+        return [FEW_TERMS] * (1 + len(self.box.terms))
+
+    def _anywhere(self, variable: int, terms: int) -> MachineState:
+        """Take series of a variable about any place, of so many terms at least, that may have been taken."""
+        if self._taken.get(variable, (0,))[0] < terms:
+            self._taken[variable] = terms, self.around(variable, terms)
+        ctx.cap = terms
+        return self._taken[variable][1]
+
+    def enclosed(self, function: Function, fits: Fits, taken: list[int]) -> list[Expansion]:
+        """Enclose functions of the motions, with as many terms of each variable as what they miss fits.
+
+        So many were `taken` a piece before; it is changed to those that are taken now.
+        """
+        rests, amplified = self._take_terms(function, fits, taken)
+        matrices, found = [*map(interpolation, taken[:-1]), from_powers(taken[-1])], list[Expansion]()
+        for rows, rest in zip(self._tables(function, taken), rests, strict=True):
+            # what values are off would be in every coefficient, but is amplified by interpolation only
+            off = reduce(arb.max, (sum((one.rad() for one in row), start=arb(0)) for row in rows))
+            table = transformed(matrices, [one.mid() for one in chain(*rows)])
+            found.append(Expansion(table, tuple(taken), (rest + off * amplified).abs_upper()))
+        return found
+
+    def bounded(self, function: Function, fits: Fits, taken: list[int]) -> list[arb]:
+        """Bound absolute values of functions likewise, by what they are at nodes at most."""
+        rests, amplified = self._take_terms(function, fits, taken)
+        inner = from_powers(taken[-1]).transpose()
+        found = ((arb_mat(one) * inner).tolist() for one in self._tables(function, taken))
+        greatest = (reduce(arb.max, (sum(map(abs, row), start=arb(0)) for row in rows)) for rows in found)
+        return [one * amplified + rest for one, rest in zip(greatest, rests, strict=True)]
+
+    def _tables(self, function: Function, counts: Sequence[int]) -> Iterator[Sequence[Values]]:
+        """List coefficients of time of each function, a row for each node of the parameters."""
         *own, terms = counts
-        rows = [[_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(own), terms)]
-        matrices = [*map(interpolation, own), from_powers(terms)]
-        tables = (transformed(matrices, list(chain(*one))) for one in zip(*rows, strict=True))
-        sums = (sum(one, start=arb(0)).abs_upper() for one in zip(*rests, strict=True))
-        return [Expansion(one, tuple(counts), rest) for one, rest in zip(tables, sums, strict=True)]
+        every = ([_coefficients(one, terms) for one in function(s)] for s in self.at_nodes(tuple(own), terms))
+        return zip(*every, strict=True)
+
+    def _take_terms(self, function: Function, fits: Fits, taken: list[int]) -> tuple[list[arb], arb]:
+        """Find how many terms fit; what they miss, and by how much parameters' nodes amplify values."""
+        rests, amplified = [], arb(1)
+        for place, near in enumerate(taken, start=1):
+            variable = place if place < len(taken) else 0  # time is the last one
+            taken[place - 1], residual = self._enough(function, fits, variable, amplified, near)
+            rests.append(residual)
+            if variable:
+                amplified *= 1 + 2 / pi * log(taken[place - 1]) + 1e-9
+        return [sum(one, start=arb(0)).abs_upper() for one in zip(*rests, strict=True)], amplified
+
+    def _enough(
+        self, function: Function, fits: Fits, variable: int, factor: arb, near: int
+    ) -> tuple[int, list[arb]]:
+        """Find how many terms of a variable miss what fits, from about so many on, and what these miss."""
+        for most in (min(near + 2, MOST_TERMS), MOST_TERMS):
+            late = [_coefficients(one, most + 1) for one in function(self._anywhere(variable, most + 1))]
+            for count in range(max(1, near - 2), most + 1):
+                less = factor * (arb(2) ** (1 - count) if variable else 1)
+                if fits(residual := [abs(one[count]) * less for one in late]):
+                    return count, residual
+        return most, residual
 
 
 def _coefficients(value: Any, terms: int) -> list[arb]:

@@ -248,7 +248,8 @@ class Case:
         def prove_box(number: int) -> None:
             box = MachineBox(self.machine, self.parameters, self.ranges, proof.parts[number], proof.terms)
             motion = zip(halves, zip(*axes, strict=True), proof.motion(number), strict=True)
-            prove([MotionPiece(box, *one) for one in motion], list(proof.scales(number)), start, claims)
+            pieces = [MotionPiece(box, half, own, *series) for half, own, series in motion]
+            prove(pieces, list(proof.scales(number)), start, claims)
 
         if processes == 1 or len(numbers) == 1 or "fork" not in get_all_start_methods():
             for done, _ in enumerate(map(prove_box, numbers), start=1):

@@ -6,7 +6,7 @@ d|S e|/dt ≤ μ |S e| + |S ∂y/∂x defect|, μ the logarithmic norm of S (∂
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -21,9 +21,11 @@ from gen_profile_recheck.machines import carried
 from gen_profile_recheck.reading import NotProvedError, require
 from gen_profile_recheck.scales import Matrix, ScaleMatrix, norm
 
-MISSED = 2.0**-11  # of a bound, that all that series leave out may be worth
-GROWTH = 2.0**-2  # by whose exponential errors may grow for what series of the growth leave out
 ATTEMPTS, WIDER = 12, 2
+
+
+# what all that series leave out may be worth of a bound, and in the exponent by which errors grow
+ROUGH, FINE = (2.0**-8, 2.0), (2.0**-11, 0.25)
 
 
 @dataclass(frozen=True)
@@ -35,24 +37,46 @@ class SwayClaim:
     bound: float
 
 
+@dataclass(frozen=True)
+class Effort:
+    """What series may leave out of sways, of the growth of errors and of their rate (as sway per second).
+
+    `taken` tells how many terms of each variable a function took in the piece before.
+    """
+
+    sway: float
+    growth: arb
+    rate: arb
+    taken: Mapping[str, list[int]]
+
+
 def prove(
     pieces: Sequence[MotionPiece], scales: Sequence[Any], start: Sequence[float], claims: Sequence[SwayClaim]
 ) -> None:
-    """Prove the bounds of all sways of the machines of a box, piece after piece.
+    """Prove the bounds of all sways of the machines of a box, roughly where that will do.
 
     Raises
     ------
     NotProvedError
     """
-    error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
     least, span = min(claim.bound for claim in claims), sum((2 * one.half for one in pieces), start=arb(0))
-    for number, piece in enumerate(pieces):
-        if 0 < number < len(scales):
-            before, scale = scale, ScaleMatrix(piece, scales[number])
-            error *= scale.change(before)
-        proof = PieceProof(piece, scale, [claim for claim in claims if number >= claim.first], least, span)
-        error += scale.length(proof.beside.leap(_leap(pieces, number, start), at_start=number == 0))
-        error = proof.error_after(error)
+    for share, growth in (ROUGH, FINE):
+        taken = {name: pieces[0].few_terms() for name in ("defect", "growth", "sway")}
+        effort = Effort(share * least, growth / span, share * least / span, taken)
+        try:
+            error, scale = arb(0), ScaleMatrix(pieces[0], scales[0])
+            for number, piece in enumerate(pieces):
+                if 0 < number < len(scales):
+                    before, scale = scale, ScaleMatrix(piece, scales[number])
+                    error *= scale.change(before)
+                due = [claim for claim in claims if number >= claim.first]
+                proof = PieceProof(piece, scale, due, effort)
+                leap = proof.beside.leap(_leap(pieces, number, start), at_start=number == 0)
+                error = proof.error_after(error + scale.length(leap))
+            return
+        except (NotProvedError, ValueError, ArithmeticError) as error_met:
+            cause = error_met
+    raise NotProvedError(str(cause)) from cause
 
 
 def _leap(pieces: Sequence[MotionPiece], number: int, start: Sequence[float]) -> list[arb]:
@@ -69,15 +93,15 @@ def _leap(pieces: Sequence[MotionPiece], number: int, start: Sequence[float]) ->
 
 
 class PieceProof:
-    """The proof for a piece, where series may miss little of the least bound and over the span of time."""
+    """The proof for a piece."""
 
     def __init__(
-        self, piece: MotionPiece, scale: ScaleMatrix, claims: Sequence[SwayClaim], least: float, span: arb
+        self, piece: MotionPiece, scale: ScaleMatrix, claims: Sequence[SwayClaim], effort: Effort
     ) -> None:
-        self.piece, self.scale, self.claims, self.beside = piece, scale, claims, Disturbance(piece)
-        self.machine, self.n = piece.box.machine, len(piece.series) // 2
+        self.piece, self.scale, self.claims, self.effort = piece, scale, claims, effort
+        self.beside, self.machine, self.n = Disturbance(piece), piece.box.machine, len(piece.series) // 2
         lever = reduce(arb.max, self._away([arb(0)] * 2 * self.n, arb(1)))
-        self.room, self.least, self.span = least / lever / span, least, span
+        self.room = effort.rate / lever
 
     def error_after(self, error: arb) -> arb:
         """Bound the error at the end by that at the beginning, and all sways.
@@ -86,35 +110,37 @@ class PieceProof:
         ------
         NotProvedError
         """
-        outputs = self.piece.enclosed(self._defect_and_sways, self._misses_little)
-        defect = self.beside.in_rates([wide(one.size) for one in outputs[: 2 * self.n]], -1)
+        fits, taken = (
+            lambda residual: bool(self.scale.length(residual) < self.room),
+            self.effort.taken["defect"],
+        )
+        found = self.piece.bounded(self._defect, fits, taken)
+        defect = self.beside.in_rates(list(map(wide, found)), -1)
         lengths = (self.scale.length(self.beside.in_rates(one)) for one in [defect, *self.beside.terms])
         error, greatest, off = self._step(error, sum(lengths, start=arb(0)) * 2 * self.piece.half)
         away = self._away(off, greatest)
-        for claim, sway in zip(self.claims, outputs[2 * self.n :], strict=True):
-            room = claim.bound - norm(away[claim.loads])
-            single = len(away[claim.loads]) == 1
-            kept = room > 0 and keeps(sway, (room if single else room * room).lower())
+        for claim in self.claims:
+            kept = self._keeps(claim, claim.bound - norm(away[claim.loads]))
             require(kept, f"a sway is not bounded by {1e3 * claim.bound:.6g} mm")
         return error
 
-    def _defect_and_sways(self, s: MachineState) -> Values:
+    def _defect(self, s: MachineState) -> Values:
         dq = s.y[self.n :]
         _, v, dv = s.axes
         rates = dq + carried(s.posture.drift(dq, v), s.posture.inputs, dv)
-        entries = [one - two for one, two in zip(s.slope, rates, strict=True)]
-        sways = s.posture.sways()
-        for claim in self.claims:
-            own = sways[claim.loads]
-            entries.append(own[0] if len(own) == 1 else sum(one * one for one in own))
-        return entries
+        return [one - two for one, two in zip(s.slope, rates, strict=True)]
 
-    def _misses_little(self, residual: Sequence[arb]) -> bool:
-        """Tell whether what series of the defect and sways miss is little beside bounds."""
-        length = self.scale.length(residual[: 2 * self.n])
-        return length < MISSED * self.room and all(
-            one < MISSED * self.least**2 for one in residual[2 * self.n :]
-        )
+    def _keeps(self, claim: SwayClaim, room: arb) -> bool:
+        """Tell whether the approximate motion's sway is proved to be at most so much."""
+
+        def square(s: MachineState) -> Values:
+            return [sum(one * one for one in s.posture.sways()[claim.loads])]
+
+        if not room > 0 or square(self.beside.state)[0] <= room * room:
+            return bool(room > 0)
+        most, taken = self.effort.sway * claim.bound, self.effort.taken["sway"]
+        (sway,) = self.piece.enclosed(square, lambda residual: bool(residual[0] < most), taken)
+        return keeps(sway, (room * room).lower())
 
     def _step(self, error: arb, source: arb) -> tuple[arb, arb, list[arb]]:
         """Assume that errors keep below something, and prove it: the last, the greatest, of all entries."""
@@ -138,21 +164,24 @@ class PieceProof:
         n, indices, half = self.n, range(2 * self.n), arb(0.5)
         tube = [one + two for one, two in zip(off, self.beside.in_rates(self.beside.shift), strict=True)]
 
-        def matrix(s: MachineState) -> Matrix:
+        def lower(s: MachineState) -> Matrix:
             y = [one + two for one, two in zip(s.y, tube, strict=True)]
-            lower = derivatives(lambda q, dq: self.machine.bend(q, dq, s.axes, s.k), y[:n], y[n:])
-            return [[int(i + n == j) for j in indices] for i in range(n)] + lower
+            return derivatives(lambda q, dq: self.machine.bend(q, dq, s.axes, s.k), y[:n], y[n:])
 
         def symmetric(s: MachineState) -> Values:
-            changed = self.scale.times(matrix(s), s)
+            changed = self.scale.changed(lower(s), s.places)
             return [(changed[i][j] + changed[j][i]) * half for i in indices for j in indices if j <= i]
 
-        most = GROWTH / (2 * n * self.span)
-        found = iter(self.piece.enclosed(symmetric, lambda rest: all(one < most for one in rest), 12))
+        most, taken = self.effort.growth / (2 * n), self.effort.taken["growth"]
+        found = iter(
+            self.piece.enclosed(symmetric, lambda residual: all(one < most for one in residual), taken)
+        )
         entry = {(i, j): next(found) for i in indices for j in indices if j <= i}
         sides = ([entry[max(i, j), min(i, j)].size for j in indices if j != i] for i in indices)
         greatest = reduce(arb.max, (sum(row, start=entry[i, i].upper) for i, row in enumerate(sides)))
-        return greatest + self.scale.gap * self.scale.size(matrix(self.beside.state))
+        whole: list[Values] = [[int(i + n == j) for j in indices] for i in range(n)]
+        whole += map(list, lower(self.beside.state))
+        return greatest + self.scale.gap * self.scale.size(whole)
 
     def _away(self, off: Sequence[arb], error: arb) -> list[arb]:
         """Bound by how much sways of all loads differ from those of the approximate motion."""

@@ -227,23 +227,26 @@ class ProofMaterial:
             entries = [own[first : first + terms] for first in range(0, len(own), terms)]
             yield [entries[first : first + n] for first in range(0, len(entries), n)]
 
-    def motion(self, box: int) -> Iterator[list[arb_mat]]:
-        """Give the series of every coordinate, (time terms × parameter terms), piece by piece."""
+    def motion(self, box: int) -> Iterator[tuple[list[arb_mat], list[arb_mat]]]:
+        """Give the series of every coordinate (time × parameter terms), and their sizes, piece by piece."""
         packed = dict(self.motions[box])
         quanta, (pieces, n, times, terms) = packed.pop("quanta"), packed["shape"]
         fits = (pieces, n, terms) == (self.pieces, self.coordinates, prod(self.terms)) and 0 < times <= 16
         require(fits, "motions that do not fit")
         whole = _unpacked(packed, "q")
         require(max(map(abs, whole)) < GREATEST, "coefficients whose sums are not exact")
-        require(
-            len(quanta) == n and all(frexp(one)[0] == 0.5 for one in quanta),
-            "quanta that are no powers of two",
-        )
+        powers = len(quanta) == n and all(frexp(one)[0] == 0.5 for one in quanta)
+        require(powers, "quanta that are no powers of two")
         each = times * terms
         for piece in range(pieces):
             own = whole[piece::pieces]
-            columns = (own[first : first + each] for first in range(0, n * each, each))
-            yield [arb_mat(times, terms, list(one)) * unit for one, unit in zip(columns, quanta, strict=True)]
+            columns = [list(own[first : first + each]) for first in range(0, n * each, each)]
+            sizes = ([abs(entry) for entry in column] for column in columns)
+            series, greatest = (
+                [arb_mat(times, terms, one) * unit for one, unit in zip(each_one, quanta, strict=True)]
+                for each_one in (columns, sizes)
+            )
+            yield series, greatest
 
 
 def _unpacked(packed: Mapping[str, Any], kind: str) -> Sequence[Any]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache, reduce
-from itertools import chain, product
+from itertools import product
 from math import prod
 from typing import Any
 
@@ -62,27 +62,30 @@ class ScaleMatrix:
             for row in (kronecker(map(interpolation, counts)) * values).transpose().tolist()
         ]
         self.nearly = PolynomialMatrix([columns[row : row + n] for row in range(0, n * n, n)], counts)
-        self.unit = [[int(i == j) for j in range(n)] for i in range(n)]
-        self.gap = self._norm(lambda s: self.times(self.unit, s), 1)
+        self.gap = self._norm(self, 1)
         require(self.gap < 1, "a matrix of scales that is nearly singular")
-        self.rows = [norm(row) for row in self.per_length(self.unit)]
+        self.rows = [norm([one / (1 - self.gap) for one in row]) for row in self.nearly.most]
 
-    def _norm(self, matrix: Callable[[MachineState], Matrix], less: int) -> arb:
-        """Bound the norm of a function of the parameters, less so many times the unit."""
-        n, away = len(self.unit), [less * one for row in self.unit for one in row]
-        found = self.piece.enclosed(
-            lambda s: [one - two for one, two in zip(chain(*matrix(s)), away, strict=True)],
-            lambda residual: all(one < MISSED for one in residual),
-        )
+    def _norm(self, before: ScaleMatrix, less: int) -> arb:
+        """Bound the norm of S times the K of another, less so many times the unit."""
+        n = len(self.scale.entries)
+
+        def times(s: MachineState) -> Values:
+            rows = multiplied(self.scale.at(s.places), before.nearly.at(s.places))
+            return [one - less * (i == j) for i, row in enumerate(rows) for j, one in enumerate(row)]
+
+        taken = self.piece.few_terms()
+        found = self.piece.enclosed(times, lambda residual: all(one < MISSED for one in residual), taken)
         return _norm([[one.size for one in found[row : row + n]] for row in range(0, n * n, n)])
 
-    def times(self, matrix: Matrix, s: MachineState, before: ScaleMatrix | None = None) -> Matrix:
-        """Give S times a matrix times K, which may be another one's."""
-        return multiplied(multiplied(self.scale.at(s.places), matrix), (before or self).nearly.at(s.places))
+    def changed(self, lower: Matrix, places: Places) -> Matrix:
+        """Give S J K at places, where J has such rows below those of (0, 1)."""
+        scale, nearly = self.scale.at(places), self.nearly.at(places)
+        return multiplied(scale, [*nearly[len(lower) :], *multiplied(lower, nearly)])
 
     def change(self, before: ScaleMatrix) -> arb:
         """Bound the norm of this S times the inverse of another."""
-        return self._norm(lambda s: self.times(self.unit, s, before), 0) / (1 - before.gap)
+        return self._norm(before, 0) / (1 - before.gap)
 
     def length(self, vector: Sequence[arb]) -> arb:
         """Bound the length of S times a vector of balls."""

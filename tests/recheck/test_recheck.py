@@ -11,7 +11,7 @@ import forgeries
 import numpy as np
 import pytest
 from certificates import certified, contents
-from flint import arb
+from flint import arb, arb_poly
 
 import gen_profile as gp
 from gen_profile.certificate.arithmetic.balls import ball
@@ -341,6 +341,31 @@ def test_quintics_have_the_values_at_their_ends():
     assert [[float(one) for one in row] for row in ends] == pytest.approx(
         np.array([[1, 3], [-2, 0.5], [4, -1]])
     )
+
+
+def test_what_values_are_off_by_counts_once_and_bounds_at_nodes_hold_between_them(quick, monkeypatch):
+    """Where it was in every coefficient, growth was bounded too roughly, and no error could be large."""
+    pieces = []
+    monkeypatch.setattr("gen_profile_recheck.check.prove", lambda given, *_: pieces.extend(given))
+    check(*contents(*quick))
+    (piece, *_), off = pieces, 1e-3
+
+    def terms():
+        return [6, 6]
+
+    def exact(s):
+        return [s.x[0]]
+
+    def rough(s):
+        return [s.x[0] + arb(0, off)]
+
+    (one,), (other,) = (piece.enclosed(each, lambda _: True, terms()) for each in (exact, rough))
+    amplified = 1 + 2 / np.pi * np.log(6)
+    assert float(other.size) <= float(one.size) + 1.001 * off * amplified
+    (bound,) = piece.bounded(exact, lambda _: True, terms())
+    motions = [arb_poly(list(s.x[0])) for s in piece.at_nodes((9,), 12)]
+    greatest = max(float(abs(one(arb(t)))) for t in (-1, 0.3, 1) for one in motions)
+    assert 0 < greatest <= float(bound) < 10 * float(one.size)
 
 
 def test_a_greatest_value_is_found_by_halves():

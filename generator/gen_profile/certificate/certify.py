@@ -26,6 +26,7 @@ LEAST_POWER, WIDEST = 1e-6, 0.5  # what they leave out where motions change litt
 PLACES = 17  # along a range, at which phases are looked at
 SLACK = 1e-3  # relative, by which a bound is stated higher than found, as other rounding could break it
 NEAR = 1e-5  # of what is allowed: a smooth motion that is as near to the axes' is near enough
+LOOSEST = 0.05  # of the move: more that is allowed does not tell what is near enough
 
 Progress = Callable[[int, int], None]
 
@@ -295,7 +296,8 @@ def _prepared(
     fastest = float(box.phases(np.concatenate([0.5 * whole[None], *_lines(none, whole)])).max())
     longest = options.radians_per_piece * box.duration / fastest
     limits = limits_of(spec)
-    near = NEAR * min(limit.allowed for limit in limits)
+    farthest = float(np.abs(np.subtract(spec.move.target, spec.move.start)).max())
+    near = NEAR * min(*(limit.allowed for limit in limits), LOOSEST * farthest or np.inf)
     axes = fitted(track, max(0.6 * float(setpoints.resolution.max()), near), longest, watch)
     theorem = Theorem(
         spec=spec,

@@ -38,6 +38,7 @@ FEW = 64  # likewise, where machines cost more
 STARTS = 8  # of local searches for each figure
 APART = 2.5  # steps between two starts
 ROUNDS = 8  # of a local search along one range, and two more for each further one
+NEAR_END = 0.1  # of a range: as near to an end a search looks at the end, too
 POLLS = 4096  # places that all local searches may look at, however many ranges there are
 
 
@@ -231,7 +232,9 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
     shares = _remembering(shares)
     values, ranges = shares(begun.places), begun.places.shape[1]
     rounds = ROUNDS + 2 * (ranges - 1)
-    starts = min(STARTS, max(POLLS // (rounds * (2 * ranges + 1) * values.shape[1]) - keep, keep))
+    starts = min(
+        STARTS, max(POLLS // (rounds * (2 * ranges + 1) * values.shape[1]) - (3 + ranges) * keep, keep)
+    )
     chosen = [
         (place, figure)
         for figure, column in enumerate(values.T)
@@ -253,7 +256,17 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
             climbers = climbers.greatest(begun.steps, keep)
         climbers = climbers.polled(shares, np.concatenate([basis, -basis]) * begun.steps)
         tried += (2 * ranges + 1) * len(climbers.best)
-    return climbers.greatest(begun.steps, keep).places, tried
+    climbers = climbers.greatest(begun.steps, keep)
+    if ranges > 1:
+        edges, along = climbers.at_ends(shares), np.concatenate([np.eye(ranges), -np.eye(ranges)])
+        between = (edges.places % 1.0 > 0.0)[:, None]
+        polls = len(edges.best) * (2 * ranges + 1)
+        rounds = min(rounds, POLLS // polls)
+        for _ in range(rounds):
+            edges = edges.polled(shares, along * begun.steps * between)
+        tried += len(edges.best) + rounds * polls
+        climbers = climbers.joined(edges).greatest(begun.steps, keep)
+    return climbers.places, tried
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -270,7 +283,7 @@ class _Climbers:
         """Look in some ways, and on as in the last rounds; go to the greatest figure, or look less far."""
         around = self.places[:, None] + self.reach[:, None, None] * ways
         polls = np.clip(np.concatenate([around, (self.places + self.way)[:, None]], axis=1), 0.0, 1.0)
-        found = shares(polls.reshape(-1, ways.shape[1])).reshape(*polls.shape[:2], -1)
+        found = shares(polls.reshape(-1, ways.shape[-1])).reshape(*polls.shape[:2], -1)
         own = np.take_along_axis(found, self.figure[:, None, None], axis=2)[:, :, 0]
         top, rows = own.argmax(axis=1), np.arange(len(own))
         better = own[rows, top] > self.best
@@ -281,6 +294,26 @@ class _Climbers:
             figure=self.figure,
             reach=np.where(better, np.minimum(2.0 * self.reach, 1.0), 0.5 * self.reach),
             way=places - self.places + 0.5 * self.way,
+        )
+
+    def at_ends(self, shares: Shares) -> _Climbers:
+        """Begin anew with parameters at the ends of their ranges: those that are nearly there, and one more.
+
+        On a ridge the others have to change with it, so that none gets there by itself.
+        """
+        ends, one_more = np.round(self.places), [*np.eye(self.places.shape[1], dtype=bool), False]
+        near = np.abs(self.places - ends) < NEAR_END
+        places = np.concatenate([np.where(near | more, ends, self.places) for more in one_more])
+        figure = np.tile(self.figure, len(one_more))
+        best = shares(places)[np.arange(len(places)), figure]
+        return _Climbers(
+            places=places, best=best, figure=figure, reach=np.ones(len(places)), way=np.zeros_like(places)
+        )
+
+    def joined(self, others: _Climbers) -> _Climbers:
+        """Take others, too."""
+        return _Climbers(
+            **{name: np.concatenate([one, getattr(others, name)]) for name, one in attrs.asdict(self).items()}
         )
 
     def greatest(self, steps: Array, keep: int) -> _Climbers:
