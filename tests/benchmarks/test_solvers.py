@@ -142,7 +142,7 @@ def test_growth_with_intervals(intervals):
         solution = module.solve(problem, options=options)
         spent = time.perf_counter() - began
         print(
-            f"\n{module.__name__.split(".")[-2]:9} {intervals:5} intervals {1e3 * spent:9.1f} ms {memory / 2**20:7.1f} MB "
+            f"\n{solution.method:9} {intervals:5} intervals {1e3 * spent:9.1f} ms {memory / 2**20:7.1f} MB "
             f"{solution.status.name}",
             end="",
         )
@@ -168,7 +168,7 @@ def test_growth_with_states(masses):
         began = time.perf_counter()
         solution = module.solve(problem)
         spent = time.perf_counter() - began
-        print(f"\n{module.__name__.split(".")[-2]:9} {masses:2} masses {1e3 * spent:9.1f} ms {solution.status.name}", end="")
+        print(f"\n{solution.method:9} {masses:2} masses {1e3 * spent:9.1f} ms {solution.status.name}", end="")
 
 
 @pytest.mark.parametrize("names", [(), ("L1",), ("L1", "m2"), ("L1", "L2", "m1", "m2")])
@@ -180,4 +180,4 @@ def test_growth_with_uncertain_parameters(names):
         solution = module.solve(problem)
         spent = time.perf_counter() - began
         left = f", {len(solution.redundant)} of them implied" if solution.redundant else ""
-        print(f"\n{module.__name__.split(".")[-2]:9} {len(names)} parameters{left} {1e3 * spent:9.1f} ms", end="")
+        print(f"\n{solution.method:9} {len(names)} parameters{left} {1e3 * spent:9.1f} ms", end="")
