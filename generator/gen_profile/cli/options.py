@@ -314,7 +314,7 @@ def output_options(command: Command) -> Command:
     @click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks.")
     @wraps(command)
     def careful(*, as_json: bool, **values: Any) -> Any:
-        del as_json  # which is for `print_outcome`
+        # `as_json` is for `print_outcome`
         _require_apart(click.get_current_context())
         return command(**values)
 

@@ -276,7 +276,6 @@ def status_line() -> Iterator[Progress]:
     import shutil
 
     def tell(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
-        del done, total, remark
         width = shutil.get_terminal_size().columns - 1
         click.echo(f"{CLEARED}{stage[:width]}", err=True, nl=False)
 
