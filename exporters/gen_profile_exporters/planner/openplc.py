@@ -11,7 +11,7 @@ OPENPLC = "_openplc.st"
 CYCLE = "fCycleTime"  # is the task's
 STEP = 64  # the first address of the outputs, or a multiple of it behind many inputs
 AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML", "LINT": "ML"}  # coils, memory of 32 and of 64 bits
-NUMBER = BlockVariable(section="VAR_OUTPUT", name="nCycle", type="LINT", comment="so many")
+NUMBER = BlockVariable("VAR_OUTPUT", "nCycle", "LINT", comment="so many")
 
 
 def openplc_files(text: str, file: str) -> tuple[File]:

@@ -63,8 +63,8 @@ def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
         "MC_CamTableSelect. *)\n",
         name=name,
         variables=(
-            BlockVariable(section="VAR_OUTPUT", name="Cam", type="MC_CAM_REF"),
-            BlockVariable(section="VAR", name="aPoints", type=f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
+            BlockVariable("VAR_OUTPUT", "Cam", "MC_CAM_REF"),
+            BlockVariable("VAR", "aPoints", f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
         ),
         body=f"Cam.byType := 3;\nCam.byVarType := 6;\nCam.nElements := {last + 1};\nCam.xStart := 0.0;\n"
         f"Cam.xEnd := {literal(points.time[-1])};\nCam.pce := ADR(aPoints);\n",

@@ -208,13 +208,7 @@ def _read_variable(section: str, element: etree._Element) -> BlockVariable:
     initial = ", ".join(values)
     if array is not None and values:
         initial = f"[{initial}]"
-    return BlockVariable(
-        section=section,
-        name=attribute(element, "name"),
-        type=type_,
-        initial=initial,
-        comment=_text(element),
-    )
+    return BlockVariable(section, attribute(element, "name"), type_, initial=initial, comment=_text(element))
 
 
 def _text(element: etree._Element) -> str:
