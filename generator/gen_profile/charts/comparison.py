@@ -49,7 +49,7 @@ def comparison_figure(comparison: Comparison, every: bool = False) -> Figure:
     )
     spectra = spectrum_panel(comparison.spec, comparison.rows[0].evaluation, motions, styles)
     sways, residuals = _sways(comparison, styles), _residuals(comparison, styles)
-    return Figure(caption=caption, panels=[*_motion(comparison, styles), spectra, *sways, residuals])
+    return Figure(caption, [*_motion(comparison, styles), spectra, *sways, residuals])
 
 
 def compared_styles(comparison: Comparison, every: bool = False) -> dict[str, Style]:
@@ -74,9 +74,9 @@ def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pan
         visible = [line for line in lines if line.style.shown]
         shown = _without_outliers(visible)
         yield Panel(
-            title=f"{quantity} of {first.name}",
-            y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
-            lines=lines,
+            f"{quantity} of {first.name}",
+            f"{quantity.lower()} ({unit.format(first.unit)})",
+            lines,
             levels=tuple(near_limits(comparison.spec, 0, order, shown or extent(visible))),
             span=shown,
         )
@@ -94,9 +94,7 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
     signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
     for index in extremes(spec):
         lines = [
-            Line(
-                name=method, x=one[index].times, y=1e3 * end_load_sway(spec, one[index]), style=styles[method]
-            )
+            Line(method, one[index].times, 1e3 * end_load_sway(spec, one[index]), styles[method])
             for method, one in responses.items()
         ]
         visible = [line for line in lines if line.style.shown]
@@ -106,16 +104,16 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
         if spec.limits.sway is not None:
             levels.append((1e3 * spec.limits.sway, (0.0, last)))
         yield Panel(
-            title=f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
-            y_label="sway (mm)",
-            lines=lines,
+            f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
+            "sway (mm)",
+            lines,
             levels=[
-                Level(value=sign * value, between=between)
+                Level(sign * value, between)
                 for value, between in levels
                 for sign in signs
                 if 2.0 * low <= sign * value <= 2.0 * high
             ],
-            bands=[Band(low=last, high=last)],
+            bands=[Band(last, last)],
             span=span,
         )
 
