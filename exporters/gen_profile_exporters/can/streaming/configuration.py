@@ -17,19 +17,11 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, startup
 from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.following_window import useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Demand, magnitude_counts
-from gen_profile_exporters.can.startup import (
-    AT_ONCE,
-    NO_REMOTE_REQUEST,
-    OFF,
-    PDO_PARAMETERS,
-    Entry,
-    startup_lists,
-)
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
     HEARTBEAT_WATCHED,
@@ -101,7 +93,7 @@ def configure(
     StreamAborted
         A drive is another one, in fault, cannot be set up, watches nothing, or stands elsewhere.
     """
-    lists = startup_lists(demand, target)
+    lists = startup.startup_lists(demand, target)
     for node in (nodes := _nodes(target)):
         link.send(nmt(PRE_OPERATIONAL, node.number))
         _require_identity(link, node, target)
@@ -127,7 +119,7 @@ def positions(link: Link, target: Target, demand: Demand) -> tuple[int, ...]:
     StreamAborted
         A drive is another one, or counts in other units than the spec says.
     """
-    lists = startup_lists(demand, target)
+    lists = startup.startup_lists(demand, target)
     for node in (nodes := _nodes(target)):
         _require_identity(link, node, target)
         for entry in lists[node.number]:
@@ -250,7 +242,7 @@ def _require_rest(link: Link, node: Node) -> None:
         )
 
 
-def _set(link: Link, node: Node, entries: Sequence[Entry], restoration: Restoration) -> None:
+def _set(link: Link, node: Node, entries: Sequence[startup.Entry], restoration: Restoration) -> None:
     """Write the list in its order where something differs, and require what the drive then holds."""
     final = {(entry.index, entry.sub): entry for entry in entries}
     held = _held(link, node, final)
@@ -276,20 +268,20 @@ def _set(link: Link, node: Node, entries: Sequence[Entry], restoration: Restorat
         )
 
 
-def _written(entry: Entry, held: Mapping[Place, bytes | None]) -> bytes:
+def _written(entry: startup.Entry, held: Mapping[Place, bytes | None]) -> bytes:
     """Tell what to write; a PDO is switched off with what it held, as that must not change before."""
     before = held[entry.index, entry.sub]
     if before is None or not _switches_off(entry):
         return entry.data
-    kept = int.from_bytes(before, "little") | entry.value & NO_REMOTE_REQUEST
-    return (OFF | kept).to_bytes(4, "little")
+    kept = int.from_bytes(before, "little") | entry.value & startup.NO_REMOTE_REQUEST
+    return (startup.OFF | kept).to_bytes(4, "little")
 
 
-def _switches_off(entry: Entry) -> bool:
-    return entry.index in PDO_PARAMETERS and entry.sub == 1 and bool(entry.value & OFF)
+def _switches_off(entry: startup.Entry) -> bool:
+    return entry.index in startup.PDO_PARAMETERS and entry.sub == 1 and bool(entry.value & startup.OFF)
 
 
-def _held(link: Link, node: Node, final: Mapping[Place, Entry]) -> dict[Place, bytes | None]:
+def _held(link: Link, node: Node, final: Mapping[Place, startup.Entry]) -> dict[Place, bytes | None]:
     return {
         place: _upload(link, node, *place, entry.bits, optional=entry.optional)
         for place, entry in final.items()
@@ -297,8 +289,8 @@ def _held(link: Link, node: Node, final: Mapping[Place, Entry]) -> dict[Place, b
 
 
 def _differing(
-    held: Mapping[Place, bytes | None], final: Mapping[Place, Entry]
-) -> list[tuple[Entry, bytes | None]]:
+    held: Mapping[Place, bytes | None], final: Mapping[Place, startup.Entry]
+) -> list[tuple[startup.Entry, bytes | None]]:
     wanted = {place: entry.data for place, entry in final.items()}
     same = {place for place, entry in final.items() if _same(entry, held[place])}
     if _interpolation_period(held) == _interpolation_period(wanted):  # 40 × 0.1 ms are 4 × 1 ms, too
@@ -306,16 +298,16 @@ def _differing(
     return [(entry, held[place]) for place, entry in final.items() if place not in same]
 
 
-def _same(entry: Entry, data: bytes | None) -> bool:
+def _same(entry: startup.Entry, data: bytes | None) -> bool:
     if data is None:
         return entry.optional
     if _switches_off(entry):
-        return bool(int.from_bytes(data, "little") & OFF)
-    if entry.index in PDO_PARAMETERS and entry.sub == 1:
+        return bool(int.from_bytes(data, "little") & startup.OFF)
+    if entry.index in startup.PDO_PARAMETERS and entry.sub == 1:
         apart = int.from_bytes(data, "little") ^ int.from_bytes(entry.data, "little")
         return not apart & COB_ID_BITS
-    if entry.index in PDO_PARAMETERS and entry.sub == 2 and entry.value in AT_ONCE:
-        return data[0] in AT_ONCE
+    if entry.index in startup.PDO_PARAMETERS and entry.sub == 2 and entry.value in startup.AT_ONCE:
+        return data[0] in startup.AT_ONCE
     return data == entry.data
 
 
