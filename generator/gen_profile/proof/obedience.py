@@ -34,9 +34,7 @@ from gen_profile.proof.followed import (
 )
 from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
 
-MORE = (
-    0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
-)
+MORE = 0.1  # of the greatest velocity, by which a plan may exceed a slow stick after its first pulses (0.05)
 BACK = 0.03  # likewise, at which an axis may go back (0.013)
 LATER = {kind: f"{kind}, on average" for kind in ON_AVERAGE}  # what is measured but not judged by one
 STILL = 1e-6  # m, from a target that an axis need not leave for
