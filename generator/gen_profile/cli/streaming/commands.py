@@ -69,7 +69,7 @@ def stream(table: Path | None, **given: Any) -> None:
     request.require_sense()
     with progress() as tell:
         source = request.source(tell)
-        if request.moves_slowly:
+        if request.to_start or request.jog:
             slow = request.slow_motion(source, tell)
             if slow is None:
                 print_outcome(*at_start(source))
