@@ -68,7 +68,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
                 [str(int(value)) for value in values] if whole else [repr(value) for value in values]
             )
     text = csv_dialects.write(dialect, _header(target), columns)
-    return (File(filename=f"{target.name}.csv", content=text.encode("utf-8")),)
+    return (File(f"{target.name}.csv", text.encode("utf-8")),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:

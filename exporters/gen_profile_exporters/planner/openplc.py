@@ -46,7 +46,7 @@ def openplc_files(text: str, file: str) -> tuple[File]:
         arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
         results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
     )
-    return (File(filename=f"{file}{OPENPLC}", content=f"{project}\n".encode("ascii")),)
+    return (File(f"{file}{OPENPLC}", f"{project}\n".encode("ascii")),)
 
 
 def _located(variables: Iterable[BlockVariable], first: int) -> Iterator[str]:

@@ -54,7 +54,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         A position does not fit the axis's counts, or the table is too long to compile.
     """
-    return (File(filename=f"{target.name}.st", content=block_text(profile, target).encode("ascii")),)
+    return (File(f"{target.name}.st", block_text(profile, target).encode("ascii")),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -70,7 +70,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write any block."""
-    return (File(filename=f"{target.name}.st", content=source.text().encode("ascii")),)
+    return (File(f"{target.name}.st", source.text().encode("ascii")),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:

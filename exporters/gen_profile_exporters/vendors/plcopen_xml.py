@@ -149,7 +149,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write a project with any block in it."""
     project = TC6.project(target.name, [TC6.pou(source)])
-    return (File(filename=f"{target.name}.xml", content=write_xml(project)),)
+    return (File(f"{target.name}.xml", write_xml(project)),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
