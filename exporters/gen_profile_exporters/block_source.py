@@ -27,7 +27,7 @@ COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class BlockVariable:
     """A declaration.
 
@@ -141,9 +141,7 @@ def ordered(source: BlockSource, names: Iterable[str]) -> BlockSource:
 
 def _variables(section: str, text: str) -> list[BlockVariable]:
     return [
-        BlockVariable(
-            section=section, name=name, type=type_.strip(), initial=initial.strip(), comment=comment.strip()
-        )
+        BlockVariable(section, name, type_.strip(), initial=initial.strip(), comment=comment.strip())
         for name, type_, initial, comment in _VARIABLE.findall(text)
         if name
     ]

@@ -29,18 +29,9 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.units import AXIS_UNITS, COUNTS, AxisScale
-from gen_profile_exporters import csv_dialects
+from gen_profile_exporters import csv_dialects, setpoints
 from gen_profile_exporters.csv_dialects import DIALECTS, CsvDialect, Row
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.setpoints import (
-    AxisTable,
-    axis_table,
-    in_axis_units,
-    is_count,
-    motion_of,
-    plausible_cycle_time,
-    sampled,
-)
 
 TIME = "time_s"
 # quantity → what follows the axis unit in its column's name
@@ -61,13 +52,13 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         or quantities.
     """
     dialect = _dialect(target)
-    motion = sampled(profile, target, target.cycle_time, "export.cycle_time", dialect.most)
+    motion = setpoints.sampled(profile, target, target.cycle_time, "export.cycle_time", dialect.most)
     if len(motion.position) < dialect.least:
         raise ExportError(
             f"export.csv_dialect: {target.export.csv_dialect} needs {dialect.least} points or more, the "
             f"motion has {len(motion.position)}; lower export.cycle_time."
         )
-    table = axis_table(motion, target.axes)
+    table = setpoints.axis_table(motion, target.axes)
     columns = [_time_texts(len(table.position), target.cycle_time)]
     for number, axis in enumerate(target.axes):
         for quantity in target.export.csv_columns:
@@ -77,7 +68,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
                 [str(int(value)) for value in values] if whole else [repr(value) for value in values]
             )
     text = csv_dialects.write(dialect, _header(target), columns)
-    return (File(filename=f"{target.name}.csv", content=text.encode("utf-8")),)
+    return (File(f"{target.name}.csv", text.encode("utf-8")),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -115,9 +106,9 @@ def _motion(
         _check_counts(columns["position"], target.axes, lines)
     else:
         columns["position"] = _integrated(
-            columns["velocity"], cycle_time, in_axis_units(np.array(target.start), factor)
+            columns["velocity"], cycle_time, setpoints.in_axis_units(np.array(target.start), factor)
         )
-    return motion_of(AxisTable(cycle_time=cycle_time, **columns), target.axes)
+    return setpoints.motion_of(setpoints.AxisTable(cycle_time=cycle_time, **columns), target.axes)
 
 
 def _integrated(velocity: Array, cycle_time: float, start: Array) -> Array:
@@ -223,7 +214,7 @@ def _cycle_time(times: Array, lines: Sequence[int]) -> float:
     """Step of the times, which must rise from 0 in equal steps."""
     if times[0] != 0.0:
         raise _altered(lines[0], "times must rise from 0 in equal steps")
-    step = plausible_cycle_time(float(times[1]), lines[1])
+    step = setpoints.plausible_cycle_time(float(times[1]), lines[1])
     grid = grid_times(len(times) - 1, step)
     wrong = np.flatnonzero(np.abs(times - grid) > GRID_TOLERANCE * grid)
     if wrong.size:
@@ -236,7 +227,7 @@ def _cycle_time(times: Array, lines: Sequence[int]) -> float:
 def _check_counts(position: Array, axes: Sequence[AxisScale], lines: Sequence[int]) -> None:
     for column, axis in enumerate(axes):
         values = position[:, column]
-        wrong = np.flatnonzero(~is_count(values)) if axis.unit == COUNTS else ()
+        wrong = np.flatnonzero(~setpoints.is_count(values)) if axis.unit == COUNTS else ()
         for row in map(int, wrong):
             raise _altered(lines[row], f"axis {axis.name}: {values[row]:.15g} is no whole 32-bit count")
 

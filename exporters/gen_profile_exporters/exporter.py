@@ -50,7 +50,7 @@ class Target:
         return self.export.cycle_time
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class File:
     """A file to be written: its name, without folder, and its bytes."""
 

@@ -74,23 +74,11 @@ def each(template: str, places: Sequence[Mapping[str, str]]) -> str:
 def around(template: str, statements: str, library: MotionLibrary) -> str:
     """Put a library's statements into a wrapper's, where ``{vendor}`` is; the axis's places stay open."""
     return template.format(
-        n="{n}",
-        i="{i}",
-        setpoint=library.setpoint,
-        speed=library.speed,
-        actual=library.actual,
-        power=library.power,
-        homed=library.homed,
-        vendor=statements,
-        let_go=LET_GO,
+        n="{n}", i="{i}", vendor=statements, let_go=LET_GO, **attrs.asdict(library, recurse=False)
     )
 
 
-def _variable(section: str, name: str, type_: str, comment: str) -> BlockVariable:
-    return BlockVariable(section=section, name=name, type=type_, comment=comment)
-
-
-HOMED = _variable("VAR_INPUT", "bHomed{n}", "BOOL", "the axis's position is known")
+HOMED = BlockVariable("VAR_INPUT", "bHomed{n}", "BOOL", comment="the axis's position is known")
 TWINCAT = MotionLibrary(
     axis_type="AXIS_REF",
     guide="MC_ExtSetPointGenEnable",
@@ -142,13 +130,15 @@ VELOCITY = MotionLibrary(
     homed="bHomed{n}",
     variables=(
         HOMED,
-        _variable("VAR_INPUT", "bRunning{n}", "BOOL", "the converter is on and follows fSpeed"),
-        _variable("VAR_INPUT", "bDriveError{n}", "BOOL", "it is in error"),
-        _variable("VAR_INPUT", "fGain{n}", "LREAL", "1/s: velocity for each distance from the setpoint"),
-        _variable("VAR_INPUT", "fCorrection{n}", "LREAL", "greatest velocity for it"),
-        _variable("VAR_OUTPUT", "bRun{n}", "BOOL", "switches the converter on"),
-        _variable("VAR_OUTPUT", "bResetDrive{n}", "BOOL", "acknowledges its error"),
-        _variable("VAR_OUTPUT", "fSpeed{n}", "LREAL", "velocity setpoint"),
+        BlockVariable("VAR_INPUT", "bRunning{n}", "BOOL", comment="the converter is on and follows fSpeed"),
+        BlockVariable("VAR_INPUT", "bDriveError{n}", "BOOL", comment="it is in error"),
+        BlockVariable(
+            "VAR_INPUT", "fGain{n}", "LREAL", comment="1/s: velocity for each distance from the setpoint"
+        ),
+        BlockVariable("VAR_INPUT", "fCorrection{n}", "LREAL", comment="greatest velocity for it"),
+        BlockVariable("VAR_OUTPUT", "bRun{n}", "BOOL", comment="switches the converter on"),
+        BlockVariable("VAR_OUTPUT", "bResetDrive{n}", "BOOL", comment="acknowledges its error"),
+        BlockVariable("VAR_OUTPUT", "fSpeed{n}", "LREAL", comment="velocity setpoint"),
     ),
     **text_parts("libraries/velocity.st"),
 )

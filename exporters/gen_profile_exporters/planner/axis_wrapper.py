@@ -28,12 +28,9 @@ TEXTS = text_parts("planner/axis_wrapper.st")
 INTERFACE = ("VAR_INPUT", "VAR_OUTPUT")
 STAGES = ("cOff", "cPowering", "cTaking", "cGuiding", "cStopping")
 STAGE = BlockVariable(
-    section="VAR_OUTPUT",
-    name="nStage",
-    type="DINT",
-    comment="0 off, 1 waits for power, 2 takes over, 3 guides, 4 stops",
+    "VAR_OUTPUT", "nStage", "DINT", comment="0 off, 1 waits for power, 2 takes over, 3 guides, 4 stops"
 )
-POWER = BlockVariable(section="VAR_INPUT", name="bPower", type="BOOL", comment="power the axes")
+POWER = BlockVariable("VAR_INPUT", "bPower", "BOOL", comment="power the axes")
 COMMENTS = {
     "bEnable": "rising edge: take the axes over; low: stop without sway, then let them go",
     "bReset": "acknowledge errors, of the axes, too",
@@ -85,11 +82,7 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: Mot
         attrs.evolve(v, comment=COMMENTS.get(v.name, v.comment)) for v in outer if v.name not in hidden
     ]
     variables = (
-        *(
-            BlockVariable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type)
-            for n in units
-            if library.axis_type
-        ),
+        *(BlockVariable("VAR_IN_OUT", f"Axis{n}", library.axis_type) for n in units if library.axis_type),
         POWER,
         *declared,
         *(attrs.evolve(v, name=v.name.format(n=n)) for n in units for v in library.variables),
@@ -128,9 +121,9 @@ def _own(block: BlockSource, units: Mapping[str, float], library: MotionLibrary)
     constants = {name: ("DINT", str(number)) for name, number in whole.items()}
     constants |= {f"cUnits{n}": ("LREAL", literal(factor)) for n, factor in units.items()}
     return [
-        *(BlockVariable(section="VAR", name=name, type=type_) for name, type_ in own.items()),
+        *(BlockVariable("VAR", name, type_) for name, type_ in own.items()),
         *(
-            BlockVariable(section="VAR CONSTANT", name=name, type=type_, initial=initial)
+            BlockVariable("VAR CONSTANT", name, type_, initial=initial)
             for name, (type_, initial) in constants.items()
         ),
     ]

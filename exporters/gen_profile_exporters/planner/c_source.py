@@ -54,8 +54,8 @@ def c_files(text: str, file: str) -> tuple[File, File]:
         memory=indented(f"{c_member(v)};" for v in by_section["VAR"]),
     )
     return (
-        File(filename=f"{file}.c", content=code.encode("ascii")),
-        File(filename=f"{file}.h", content=header.encode("ascii")),
+        File(f"{file}.c", code.encode("ascii")),
+        File(f"{file}.h", header.encode("ascii")),
     )
 
 

@@ -11,7 +11,7 @@ OPENPLC = "_openplc.st"
 CYCLE = "fCycleTime"  # is the task's
 STEP = 64  # the first address of the outputs, or a multiple of it behind many inputs
 AREAS = {"BOOL": "QX", "DINT": "MD", "LREAL": "ML", "LINT": "ML"}  # coils, memory of 32 and of 64 bits
-NUMBER = BlockVariable(section="VAR_OUTPUT", name="nCycle", type="LINT", comment="so many")
+NUMBER = BlockVariable("VAR_OUTPUT", "nCycle", "LINT", comment="so many")
 
 
 def openplc_files(text: str, file: str) -> tuple[File]:
@@ -46,7 +46,7 @@ def openplc_files(text: str, file: str) -> tuple[File]:
         arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
         results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
     )
-    return (File(filename=f"{file}{OPENPLC}", content=f"{project}\n".encode("ascii")),)
+    return (File(f"{file}{OPENPLC}", f"{project}\n".encode("ascii")),)
 
 
 def _located(variables: Iterable[BlockVariable], first: int) -> Iterator[str]:

@@ -37,10 +37,7 @@ def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> Block
         header=TEXTS["header"].format(name=name, block=block.name, guide=library.guide) + "\n",
         name=name,
         variables=(
-            *(
-                BlockVariable(section="VAR_IN_OUT", name=f"Axis{place['n']}", type=library.axis_type)
-                for place in places
-            ),
+            *(BlockVariable("VAR_IN_OUT", f"Axis{place['n']}", library.axis_type) for place in places),
             *inputs,
             *outputs,
             *_own(block.name, [v.name for v in inputs], places, library),
@@ -65,9 +62,9 @@ def _own(
         for key, type_ in {"bTaken": "BOOL", **library.instances}.items()
     }
     return [
-        *(BlockVariable(section="VAR", name=key, type=type_) for key, type_ in own.items()),
+        *(BlockVariable("VAR", key, type_) for key, type_ in own.items()),
         *(
-            BlockVariable(section="VAR CONSTANT", name=stage, type="DINT", initial=str(number))
+            BlockVariable("VAR CONSTANT", stage, "DINT", initial=str(number))
             for number, stage in enumerate(STAGES)
         ),
     ]

@@ -88,8 +88,8 @@ VARIABLES = {
     "BOOL": ("bLoaded", "bLoad", "bAgain", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
 }
 SELECTION = (
-    BlockVariable(section="VAR_INPUT", name=LIBRARY, type="DINT", comment="which motion, from 0 on"),
-    BlockVariable(section="VAR", name="nSelected", type="DINT", comment="it, once nothing moved"),
+    BlockVariable("VAR_INPUT", LIBRARY, "DINT", comment="which motion, from 0 on"),
+    BlockVariable("VAR", "nSelected", "DINT", comment="it, once nothing moved"),
 )
 NOTE = """\
     Its numbers are variables, in two buffers, which gen-profile deploy writes through aRequest and reads
@@ -202,13 +202,13 @@ def declared(
     numbered = {name: number for names in (RESULTS, TRIALS) for number, name in enumerate(names)}
     numbered |= {"cInterface": INTERFACE, "cCapacity": capacity, **constants}
     return [
-        BlockVariable(section="VAR_INPUT", name=REQUEST, type=window, comment="of gen-profile deploy"),
-        BlockVariable(section="VAR_OUTPUT", name=REPLY, type=window),
-        BlockVariable(section="VAR_OUTPUT", name=STATE, type=state),
-        BlockVariable(section="VAR", name=TABLE, type=both, initial=initialiser(whole)),
-        *(BlockVariable(section="VAR", name=name, type=kind) for kind, of in members.items() for name in of),
+        BlockVariable("VAR_INPUT", REQUEST, window, comment="of gen-profile deploy"),
+        BlockVariable("VAR_OUTPUT", REPLY, window),
+        BlockVariable("VAR_OUTPUT", STATE, state),
+        BlockVariable("VAR", TABLE, both, initial=initialiser(whole)),
+        *(BlockVariable("VAR", name, kind) for kind, of in members.items() for name in of),
         *(
-            BlockVariable(section="VAR CONSTANT", name=name, type="DINT", initial=str(value))
+            BlockVariable("VAR CONSTANT", name, "DINT", initial=str(value))
             for name, value in numbered.items()
         ),
     ]

@@ -182,9 +182,9 @@ def _merged(same: Sequence[BlockVariable]) -> BlockVariable:
 
 def _array(name: str, type_: str, values: Sequence[str], comment: str = "") -> BlockVariable:
     return BlockVariable(
-        section="VAR CONSTANT",
-        name=name,
-        type=f"ARRAY [0..{len(values) - 1}] OF {type_}",
+        "VAR CONSTANT",
+        name,
+        f"ARRAY [0..{len(values) - 1}] OF {type_}",
         initial=initialiser(values),
         comment=comment,
     )
@@ -194,11 +194,9 @@ def _selector(sources: Sequence[BlockSource]) -> list[BlockVariable]:
     """Declare what selects a motion, and where its tables begin and end."""
     last, rows = len(sources) - 1, [_rows(source) for source in sources]
     added = [
-        BlockVariable(
-            section="VAR_INPUT", name="nProfile", type="DINT", comment=f"which motion, 0 to {last}"
-        ),
-        BlockVariable(section="VAR", name="nSelected", type="DINT", comment="nProfile, once nothing moved"),
-        BlockVariable(section="VAR CONSTANT", name="cProfiles", type="DINT", initial=str(len(sources))),
+        BlockVariable("VAR_INPUT", "nProfile", "DINT", comment=f"which motion, 0 to {last}"),
+        BlockVariable("VAR", "nSelected", "DINT", comment="nProfile, once nothing moved"),
+        BlockVariable("VAR CONSTANT", "cProfiles", "DINT", initial=str(len(sources))),
         _array(FIRST_ROW, "DINT", _starts(rows)),
     ]
     segments = [len(v.elements) for source in sources for v in source.variables if v.name == SEGMENTS]

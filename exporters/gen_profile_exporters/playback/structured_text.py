@@ -27,14 +27,8 @@ from gen_profile_exporters.block_source import BlockSource, initialiser, parse_f
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.playback import block as playback_block
+from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.playback.block import Token
-from gen_profile_exporters.playback.buffers import (
-    TABLE,
-    buffered,
-    constant_sources,
-    is_buffered,
-    is_library,
-)
 from gen_profile_exporters.playback.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR
 from gen_profile_exporters.playback.table import PlaybackTable, counted_axes, tabulate
 from gen_profile_exporters.playback.table_checksum import checksum
@@ -60,7 +54,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         A position does not fit the axis's counts, or the table is too long to compile.
     """
-    return (File(filename=f"{target.name}.st", content=block_text(profile, target).encode("ascii")),)
+    return (File(f"{target.name}.st", block_text(profile, target).encode("ascii")),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -76,7 +70,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write any block."""
-    return (File(filename=f"{target.name}.st", content=source.text().encode("ascii")),)
+    return (File(f"{target.name}.st", source.text().encode("ascii")),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
@@ -97,17 +91,17 @@ def block_text(profile: Profile, target: Target) -> str:
     text = playback_block.fill(values, table.layout, len(table.axes))
     if target.export.plc_tables == "constants":
         return text
-    return buffered([parse_function_block(text)], target).text()
+    return buffers.buffered([parse_function_block(text)], target).text()
 
 
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
-    if TABLE in text and is_buffered(source := parse_function_block(text)):
-        if is_library(source):
+    if buffers.TABLE in text and buffers.is_buffered(source := parse_function_block(text)):
+        if buffers.is_library(source):
             raise ExportError(
                 "The block is a library of motions, and no single one; check the sweep's cases."
             )
-        text = constant_sources(source, target)[0].text()
+        text = buffers.constant_sources(source, target)[0].text()
     layout = playback_block.layout_of(text)
     tokens = playback_block.match(text, layout, len(target.axes))
     if not _NAME.fullmatch(tokens["block"].text):

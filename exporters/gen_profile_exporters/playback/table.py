@@ -16,18 +16,11 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.units import COUNTS, AxisScale
+from gen_profile_exporters import setpoints
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.playback.path_limits import PathLimits, latest_stop, path_limits
 from gen_profile_exporters.playback.quintic_segments import QuinticSegments, fit, horner
-from gen_profile_exporters.setpoints import (
-    INT32,
-    AxisTable,
-    axis_table,
-    in_axis_units,
-    motion_of,
-    sampled,
-)
 
 MOST_SAMPLES = 100_001  # larger tables were not seen to compile
 LEAST_CHECKS = 8  # values that enter the checksum in a cycle
@@ -105,12 +98,12 @@ class PlaybackTable:
         return latest_stop(self.limits, velocity, acceleration, self.cycle_time)
 
     @cached_property
-    def played(self) -> AxisTable:
+    def played(self) -> setpoints.AxisTable:
         """What the block issues every cycle when nothing disturbs it, in axis units."""
         position, velocity, acceleration = (
             self.columns if self.first is None else self._segments().at_cycles()
         )
-        return AxisTable(
+        return setpoints.AxisTable(
             cycle_time=self.cycle_time, position=position, velocity=velocity, acceleration=acceleration
         )
 
@@ -151,7 +144,7 @@ class PlaybackTable:
 
     def motion(self) -> SampledProfile:
         """Convert what the block issues to SI units."""
-        motion = motion_of(self.played, self.axes)
+        motion = setpoints.motion_of(self.played, self.axes)
         return motion if self.first is None else attrs.evolve(motion, resolution=np.zeros(len(self.axes)))
 
     @cached_property
@@ -192,17 +185,17 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     ExportError
         A position does not fit the axis's counts, or the table is too long to compile.
     """
-    motion = sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
+    motion = setpoints.sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
     axes = counted_axes(target, target.export.plc_layout)
     first, last = None, len(motion.position) - 1
     if target.export.plc_layout == "segments":
         segments = fit(_quantities(motion), motion.cycle_time)
         first = segments.first[:-1].astype(np.float64)
         factor = np.array([axis.factor for axis in axes])
-        columns = _literal(in_axis_units(np.moveaxis(segments.coefficients, 1, 0), factor))
-        end = _literal(in_axis_units(segments.target, factor))
+        columns = _literal(setpoints.in_axis_units(np.moveaxis(segments.coefficients, 1, 0), factor))
+        end = _literal(setpoints.in_axis_units(segments.target, factor))
     else:
-        columns = _quantities(axis_table(motion, axes))
+        columns = _quantities(setpoints.axis_table(motion, axes))
         columns = _literal(_whole(columns, axes) if target.export.plc_layout == "counts" else columns)
         end = columns[0, -1]
     return PlaybackTable(
@@ -217,7 +210,7 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     )
 
 
-def _quantities(table: AxisTable | SampledProfile) -> Array:
+def _quantities(table: setpoints.AxisTable | SampledProfile) -> Array:
     """Stack position, velocity and acceleration."""
     quantities = (table.position, table.velocity, table.acceleration)
     return np.stack([values for values in quantities if values is not None])
@@ -243,7 +236,7 @@ def _literal(columns: Array) -> Array:
 def _whole(columns: Array, axes: tuple[AxisScale, ...]) -> Array:
     """Round velocities and accelerations, too."""
     rounded = np.rint(columns) + 0.0
-    outside = np.argwhere(np.abs(rounded) > INT32.max)
+    outside = np.argwhere(np.abs(rounded) > setpoints.INT32.max)
     if len(outside):
         column, _, axis = outside[0]
         quantity = ("position", "velocity", "acceleration")[column]

@@ -46,12 +46,7 @@ unwrap, replay = plcopen_xml.unwrap, plcopen_xml.replay
 def _project(source: BlockSource, target: Target, cams: list[etree._Element]) -> tuple[File, ...]:
     blocks = (source, *axis_wrappers(source, len(target.axes), CODESYS))
     pous = [*map(plcopen_xml.CODESYS.pou, blocks), *cams]
-    return (
-        File(
-            filename=f"{target.name}.codesys.xml",
-            content=write_xml(plcopen_xml.CODESYS.project(target.name, pous)),
-        ),
-    )
+    return (File(f"{target.name}.codesys.xml", write_xml(plcopen_xml.CODESYS.project(target.name, pous))),)
 
 
 def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
@@ -63,8 +58,8 @@ def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
         "MC_CamTableSelect. *)\n",
         name=name,
         variables=(
-            BlockVariable(section="VAR_OUTPUT", name="Cam", type="MC_CAM_REF"),
-            BlockVariable(section="VAR", name="aPoints", type=f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
+            BlockVariable("VAR_OUTPUT", "Cam", "MC_CAM_REF"),
+            BlockVariable("VAR", "aPoints", f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
         ),
         body=f"Cam.byType := 3;\nCam.byVarType := 6;\nCam.nElements := {last + 1};\nCam.xStart := 0.0;\n"
         f"Cam.xEnd := {literal(points.time[-1])};\nCam.pce := ADR(aPoints);\n",

@@ -149,7 +149,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write a project with any block in it."""
     project = TC6.project(target.name, [TC6.pou(source)])
-    return (File(filename=f"{target.name}.xml", content=write_xml(project)),)
+    return (File(f"{target.name}.xml", write_xml(project)),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
@@ -208,13 +208,7 @@ def _read_variable(section: str, element: etree._Element) -> BlockVariable:
     initial = ", ".join(values)
     if array is not None and values:
         initial = f"[{initial}]"
-    return BlockVariable(
-        section=section,
-        name=attribute(element, "name"),
-        type=type_,
-        initial=initial,
-        comment=_text(element),
-    )
+    return BlockVariable(section, attribute(element, "name"), type_, initial=initial, comment=_text(element))
 
 
 def _text(element: etree._Element) -> str:

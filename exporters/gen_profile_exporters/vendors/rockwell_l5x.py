@@ -67,7 +67,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     content = etree.SubElement(routine, "STContent")
     for number, line in enumerate(_statements(_tag_names(target), len(cycles))):
         etree.SubElement(content, "Line", {"Number": str(number)}).text = etree.CDATA(line)
-    return (File(filename=f"{target.name}.L5X", content=write_xml(root)),)
+    return (File(f"{target.name}.L5X", write_xml(root)),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:

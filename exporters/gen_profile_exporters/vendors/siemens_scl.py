@@ -49,7 +49,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     source = parse_function_block(block_text(profile, target))
     blocks = wrap(source, target)
     cams = _cams(source.name, profile, target)
-    return (*blocks, File(filename=f"{target.name}_cam.scl", content=cams.encode("ascii")))
+    return (*blocks, File(f"{target.name}_cam.scl", cams.encode("ascii")))
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
@@ -73,7 +73,7 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
         wrappers = tuple(_wired(wrapper, source) for wrapper in wrappers)
         others = [_mailbox(source)]
     text = "\n".join([*map(_scl, (source, *wrappers)), *others])
-    return (File(filename=f"{target.name}.scl", content=text.encode("ascii")),)
+    return (File(f"{target.name}.scl", text.encode("ascii")),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:

@@ -64,7 +64,7 @@ def _pou(source: BlockSource) -> File:
     etree.SubElement(pou, "Declaration").text = etree.CDATA(source.header + source.declaration())
     implementation = etree.SubElement(pou, "Implementation")
     etree.SubElement(implementation, "ST").text = etree.CDATA(source.body)
-    return File(filename=f"{source.name}.TcPOU", content=write_xml(root))
+    return File(f"{source.name}.TcPOU", write_xml(root))
 
 
 def _variable_list(name: str, points: QuinticPoints) -> File:
@@ -73,7 +73,7 @@ def _variable_list(name: str, points: QuinticPoints) -> File:
     text = "\n".join(["{attribute 'qualified_only'}", "VAR_GLOBAL CONSTANT", *arrays, "END_VAR", ""])
     root, element = _object("GVL", name)
     etree.SubElement(element, "Declaration").text = etree.CDATA(text)
-    return File(filename=f"{name}.TcGVL", content=write_xml(root))
+    return File(f"{name}.TcGVL", write_xml(root))
 
 
 def _points(name: str, points: QuinticPoints, axis: int) -> str:

@@ -12,7 +12,7 @@ _PROCESSORS = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "arm64", "aarch64
 _SYSTEMS = {"linux": "linux", "darwin": "macos", "win32": "windows"}
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class Platform:
     """A platform.
 
@@ -38,21 +38,11 @@ class Platform:
 
 
 PLATFORMS = {
-    "linux-x86_64": Platform(
-        target="x86_64-linux-gnu.2.17", fmi2="linux64", fmi3="x86_64-linux", extension=".so"
-    ),
-    "linux-arm64": Platform(
-        target="aarch64-linux-gnu.2.17", fmi2="aarch64-linux", fmi3="aarch64-linux", extension=".so"
-    ),
-    "windows-x86_64": Platform(
-        target="x86_64-windows-gnu", fmi2="win64", fmi3="x86_64-windows", extension=".dll"
-    ),
-    "macos-x86_64": Platform(
-        target="x86_64-macos.11.0", fmi2="darwin64", fmi3="x86_64-darwin", extension=".dylib"
-    ),
-    "macos-arm64": Platform(
-        target="aarch64-macos.11.0", fmi2="darwin64", fmi3="aarch64-darwin", extension=".dylib"
-    ),
+    "linux-x86_64": Platform("x86_64-linux-gnu.2.17", "linux64", "x86_64-linux", ".so"),
+    "linux-arm64": Platform("aarch64-linux-gnu.2.17", "aarch64-linux", "aarch64-linux", ".so"),
+    "windows-x86_64": Platform("x86_64-windows-gnu", "win64", "x86_64-windows", ".dll"),
+    "macos-x86_64": Platform("x86_64-macos.11.0", "darwin64", "x86_64-darwin", ".dylib"),
+    "macos-arm64": Platform("aarch64-macos.11.0", "darwin64", "aarch64-darwin", ".dylib"),
 }
 
 

@@ -3,7 +3,7 @@
 import math
 from collections import defaultdict
 from importlib.metadata import version
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from gen_profile_fmu.description.base_units import BASE_UNITS
 from gen_profile_fmu.model.contents import Model
@@ -44,10 +44,10 @@ def model_description(model: Model, fmi: str, identity: str, source_file: str) -
     """
     root = _root(model, fmi, identity)
     for name in ("ModelExchange", "CoSimulation"):
-        interface = ElementTree.SubElement(root, name, _abilities(model, fmi, name))
+        interface = SubElement(root, name, _abilities(model, fmi, name))
         if fmi == "2":
-            files = ElementTree.SubElement(interface, "SourceFiles")
-            ElementTree.SubElement(files, "File", name=source_file)
+            files = SubElement(interface, "SourceFiles")
+            SubElement(files, "File", name=source_file)
     _add_units(root, model.variables)
     _add_log_categories(root)
     _add_experiment(root, model)
@@ -58,14 +58,14 @@ def model_description(model: Model, fmi: str, identity: str, source_file: str) -
 
 def build_description(model: Model, source_file: str) -> bytes:
     """Say how to compile the sources: buildDescription.xml of FMI 3.0 (section 2.5.1)."""
-    root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
-    files = ElementTree.SubElement(configuration, "SourceFileSet", language="C99")
-    ElementTree.SubElement(files, "SourceFile", name=source_file)
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
+    files = SubElement(configuration, "SourceFileSet", language="C99")
+    SubElement(files, "SourceFile", name=source_file)
     return to_bytes(root)
 
 
-def _root(model: Model, fmi: str, identity: str) -> ElementTree.Element:
+def _root(model: Model, fmi: str, identity: str) -> Element:
     """Begin a model description."""
     tool = version("gen-profile")
     attributes = {
@@ -81,7 +81,7 @@ def _root(model: Model, fmi: str, identity: str) -> ElementTree.Element:
     }
     if fmi == "2":
         attributes["numberOfEventIndicators"] = "0"
-    return ElementTree.Element("fmiModelDescription", attributes)
+    return Element("fmiModelDescription", attributes)
 
 
 def _abilities(model: Model, fmi: str, interface: str) -> dict[str, str]:
@@ -96,33 +96,33 @@ def _abilities(model: Model, fmi: str, interface: str) -> dict[str, str]:
     }
 
 
-def _add_units(root: ElementTree.Element, table: VariableTable) -> None:
+def _add_units(root: Element, table: VariableTable) -> None:
     """List the units in use, with their base units where these are known."""
-    definitions = ElementTree.SubElement(root, "UnitDefinitions")
+    definitions = SubElement(root, "UnitDefinitions")
     shown_in: defaultdict[str, dict[str, float]] = defaultdict(dict)
     for variable in table.variables:
         if variable.display_unit != variable.unit:
             factor = _PER_UNIT[variable.display_unit.partition("/")[0]]
             shown_in[variable.unit][variable.display_unit] = factor
     for name in sorted({variable.unit for variable in table.variables} - {""}):
-        unit = ElementTree.SubElement(definitions, "Unit", name=name)
+        unit = SubElement(definitions, "Unit", name=name)
         if name in BASE_UNITS:
             exponents = {base: str(exponent) for base, exponent in BASE_UNITS[name].items()}
-            ElementTree.SubElement(unit, "BaseUnit", exponents)
+            SubElement(unit, "BaseUnit", exponents)
         for shown, factor in sorted(shown_in[name].items()):
-            ElementTree.SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
+            SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
 
 
-def _add_log_categories(root: ElementTree.Element) -> None:
+def _add_log_categories(root: Element) -> None:
     """List the log categories."""
-    categories = ElementTree.SubElement(root, "LogCategories")
+    categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
-        ElementTree.SubElement(categories, "Category", name=name, description=description)
+        SubElement(categories, "Category", name=name, description=description)
 
 
-def _add_experiment(root: ElementTree.Element, model: Model) -> None:
+def _add_experiment(root: Element, model: Model) -> None:
     """State a sensible simulation."""
-    ElementTree.SubElement(
+    SubElement(
         root,
         "DefaultExperiment",
         startTime="0.0",
@@ -132,27 +132,27 @@ def _add_experiment(root: ElementTree.Element, model: Model) -> None:
     )
 
 
-def _add_variables(root: ElementTree.Element, model: Model, fmi: str) -> None:
+def _add_variables(root: Element, model: Model, fmi: str) -> None:
     table = model.variables
-    variables = ElementTree.SubElement(root, "ModelVariables")
+    variables = SubElement(root, "ModelVariables")
     state_of = dict(zip(table.derivatives, table.states, strict=True))
     for reference, variable in enumerate(table.variables):
         attributes, value = _variable_attributes(reference, variable), _value_attributes(variable)
         if fmi == "2":
-            scalar = ElementTree.SubElement(variables, "ScalarVariable", attributes)
-            element = ElementTree.SubElement(scalar, variable.type.name_of_fmi2, value)
+            scalar = SubElement(variables, "ScalarVariable", attributes)
+            element = SubElement(scalar, variable.type.name_of_fmi2, value)
         else:
-            element = ElementTree.SubElement(variables, variable.type.name_of_fmi3, attributes | value)
+            element = SubElement(variables, variable.type.name_of_fmi3, attributes | value)
             if model.interpolates_inputs and variable.kind.causality in {"input", "output"}:
                 element.set("intermediateUpdate", "true")
         if reference in state_of:
             element.set("derivative", str(state_of[reference] + FIRST[fmi]))
 
 
-def _add_structure(root: ElementTree.Element, model: Model, fmi: str) -> None:
+def _add_structure(root: Element, model: Model, fmi: str) -> None:
     """List unknowns with what they depend on: by index in FMI 2, by value reference in FMI 3."""
     table, structure, first = model.variables, model.structure, FIRST[fmi]
-    element = ElementTree.SubElement(root, "ModelStructure")
+    element = SubElement(root, "ModelStructure")
     for title, unknowns, known in (
         ("Output", table.references_of(Kind.STATE, Kind.OUTPUT, Kind.DISCRETE_OUTPUT), structure.running),
         (DERIVATIVE[fmi], table.derivatives, structure.running),
@@ -166,11 +166,11 @@ def _add_structure(root: ElementTree.Element, model: Model, fmi: str) -> None:
         if fmi == "2":
             if title == DERIVATIVE[fmi] and not unknowns:
                 continue
-            listed, name, number = ElementTree.SubElement(element, f"{title}s"), "Unknown", "index"
+            listed, name, number = SubElement(element, f"{title}s"), "Unknown", "index"
         for unknown in unknowns:
             dependencies = " ".join(str(reference + first) for reference in known[unknown])
             attributes = {number: str(unknown + first), "dependencies": dependencies}
-            ElementTree.SubElement(listed, name, attributes)
+            SubElement(listed, name, attributes)
 
 
 def _variable_attributes(reference: int, variable: FmuVariable) -> dict[str, str]:
@@ -211,8 +211,8 @@ def text_of(value: float, type_: Type) -> str:
             return str(int(value))
 
 
-def to_bytes(root: ElementTree.Element) -> bytes:
+def to_bytes(root: Element) -> bytes:
     """Write XML in UTF-8 with line feeds."""
-    ElementTree.indent(root)
-    text: str = ElementTree.tostring(root, encoding="unicode")
+    indent(root)
+    text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

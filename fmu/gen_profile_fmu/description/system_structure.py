@@ -5,7 +5,7 @@ Importers look for the names of XML elements with the prefixes that the standard
 
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 import attrs
 
@@ -88,24 +88,24 @@ def ssp(
     )
 
 
-def _root(tag: str, name: str, others: Iterable[str]) -> ElementTree.Element:
+def _root(tag: str, name: str, others: Iterable[str]) -> Element:
     own, _, _ = tag.partition(":")
     spaces = {f"xmlns:{space}": _NAMESPACES[space] for space in (own, *others)}
     tool = f"gen-profile {version('gen-profile')}"
-    return ElementTree.Element(tag, {**spaces, "version": "1.0", "name": name, "generationTool": tool})
+    return Element(tag, {**spaces, "version": "1.0", "name": name, "generationTool": tool})
 
 
 def _structure(name: str, leader: Component, plant: Component, step: float) -> bytes:
     root = _root("ssd:SystemStructureDescription", name, ("ssc", "osp"))
-    system = ElementTree.SubElement(root, "ssd:System", name=name)
-    elements = ElementTree.SubElement(system, "ssd:Elements")
+    system = SubElement(root, "ssd:System", name=name)
+    elements = SubElement(system, "ssd:Elements")
     for place, component in enumerate((leader, plant)):
         _add_component(elements, component, place * (_WIDTH + _GAP))
-    connections = ElementTree.SubElement(system, "ssd:Connections")
+    connections = SubElement(system, "ssd:Connections")
     given = {variable.name for variable in leader.variables("output")}
     for variable in plant.variables("input"):
         if variable.name in given:
-            ElementTree.SubElement(
+            SubElement(
                 connections,
                 "ssd:Connection",
                 startElement=leader.name,
@@ -114,7 +114,7 @@ def _structure(name: str, leader: Component, plant: Component, step: float) -> b
                 endConnector=variable.name,
             )
     connectors = [*_connectors(leader), *_connectors(plant)]
-    _add_units(ElementTree.SubElement(root, "ssd:Units"), connectors)
+    _add_units(SubElement(root, "ssd:Units"), connectors)
     _add_experiment(root, max(leader.model.stop_time, plant.model.stop_time), step)
     return to_bytes(root)
 
@@ -124,50 +124,39 @@ def _connectors(component: Component) -> list[FmuVariable]:
     return [v for v in component.variables("input", "output") if v.name != "trigger"]
 
 
-def _add_component(elements: ElementTree.Element, component: Component, left: float) -> None:
+def _add_component(elements: Element, component: Component, left: float) -> None:
     kind = "application/x-fmu-sharedlibrary"
-    element = ElementTree.SubElement(
-        elements, "ssd:Component", name=component.name, type=kind, source=component.fmu
-    )
-    connectors = ElementTree.SubElement(element, "ssd:Connectors")
+    element = SubElement(elements, "ssd:Component", name=component.name, type=kind, source=component.fmu)
+    connectors = SubElement(element, "ssd:Connectors")
     for variable in _connectors(component):
-        connector = ElementTree.SubElement(
-            connectors, "ssd:Connector", name=variable.name, kind=variable.kind.causality
-        )
-        ElementTree.SubElement(connector, f"ssc:{variable.type.name_of_fmi2}", _unit(variable))
-    ElementTree.SubElement(
-        element,
-        "ssd:ElementGeometry",
-        x1=repr(left),
-        y1="0.0",
-        x2=repr(left + _WIDTH),
-        y2=repr(_HEIGHT),
+        connector = SubElement(connectors, "ssd:Connector", name=variable.name, kind=variable.kind.causality)
+        SubElement(connector, f"ssc:{variable.type.name_of_fmi2}", _unit(variable))
+    SubElement(
+        element, "ssd:ElementGeometry", x1=repr(left), y1="0.0", x2=repr(left + _WIDTH), y2=repr(_HEIGHT)
     )
     if component.variables("parameter"):
-        bindings = ElementTree.SubElement(element, "ssd:ParameterBindings")
-        ElementTree.SubElement(bindings, "ssd:ParameterBinding", source=component.parameters)
+        bindings = SubElement(element, "ssd:ParameterBindings")
+        SubElement(bindings, "ssd:ParameterBinding", source=component.parameters)
 
 
-def _add_experiment(root: ElementTree.Element, stop_time: float, step: float) -> None:
-    experiment = ElementTree.SubElement(
-        root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop_time)
-    )
-    annotations = ElementTree.SubElement(experiment, "ssd:Annotations")
-    annotation = ElementTree.SubElement(annotations, "ssc:Annotation", type=_OSP)
-    algorithm = ElementTree.SubElement(annotation, "osp:Algorithm")
-    ElementTree.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(step))
+def _add_experiment(root: Element, stop_time: float, step: float) -> None:
+    experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop_time))
+    annotations = SubElement(experiment, "ssd:Annotations")
+    annotation = SubElement(annotations, "ssc:Annotation", type=_OSP)
+    algorithm = SubElement(annotation, "osp:Algorithm")
+    SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(step))
 
 
 def _parameters(component: Component) -> bytes:
     """Write a component's parameters with the values that they have in its FMU."""
     root = _root("ssv:ParameterSet", PARAMETER_SET, ("ssc",))
-    parameters = ElementTree.SubElement(root, "ssv:Parameters")
+    parameters = SubElement(root, "ssv:Parameters")
     variables = component.variables("parameter")
     for variable in variables:
-        parameter = ElementTree.SubElement(parameters, "ssv:Parameter", name=variable.name)
+        parameter = SubElement(parameters, "ssv:Parameter", name=variable.name)
         value = {"value": text_of(variable.start, variable.type), **_unit(variable)}
-        ElementTree.SubElement(parameter, f"ssv:{variable.type.name_of_fmi2}", value)
-    _add_units(ElementTree.SubElement(root, "ssv:Units"), variables)
+        SubElement(parameter, f"ssv:{variable.type.name_of_fmi2}", value)
+    _add_units(SubElement(root, "ssv:Units"), variables)
     return to_bytes(root)
 
 
@@ -176,8 +165,8 @@ def _unit(variable: FmuVariable) -> dict[str, str]:
     return {"unit": variable.unit} if variable.unit in BASE_UNITS else {}
 
 
-def _add_units(units: ElementTree.Element, variables: Iterable[FmuVariable]) -> None:
+def _add_units(units: Element, variables: Iterable[FmuVariable]) -> None:
     for name in sorted({unit for variable in variables for unit in _unit(variable).values()}):
-        unit = ElementTree.SubElement(units, "ssc:Unit", name=name)
+        unit = SubElement(units, "ssc:Unit", name=name)
         exponents = {base: str(exponent) for base, exponent in BASE_UNITS[name].items()}
-        ElementTree.SubElement(unit, "ssc:BaseUnit", exponents)
+        SubElement(unit, "ssc:BaseUnit", exponents)

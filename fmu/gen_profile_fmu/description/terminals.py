@@ -5,7 +5,7 @@ of a plant's have the same names and members.
 """
 
 from collections import defaultdict
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 from gen_profile_fmu.description.model_description import to_bytes
 from gen_profile_fmu.model.variables import VariableTable
@@ -16,20 +16,20 @@ _SQUARE = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
 
 def terminals_and_icons(table: VariableTable) -> bytes:
     """Write the XML text: the last part of a variable's name is its name within the terminal."""
-    root = ElementTree.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-    graphics = ElementTree.SubElement(root, "GraphicalRepresentation")
-    ElementTree.SubElement(graphics, "CoordinateSystem", _SQUARE, suggestedScalingFactorTo_mm="0.1")
-    ElementTree.SubElement(graphics, "Icon", _SQUARE)
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    graphics = SubElement(root, "GraphicalRepresentation")
+    SubElement(graphics, "CoordinateSystem", _SQUARE, suggestedScalingFactorTo_mm="0.1")
+    SubElement(graphics, "Icon", _SQUARE)
     members = defaultdict(list)
     for variable in (variable for block in BLOCKS for variable in table.blocks.get(block, ())):
         terminal, _, member = variable.name.rpartition(".")
         members[terminal].append((variable.name, member))
-    terminals = ElementTree.SubElement(root, "Terminals")
+    terminals = SubElement(root, "Terminals")
     for terminal, named in members.items():
         # "bus": members of the same name are connected, whatever else the other side has
-        element = ElementTree.SubElement(terminals, "Terminal", name=terminal, matchingRule="bus")
+        element = SubElement(terminals, "Terminal", name=terminal, matchingRule="bus")
         for name, member in named:
-            ElementTree.SubElement(
+            SubElement(
                 element, "TerminalMemberVariable", variableName=name, memberName=member, variableKind="signal"
             )
     return to_bytes(root)

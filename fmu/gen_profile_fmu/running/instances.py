@@ -111,7 +111,6 @@ def instance(fmu: PlantFmu) -> Instance:
     messages: list[str] = []
 
     def log(environment: object, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-        del environment, instance
         text = message.decode("utf-8", errors="replace")
         if status == fmi2OK:
             _logger.debug("%s: %s", category.decode("utf-8"), text)

@@ -5,14 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import attrs
 import numpy as np
 
-from gen_profile.charts.curves import (
-    ORDERS,
-    derivative_line,
-    end_load_sway,
-    extent,
-    near_limits,
-    spectrum_panel,
-)
+from gen_profile.charts import curves
 from gen_profile.charts.figure import Band, Bars, Figure, Level, Line, Panel, Style
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.candidates import own_method
@@ -47,9 +40,9 @@ def comparison_figure(comparison: Comparison, every: bool = False) -> Figure:
         "Optimal motions solid, shapers dashed, extra-insensitive ones dotted; recommended ones thick. "
         "Dashed in red: limits. Behind the spectrum: natural frequencies, with their ranges."
     )
-    spectra = spectrum_panel(comparison.spec, comparison.rows[0].evaluation, motions, styles)
+    spectra = curves.spectrum_panel(comparison.spec, comparison.rows[0].evaluation, motions, styles)
     sways, residuals = _sways(comparison, styles), _residuals(comparison, styles)
-    return Figure(caption=caption, panels=[*_motion(comparison, styles), spectra, *sways, residuals])
+    return Figure(caption, [*_motion(comparison, styles), spectra, *sways, residuals])
 
 
 def compared_styles(comparison: Comparison, every: bool = False) -> dict[str, Style]:
@@ -66,18 +59,18 @@ def compared_styles(comparison: Comparison, every: bool = False) -> dict[str, St
 def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
     """Draw position, velocity, acceleration and jerk of the first axis (the paper's figure 2)."""
     first = comparison.spec.machine().actuated[0]
-    for order, (quantity, unit) in enumerate(ORDERS):
+    for order, (quantity, unit) in enumerate(curves.ORDERS):
         lines = [
-            derivative_line(row.method, row.evaluation.motion, order, 0, styles[row.method], SAMPLES)
+            curves.derivative_line(row.method, row.evaluation.motion, order, 0, styles[row.method], SAMPLES)
             for row in comparison.rows
         ]
         visible = [line for line in lines if line.style.shown]
         shown = _without_outliers(visible)
         yield Panel(
-            title=f"{quantity} of {first.name}",
-            y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
-            lines=lines,
-            levels=tuple(near_limits(comparison.spec, 0, order, shown or extent(visible))),
+            f"{quantity} of {first.name}",
+            f"{quantity.lower()} ({unit.format(first.unit)})",
+            lines,
+            levels=tuple(curves.near_limits(comparison.spec, 0, order, shown or curves.extent(visible))),
             span=shown,
         )
 
@@ -94,28 +87,26 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
     signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
     for index in extremes(spec):
         lines = [
-            Line(
-                name=method, x=one[index].times, y=1e3 * end_load_sway(spec, one[index]), style=styles[method]
-            )
+            Line(method, one[index].times, 1e3 * curves.end_load_sway(spec, one[index]), styles[method])
             for method, one in responses.items()
         ]
         visible = [line for line in lines if line.style.shown]
         span = _without_outliers(visible)
-        low, high = span or extent(visible)
+        low, high = span or curves.extent(visible)
         levels = [(1e3 * spec.check.residual_sway[plant.loads[-1]], (last, max(ends.values())))]
         if spec.limits.sway is not None:
             levels.append((1e3 * spec.limits.sway, (0.0, last)))
         yield Panel(
-            title=f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
-            y_label="sway (mm)",
-            lines=lines,
+            f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
+            "sway (mm)",
+            lines,
             levels=[
-                Level(value=sign * value, between=between)
+                Level(sign * value, between)
                 for value, between in levels
                 for sign in signs
                 if 2.0 * low <= sign * value <= 2.0 * high
             ],
-            bands=[Band(low=last, high=last)],
+            bands=[Band(last, last)],
             span=span,
         )
 
@@ -138,5 +129,5 @@ def _without_outliers(lines: Sequence[Line]) -> tuple[float, float] | None:
     """End an axis where most curves do; None where none goes far beyond."""
     peaks = [float(np.abs(line.y).max()) for line in lines]
     end = OUTLYING * float(np.median(peaks))
-    low, high = extent(lines)
+    low, high = curves.extent(lines)
     return (ROOM * max(low, -end), ROOM * min(high, end)) if max(peaks) > end > 0.0 else None

@@ -74,10 +74,10 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
             title = Phrase("{quantity} of {name}", quantity=quantity, name=axis.name)
             own = unit.format(axis.unit if order else place)
             label = Phrase("{quantity} ({unit})", quantity=quantity.lower(), unit=own)
-            panels.append(Panel(title=title, y_label=label, lines=lines, levels=levels))
+            panels.append(Panel(title, label, lines, levels=levels))
     drawn = "The command of each drive leads its lag" if lagging else "The drives follow it as it is"
     caption = f"The reference and its derivatives. {drawn}. Dashed in red: limits of the spec."
-    return Figure(caption=caption, panels=panels)
+    return Figure(caption, panels)
 
 
 def profile_figure(profile: Profile) -> Figure:
@@ -89,8 +89,8 @@ def profile_figure(profile: Profile) -> Figure:
             for axis, colour in zip(range(profile.axes), cycle(PALETTE), strict=False)
         ]
         label = f"{quantity.lower()} ({unit.format('m')} or {unit.format('rad')})"
-        panels.append(Panel(title=quantity, y_label=label, lines=lines))
-    return Figure(caption="The motion and its derivatives.", panels=panels)
+        panels.append(Panel(quantity, label, lines))
+    return Figure("The motion and its derivatives.", panels)
 
 
 def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
@@ -104,7 +104,7 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
         meaning = "The less the motion holds there, the less the loads swing on."
     caption = f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}"
     panel = spectrum_panel(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})
-    return Figure(caption=caption, panels=[panel])
+    return Figure(caption, [panel])
 
 
 def sway_figure(
@@ -124,20 +124,17 @@ def sway_figure(
     end, panels = float(times[-1]), []
     for number, load in enumerate(spec.machine().loads):
         sways = [1e3 * responses[one.index].sway[:, number] for one in shown]
-        lines = [
-            Line(name=one.name, x=times, y=sway, style=one.style)
-            for one, sway in zip(shown, sways, strict=True)
-        ]
+        lines = [Line(one.name, times, sway, one.style) for one, sway in zip(shown, sways, strict=True)]
         panel = Panel(
-            title=Phrase("Sway of the {load}", load=load),
-            y_label="sway (mm)",
-            lines=lines + wind_lines(wind, load, arrival, end),
+            Phrase("Sway of the {load}", load=load),
+            "sway (mm)",
+            lines + wind_lines(wind, load, arrival, end),
             levels=sway_levels(spec, load, arrival, end),
-            bands=[Band(low=arrival, high=arrival)],
+            bands=[Band(arrival, arrival)],
         )
         panels.append(panel)
     caption = f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}"
-    return Figure(caption=caption, panels=panels)
+    return Figure(caption, panels)
 
 
 def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
@@ -146,20 +143,20 @@ def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
     It does not depend on time explicitly, so along the exact optimum it is constant.
     """
     change = (hamiltonian - hamiltonian.mean()) / np.abs(hamiltonian).max()
-    lines = [Line(name="change", x=times, y=change)]
+    lines = [Line("change", times, change)]
     caption = "Change of the Hamiltonian at the mesh's nodes, relative: the exact optimum has none."
-    panel = Panel(title="Hamiltonian", y_label="relative change", lines=lines)
-    return Figure(caption=caption, panels=[panel])
+    panel = Panel("Hamiltonian", "relative change", lines)
+    return Figure(caption, [panel])
 
 
 def sway_levels(spec: Spec, load: str, arrival: float, end: float) -> list[Level]:
     """List the limits of a load's sway in mm: after the arrival, and the end load's on the way."""
     residual = 1e3 * spec.check.residual_sway[load]
-    levels = [Level(value=sign * residual, between=(arrival, end)) for sign in (1.0, -1.0)]
+    levels = [Level(sign * residual, (arrival, end)) for sign in (1.0, -1.0)]
     plant = spec.machine()
     if spec.limits.sway is not None and load in plant.loads[plant.end_load]:
         transient = 1e3 * spec.limits.sway
-        levels += [Level(value=sign * transient, between=(0.0, arrival)) for sign in (1.0, -1.0)]
+        levels += [Level(sign * transient, (0.0, arrival)) for sign in (1.0, -1.0)]
     return levels
 
 
@@ -170,7 +167,7 @@ def wind_lines(wind: StaticDeflection | None, load: str, arrival: float, end: fl
     aside = 1e3 * wind.loads[load]
     span = np.array([arrival, end])
     name = f"wind, {wind.force:g} N"
-    return [Line(name=name, x=span, y=np.full(2, sign * aside), style=WINDY) for sign in (1.0, -1.0)]
+    return [Line(name, span, np.full(2, sign * aside), WINDY) for sign in (1.0, -1.0)]
 
 
 def end_load_sway(spec: Spec, response: Response) -> Array:
@@ -184,7 +181,7 @@ def derivative_line(  # noqa: PLR0917  # name, then what, then how
     """Draw a derivative of one axis, its jumps between segments included."""
     points = max(2, samples // (len(profile.knots) - 1))
     times, values = profile.within_segments(points, order)
-    return Line(name=name, x=times, y=values[:, column], style=style)
+    return Line(name, times, values[:, column], style)
 
 
 def extent(lines: Sequence[Line]) -> tuple[float, float]:
@@ -200,7 +197,7 @@ def near_limits(spec: Spec, column: int, order: int, shown: tuple[float, float])
     low, high = shown if order else (-max(map(abs, shown)), max(map(abs, shown)))
     for value in allowed if order == 0 else (allowed, -allowed):
         if NEAR * low <= value <= NEAR * high:
-            yield Level(value=value)
+            yield Level(value)
 
 
 def spectrum_panel(
@@ -210,15 +207,15 @@ def spectrum_panel(
     first, natural = spec.machine().actuated[0], natural_frequencies(spec, evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
-    bands = [Band(low=low, high=high) for low, high in ranges if high > low]
+    bands = [Band(low, high) for low, high in ranges if high > low]
     return Panel(
-        title=Phrase("Spectrum of the acceleration of {name}", name=first.name),
-        x_label="frequency (rad/s)",
-        y_label=Phrase("magnitude ({unit}/s)", unit=first.unit),
-        lines=[
-            Line(name=name, x=frequencies, y=spectrum(motion, frequencies), style=styles[name])
+        Phrase("Spectrum of the acceleration of {name}", name=first.name),
+        Phrase("magnitude ({unit}/s)", unit=first.unit),
+        [
+            Line(name, frequencies, spectrum(motion, frequencies), styles[name])
             for name, motion in motions.items()
         ],
-        bands=bands + [Band(low=frequency, high=frequency) for frequency in natural.nominal.tolist()],
+        x_label="frequency (rad/s)",
+        bands=bands + [Band(frequency, frequency) for frequency in natural.nominal.tolist()],
         decades=DECADES,
     )

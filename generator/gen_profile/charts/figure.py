@@ -49,7 +49,7 @@ class Style:
 PLAIN = Style()
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class Line:
     """A curve.
 
@@ -67,7 +67,7 @@ class Line:
     style: Style = PLAIN
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class Level:
     """A horizontal line, such as a limit, over a range of x or the whole width."""
 
@@ -75,7 +75,7 @@ class Level:
     between: tuple[float, float] | None = None
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class Band:
     """A range on the horizontal axis; one of no width is a line."""
 
@@ -83,15 +83,15 @@ class Band:
     high: float
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class Panel:
     """A plot.
 
     Attributes
     ----------
-    title : str
-    x_label, y_label : str
+    title, y_label : str
     lines : sequence of Line
+    x_label : str
     levels : sequence of Level
     bands : sequence of Band
     decades : float or None
@@ -101,9 +101,9 @@ class Panel:
     """
 
     title: str
-    x_label: str = "time (s)"
     y_label: str
     lines: Sequence[Line]
+    x_label: str = "time (s)"
     levels: Sequence[Level] = ()
     bands: Sequence[Band] = ()
     decades: float | None = None
@@ -178,7 +178,7 @@ class Map:
     lines: ClassVar[Sequence[Line]] = ()
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class Figure:
     """Panels under one legend, which names the curves.
 

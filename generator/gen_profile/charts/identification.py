@@ -24,27 +24,27 @@ def identification_figure(identified: Identification) -> Figure:
     shown = spectrum(log.times, left, float(natural[-1]))
     amplitude, chance = (2.0 * np.sqrt(power / len(left)) for power in (shown.power, shown.threshold))
     greatest = max(float(amplitude.max()), float(np.max(chance)))
-    logged = Line(name="logged", x=log.times, y=log.values, style=LOGGED)
-    found = Line(name="machine found", x=log.times, y=swing, style=FOUND)
+    logged = Line("logged", log.times, log.values, LOGGED)
+    found = Line("machine found", log.times, swing, FOUND)
     template = "{quantity} of {load} ({unit})"
     label = Phrase(template, quantity=log.quantity, load=log.load, unit=log.unit)
-    rest = Line(name="left", x=log.times, y=left, style=LEFT)
+    rest = Line("left", log.times, left, LEFT)
     of_rest = Phrase("left of it ({unit})", unit=log.unit)
     spectral = [
-        Line(name="left", x=shown.frequencies, y=amplitude, style=LEFT),
-        Line(name="noise stays below", x=shown.frequencies, y=chance, style=CHANCE),
+        Line("left", shown.frequencies, amplitude, LEFT),
+        Line("noise stays below", shown.frequencies, chance, CHANCE),
     ]
     panels = [
-        Panel(title=Phrase("Swing of the {load}", load=log.load), y_label=label, lines=[logged, found]),
-        Panel(title="What is left of the log", y_label=of_rest, lines=[rest]),
+        Panel(Phrase("Swing of the {load}", load=log.load), label, [logged, found]),
+        Panel("What is left of the log", of_rest, [rest]),
         Panel(
-            title="Spectrum of what is left",
+            "Spectrum of what is left",
+            Phrase("amplitude ({unit})", unit=log.unit),
+            spectral,
             x_label="frequency (rad/s)",
-            y_label=Phrase("amplitude ({unit})", unit=log.unit),
-            lines=spectral,
-            bands=[Band(low=frequency, high=frequency) for frequency in natural.tolist()],
+            bands=[Band(frequency, frequency) for frequency in natural.tolist()],
             decades=BELOW + math.log10(greatest / float(np.min(chance))),
         ),
     ]
     caption = "Dotted in the spectrum: natural frequencies of the machine found."
-    return Figure(caption=caption, columns=1, panels=panels)
+    return Figure(caption, panels, columns=1)

@@ -9,26 +9,13 @@ from typing import Any
 import numpy as np
 
 from gen_profile.artefacts.writing import deliver, require_place
-from gen_profile.charts.figure import (
-    FRAME,
-    INK,
-    LIMIT,
-    PAPER,
-    SHADES,
-    Bars,
-    Dash,
-    Figure,
-    Level,
-    Map,
-    Panel,
-    Style,
-)
+from gen_profile.charts import figure as parts
 from gen_profile.errors import OutputError
 from gen_profile.plugins import require_installed
 
 # suffix → metadata that keeps the clock out of the file
 METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-DASHES: dict[Dash, str] = {"solid": "-", "dash": "--", "dot": ":", "points": "none"}
+DASHES: dict[parts.Dash, str] = {"solid": "-", "dash": "--", "dot": ":", "points": "none"}
 WIDE, HIGH = (9.0, 7.5, 5.2, 3.9), (6.0, 3.8, 3.8, 3.4)  # inches of a panel, by columns from 1
 BESIDE = 5.5  # inches of a figure beside another one
 LETTERS = 13  # of a caption, in an inch
@@ -48,7 +35,7 @@ def require_drawable(path: Path) -> None:
     require_place(path)
 
 
-def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
+def save(figures: Sequence[parts.Figure], path: Path, salt: str, title: str) -> None:
     """Draw figures side by side in one file.
 
     Parameters
@@ -78,7 +65,7 @@ def write(canvas: Any, path: Path, salt: str) -> None:
     deliver(path, content.getvalue())
 
 
-def drawn(figures: Sequence[Figure], title: str) -> Any:
+def drawn(figures: Sequence[parts.Figure], title: str) -> Any:
     """Draw figures side by side, as a figure of Matplotlib's; its pyplot stays as the caller has it."""
     from matplotlib.figure import Figure as Canvas  # noqa: PLC0415  # an extra
 
@@ -87,26 +74,26 @@ def drawn(figures: Sequence[Figure], title: str) -> Any:
     widths = [columns * WIDE[columns - 1], *[BESIDE] * (len(figures) - 1)]
     height = max(6.0, 1.0 + rows * (2.4 if rows > 2 and columns == 1 else HIGH[columns - 1]))
     picture = Canvas(figsize=(sum(widths), height), layout="constrained")
-    parts = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
-    for part, figure, width in zip(parts, figures, widths, strict=True):
+    beside = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
+    for part, figure, width in zip(beside, figures, widths, strict=True):
         _draw(part, figure, width)
     picture.suptitle(title)
     return picture
 
 
-def _draw(part: Any, figure: Figure, width: float) -> None:
+def _draw(part: Any, figure: parts.Figure, width: float) -> None:
     """Draw panels row by row; bars take what is left of their row."""
     columns, names = _columns(figure), [str(number) for number in range(len(figure.panels))]
-    filling = names[-1] if isinstance(figure.panels[-1], Bars) else "."
+    filling = names[-1] if isinstance(figure.panels[-1], parts.Bars) else "."
     mosaic = np.reshape([*names, *[filling] * (-len(names) % columns)], (-1, columns))
     axes = part.subplot_mosaic(mosaic.tolist())
     for name, panel in zip(names, figure.panels, strict=False):
         match panel:
-            case Panel():
+            case parts.Panel():
                 _curves(axes[name], panel)
-            case Bars():
+            case parts.Bars():
                 _bars(axes[name], panel)
-            case Map():
+            case parts.Map():
                 _map(part, axes[name], panel)
         axes[name].set_title(panel.title, fontsize="medium")
     handles: Mapping[str, Any] = {
@@ -129,19 +116,19 @@ def _draw(part: Any, figure: Figure, width: float) -> None:
     )
 
 
-def _columns(figure: Figure) -> int:
+def _columns(figure: parts.Figure) -> int:
     return min(figure.columns, len(figure.panels))
 
 
-def _curves(axis: Any, panel: Panel) -> None:
+def _curves(axis: Any, panel: parts.Panel) -> None:
     shown = [line for line in panel.lines if line.style.shown]
     for line in shown:
         axis.plot(line.x, line.y, label=line.name, **_ink(line.style))
     for band in panel.bands:
         if band.high > band.low:
-            axis.axvspan(band.low, band.high, color=FRAME, alpha=0.2, linewidth=0.0, zorder=0)
+            axis.axvspan(band.low, band.high, color=parts.FRAME, alpha=0.2, linewidth=0.0, zorder=0)
         else:
-            axis.axvline(band.low, color=FRAME, linewidth=0.9, linestyle=":", zorder=1)
+            axis.axvline(band.low, color=parts.FRAME, linewidth=0.9, linestyle=":", zorder=1)
     for level in panel.levels:
         _level(axis, level)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
@@ -154,44 +141,44 @@ def _curves(axis: Any, panel: Panel) -> None:
         axis.set_ylim(panel.span)
 
 
-def _level(axis: Any, level: Level) -> None:
-    look = {"color": LIMIT, "linewidth": 1.0, "linestyle": "--", "zorder": 1}
+def _level(axis: Any, level: parts.Level) -> None:
+    look = {"color": parts.LIMIT, "linewidth": 1.0, "linestyle": "--", "zorder": 1}
     if level.between is None:
         axis.axhline(level.value, **look)
     else:
         axis.plot(level.between, [level.value] * 2, **look)
 
 
-def _bars(axis: Any, panel: Bars) -> None:
+def _bars(axis: Any, panel: parts.Bars) -> None:
     """Draw bars, and their texts beside them; what the axis cannot hold has an arrow."""
     axis.barh(list(panel.names), panel.values, color=list(panel.colours))
     for place, (value, text) in enumerate(zip(panel.values, panel.texts, strict=True)):
         arrow = "" if value <= panel.end else "▸ "
         axis.text(min(value, panel.end), place, f" {arrow}{text}", va="center", fontsize="small")
-    axis.axvline(panel.limit, color=LIMIT, linewidth=1.0, linestyle="--")
+    axis.axvline(panel.limit, color=parts.LIMIT, linewidth=1.0, linestyle="--")
     axis.invert_yaxis()
     axis.set(xlabel=panel.x_label, xlim=(0.0, panel.end))
 
 
-def _map(part: Any, axis: Any, panel: Map) -> None:
+def _map(part: Any, axis: Any, panel: parts.Map) -> None:
     end = panel.headroom * panel.limit
     if panel.cells:
         coloured = axis.pcolormesh(panel.x, panel.y, panel.values, cmap="viridis_r", vmin=0.0, vmax=end)
     else:
-        levels = np.linspace(0.0, end, SHADES + 1)
+        levels = np.linspace(0.0, end, parts.SHADES + 1)
         coloured = axis.contourf(panel.x, panel.y, panel.values, levels, cmap="viridis_r", extend="max")
         if panel.values.min() < panel.limit < panel.values.max():
-            axis.contour(panel.x, panel.y, panel.values, [panel.limit], colors=INK, linewidths=2.2)
+            axis.contour(panel.x, panel.y, panel.values, [panel.limit], colors=parts.INK, linewidths=2.2)
     if panel.frame is not None:
         width, height = panel.frame
-        for colour, dash in ((PAPER, "-"), (INK, ":")):
+        for colour, dash in ((parts.PAPER, "-"), (parts.INK, ":")):
             corners = ([-width, width, width, -width, -width], [-height, -height, height, height, -height])
             axis.plot(*corners, color=colour, linestyle=dash, linewidth=1.2)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
     part.colorbar(coloured, ax=axis, label=panel.unit)
 
 
-def _ink(style: Style) -> dict[str, Any]:
+def _ink(style: parts.Style) -> dict[str, Any]:
     """Say in Matplotlib's words how a curve looks."""
     points = {"marker": ".", "markersize": 3.0} if style.dash == "points" else {}
     return {"color": style.colour, "linestyle": DASHES[style.dash], "linewidth": style.width, **points}

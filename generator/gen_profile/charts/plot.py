@@ -129,4 +129,4 @@ def _check_figure(check: Check) -> Figure:
         texts=[f"{number(1e3 * sway)} mm" for _, sway in shown.values()],
         limit=100.0,
     )
-    return Figure(caption=f"Dashed in red: what is allowed.{more}", panels=[bars])
+    return Figure(f"Dashed in red: what is allowed.{more}", [bars])

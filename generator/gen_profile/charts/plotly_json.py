@@ -6,30 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from gen_profile.charts.figure import (
-    FRAME,
-    INK,
-    LIMIT,
-    PAPER,
-    SHADES,
-    Band,
-    Bars,
-    Dash,
-    Figure,
-    Level,
-    Line,
-    Map,
-    Panel,
-)
+from gen_profile.charts import figure as parts
 from gen_profile.motion.profile import Array
 
 EVEN = 1e-12  # of the last time, by which even steps may differ
 DIGITS = 6  # of a curve's largest value: finer than any screen, and a third of the bytes
 SHADE = "rgba(120,130,140,0.16)"
-DASHED = {"color": LIMIT, "dash": "dash", "width": 1.2}
+DASHED = {"color": parts.LIMIT, "dash": "dash", "width": 1.2}
 
 
-def figure_json(figure: Figure) -> dict[str, Any]:
+def figure_json(figure: parts.Figure) -> dict[str, Any]:
     """Nest plain values for a page's script: the legend's entries, and data and layout of every panel."""
     return {
         "legend": [
@@ -40,17 +26,17 @@ def figure_json(figure: Figure) -> dict[str, Any]:
     }
 
 
-def _panel(panel: Panel | Bars | Map) -> dict[str, Any]:
+def _panel(panel: parts.Panel | parts.Bars | parts.Map) -> dict[str, Any]:
     match panel:
-        case Panel():
+        case parts.Panel():
             return _curves(panel)
-        case Bars():
+        case parts.Bars():
             return _bars(panel)
-        case Map():
+        case parts.Map():
             return _map(panel)
 
 
-def _curves(panel: Panel) -> dict[str, Any]:
+def _curves(panel: parts.Panel) -> dict[str, Any]:
     layout = _labels(panel.x_label, panel.y_label)
     layout["shapes"] = [*map(_band, panel.bands), *map(_level, panel.levels)]
     if panel.decades is not None:
@@ -66,7 +52,7 @@ def _curves(panel: Panel) -> dict[str, Any]:
     return {"data": [_trace(line) for line in panel.lines], "layout": layout}
 
 
-def _bars(panel: Bars) -> dict[str, Any]:
+def _bars(panel: parts.Bars) -> dict[str, Any]:
     shown = np.minimum(panel.values, panel.end)
     layout = _labels(panel.x_label, "")
     layout["xaxis"] |= {"range": [0, panel.end]}
@@ -85,7 +71,7 @@ def _bars(panel: Bars) -> dict[str, Any]:
     return {"data": [bars], "layout": {**layout, "hovermode": "closest"}}
 
 
-def _map(panel: Map) -> dict[str, Any]:
+def _map(panel: parts.Map) -> dict[str, Any]:
     grid = {"x": rounded(panel.x), "y": rounded(panel.y), "z": [rounded(row) for row in panel.values]}
     end = panel.headroom * panel.limit
     bar = {"title": {"text": escape(panel.unit)}, "thickness": 12, "outlinewidth": 0, "dtick": panel.limit}
@@ -93,16 +79,16 @@ def _map(panel: Map) -> dict[str, Any]:
     if panel.cells:
         data = [{"type": "heatmap", **grid, **colours}]
     else:
-        step = {"start": 0.0, "end": end, "size": end / SHADES}
+        step = {"start": 0.0, "end": end, "size": end / parts.SHADES}
         limit = {"start": panel.limit, "end": panel.limit, "size": end, "coloring": "none"}
-        ink = {"line": {"color": INK, "width": 2.2}, "showscale": False, "hoverinfo": "skip"}
+        ink = {"line": {"color": parts.INK, "width": 2.2}, "showscale": False, "hoverinfo": "skip"}
         data = [
             {"type": "contour", **grid, "contours": step, "line": {"width": 0}, **colours},
             {"type": "contour", **grid, "contours": limit, **ink},
         ]
     layout = {**_labels(panel.x_label, panel.y_label), "hovermode": "closest"}
     if panel.frame is not None:
-        layout["shapes"] = [_frame(panel.frame, PAPER, "solid"), _frame(panel.frame, INK, "dot")]
+        layout["shapes"] = [_frame(panel.frame, parts.PAPER, "solid"), _frame(panel.frame, parts.INK, "dot")]
     return {"data": data, "layout": layout}
 
 
@@ -120,7 +106,7 @@ def rounded(values: Array) -> list[float | None]:
     return [None if math.isnan(number) else number for number in numbers]
 
 
-def _trace(line: Line) -> dict[str, Any]:
+def _trace(line: parts.Line) -> dict[str, Any]:
     style = line.style
     look: dict[str, Any] = {"line": {"color": style.colour, "width": style.width, "dash": style.dash}}
     if style.dash == "points":
@@ -149,18 +135,18 @@ def _shape(kind: str, x: tuple[float, float], y: tuple[float, float], **look: An
     return {"type": kind, "x0": x[0], "x1": x[1], "y0": y[0], "y1": y[1], **look}
 
 
-def _band(band: Band) -> dict[str, Any]:
-    edge = {"width": 1, "color": FRAME, "dash": "dot"} if band.low == band.high else {"width": 0}
+def _band(band: parts.Band) -> dict[str, Any]:
+    edge = {"width": 1, "color": parts.FRAME, "dash": "dot"} if band.low == band.high else {"width": 0}
     look = {"yref": "paper", "layer": "below", "fillcolor": SHADE, "line": edge}
     return _shape("rect", (band.low, band.high), (0, 1), **look)
 
 
-def _frame(frame: tuple[float, float], colour: str, dash: Dash) -> dict[str, Any]:
+def _frame(frame: tuple[float, float], colour: str, dash: parts.Dash) -> dict[str, Any]:
     width, height = frame
     line = {"width": 1.2, "color": colour, "dash": dash}
     return _shape("rect", (-width, width), (-height, height), line=line)
 
 
-def _level(level: Level) -> dict[str, Any]:
+def _level(level: parts.Level) -> dict[str, Any]:
     across = "paper" if level.between is None else "x"
     return _shape("line", level.between or (0, 1), (level.value, level.value), xref=across, line=DASHED)

@@ -62,20 +62,20 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     bands = [*_unpromised(trace)]
     panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
     for name, corners in trace.history.hoisting.items():
-        line = Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)
-        ends, label = [Level(value=value) for value in spec.planner.live[name]], _labelled(spec, name)
+        line = Line("command", times, np.interp(times, *np.transpose(corners)), COMMAND)
+        ends, label = [Level(value) for value in spec.planner.live[name]], _labelled(spec, name)
         title = f"{name} as given to the block"
-        panels.append(Panel(title=title, y_label=label, lines=[line], levels=ends, bands=bands))
+        panels.append(Panel(title, label, [line], levels=ends, bands=bands))
     styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
     sways = [
-        Line(name=name, x=times, y=1e3 * sway[few], style=style)
+        Line(name, times, 1e3 * sway[few], style)
         for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
     ]
-    levels = [Level(value=sign * limit, between=(arrival, times[-1])) for sign in _signs(spec)]
+    levels = [Level(sign * limit, (arrival, times[-1])) for sign in _signs(spec)]
     title = f"Sway of the {spec.machine().end_load_name}"
-    panels.append(Panel(title=title, y_label="sway (mm)", lines=sways, levels=levels, bands=bands))
+    panels.append(Panel(title, "sway (mm)", sways, levels=levels, bands=bands))
     caption = "Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains."
-    return Figure(caption=caption, panels=panels, columns=1)
+    return Figure(caption, panels, columns=1)
 
 
 def _signs(spec: Spec) -> tuple[float, ...]:
@@ -96,17 +96,17 @@ def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
     assert own.velocity and own.acceleration and own.travel
     of = f" of {axis.name}" if axis.name else ""
     stops = [one.time for one in trace.history.commands if one.command not in {"position", "velocity"}]
-    bands = [*_unpromised(trace), *(Band(low=time, high=time) for time in stops)]
+    bands = [*_unpromised(trace), *(Band(time, time) for time in stops)]
     for title, unit, output, levels, command in (
         ("Position", axis.unit, "fPosition", own.travel, "position"),
         ("Velocity", f"{axis.unit}/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
         ("Acceleration", f"{axis.unit}/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
     ):
         setpoints = trace.issued[axis.of(output)][few]
-        issued = Line(name="setpoint", x=trace.times[few], y=setpoints, style=SETPOINT)
-        lines, limits = [issued, *_commanded(trace, command, place)], [Level(value=level) for level in levels]
+        issued = Line("setpoint", trace.times[few], setpoints, SETPOINT)
+        lines, limits = [issued, *_commanded(trace, command, place)], [Level(level) for level in levels]
         label = f"{title.lower()} ({unit})"
-        yield Panel(title=title + of, y_label=label, lines=lines, levels=limits, bands=bands)
+        yield Panel(title + of, label, lines, levels=limits, bands=bands)
 
 
 def worst_damped(proof: Proof) -> JudgedHistory | None:
@@ -134,8 +134,8 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
 
     def panel(title: str, y_label: str, names: Sequence[str], columns: Array) -> Panel:
         drawn = zip(names, columns.T, (SETPOINT, COMMAND), strict=False)
-        lines = [Line(name=name, x=times, y=column, style=style) for name, column, style in drawn]
-        return Panel(title=title, y_label=y_label, lines=lines, bands=bands)
+        lines = [Line(name, times, column, style) for name, column, style in drawn]
+        return Panel(title, y_label, lines, bands=bands)
 
     along = [axis.name or "gusts" for axis in axes]
     shown = f"{sensor.quantity} ({unit}/s)" if sensor.quantity == "rate" else f"{sensor.quantity} ({unit})"
@@ -147,14 +147,14 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
     panels = [
         panel("Gusts", "push (m/s²)", along, pushes),
         panel(title, shown, sensor.names if len(axes) > 1 else ["shown"], trace.measured[few]),
-        attrs.evolve(sway, levels=[Level(value=sign * limit) for sign in _signs(spec)]),
+        attrs.evolve(sway, levels=[Level(sign * limit) for sign in _signs(spec)]),
     ]
     for axis in axes:
         title = f"Position of {axis.name}" if axis.name else "Position"
         places = trace.issued[axis.of("fPosition")][few, None]
         panels.append(panel(title, f"position ({axis.unit})", ["setpoint"], places))
     caption = "Shaded: not promised. Dashed in red: what may remain."
-    return [Figure(caption=caption, panels=panels, columns=1), _remains_figure(spec, proof)]
+    return [Figure(caption, panels, columns=1), _remains_figure(spec, proof)]
 
 
 def _remains_figure(spec: Spec, proof: Proof) -> Figure:
@@ -172,7 +172,7 @@ def _remains_figure(spec: Spec, proof: Proof) -> Figure:
         [proof.fraction(one) for one in judged],
     )
     caption = "Every history with a sound sensor and gusts; white: none there."
-    return Figure(caption=caption, panels=[panel], columns=1)
+    return Figure(caption, [panel], columns=1)
 
 
 def map_figure(spec: Spec, proof: Proof) -> Figure:
@@ -188,7 +188,7 @@ def map_figure(spec: Spec, proof: Proof) -> Figure:
         [proof.fraction(one) for one in proof.judged],
     )
     caption = "Over what the block is given; white: no history there."
-    return Figure(caption=caption, panels=[panel], columns=1)
+    return Figure(caption, [panel], columns=1)
 
 
 def _labelled(spec: Spec, name: str) -> str:
@@ -202,7 +202,7 @@ def _unpromised(trace: Trace) -> Iterator[Band]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], unkept, [False]])))
     last = len(trace.times) - 1
     for begin, end in edges.reshape(-1, 2):
-        yield Band(low=float(trace.times[begin]), high=float(trace.times[min(end, last)]))
+        yield Band(float(trace.times[begin]), float(trace.times[min(end, last)]))
 
 
 def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:
@@ -214,7 +214,7 @@ def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:
         return []
     x = np.array([[one.time, end, end] for one, end in held]).ravel()
     y = np.array([[one.values[place], one.values[place], np.nan] for one, _ in held]).ravel()
-    return [Line(name="command", x=x, y=y, style=COMMAND)]
+    return [Line("command", x, y, COMMAND)]
 
 
 def _shares_panel(
@@ -232,11 +232,11 @@ def _shares_panel(
     if len(labels) == 1:
         order = np.argsort(places[0], kind="stable")
         return Panel(
-            title=title,
+            title,
+            "share of its limit (%)",
+            [Line("history", places[0][order], shares[order], Style(dash="points"))],
             x_label=labels[0],
-            y_label="share of its limit (%)",
-            lines=[Line(name="history", x=places[0][order], y=shares[order], style=Style(dash="points"))],
-            levels=[Level(value=100.0)],
+            levels=[Level(100.0)],
         )
     low, high = np.transpose(ranges)
     cells = np.minimum(CELLS * (places.T - low) / (high - low), CELLS - 1).astype(int)

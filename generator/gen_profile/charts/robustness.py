@@ -29,8 +29,8 @@ def robustness_figure(curves: Robustness) -> Figure:
 def curves_figure(curves: Mapping[str, Robustness], styles: Mapping[str, Style]) -> Figure:
     """Draw curves over the errors of some parameters, each by its name."""
     return Figure(
-        caption="Shaded: the range that the spec states; dashed in red: what is allowed.",
-        panels=[_curves(name, one, styles) for name, one in curves.items()],
+        "Shaded: the range that the spec states; dashed in red: what is allowed.",
+        [_curves(name, one, styles) for name, one in curves.items()],
     )
 
 
@@ -59,23 +59,23 @@ def maps_figure(grid: Robustness) -> Figure:
         f"How much of its allowed residual sway the load takes up that takes most, where {across} and "
         f"{upwards} are off at once. Thick line: all of it{dotted}."
     )
-    return Figure(caption=caption, columns=min(COLUMNS, len(grid.residual)), panels=panels)
+    return Figure(caption, panels, columns=min(COLUMNS, len(grid.residual)))
 
 
 def _curves(name: str, curve: Robustness, styles: Mapping[str, Style]) -> Panel:
     spec, limit = curve.spec, 1e3 * curve.tolerance
     stated = spec.robustness.uncertain.get(name)
     lines = [
-        Line(name=method, x=100.0 * curve.errors[name], y=1e3 * curve.end_load(method), style=styles[method])
+        Line(method, 100.0 * curve.errors[name], 1e3 * curve.end_load(method), styles[method])
         for method in curve.residual
     ]
     return Panel(
-        title=Phrase("Residual sway of the {load} over {name}", load=spec.machine().end_load_name, name=name),
+        Phrase("Residual sway of the {load} over {name}", load=spec.machine().end_load_name, name=name),
+        "residual sway (mm)",
+        lines,
         x_label=_off(curve, name),
-        y_label="residual sway (mm)",
-        lines=lines,
-        levels=[Level(value=limit)],
-        bands=[Band(low=-100.0 * stated, high=100.0 * stated)] if stated else [],
+        levels=[Level(limit)],
+        bands=[Band(-100.0 * stated, 100.0 * stated)] if stated else [],
         span=beside_limit(max(float(line.y.max()) for line in lines), limit),
     )
 

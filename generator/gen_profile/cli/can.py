@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import bitrate_option, output_options
+from gen_profile.cli.options import option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -25,12 +25,10 @@ def can() -> None:
 
 
 @can.command("list", epilog="Example: gen-profile can list --interface socketcan --channel can0")
-@click.option(
-    "--interface", metavar="NAME", help="Only this interface, such as socketcan; all of them by default."
-)
-@click.option("--channel", metavar="NAME", help="Ask on this channel of it which nodes are there.")
-@bitrate_option("channel")
-@output_options
+@option("--interface NAME", "Only this interface, such as socketcan; all of them by default.")
+@option("--channel NAME", "Ask on this channel of it which nodes are there.")
+@options.bitrate("channel")
+@options.output
 def list_(interface: str | None, channel: str | None, bitrate: int) -> None:
     """List CAN interfaces, their channels, and the nodes that answer.
 

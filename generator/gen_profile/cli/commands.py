@@ -9,28 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.group import DefaultGroup
-from gen_profile.cli.options import (
-    Count,
-    InputFile,
-    Number,
-    OutputFile,
-    PathType,
-    SpecChoice,
-    block_plot_option,
-    certify_option,
-    complete_presets,
-    export_option,
-    folder_option,
-    histories_option,
-    output_options,
-    plot_option,
-    repeatable,
-    require_formats,
-    scheduler_option,
-    spec_options,
-    version_option,
-)
+from gen_profile.cli.options import Count, InputFile, Number, OutputFile, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, leave_unproved, not_written, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.cli.signing import require_signature, sign, signed_by_option, signing_key, signing_option
@@ -47,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @click.group(cls=DefaultGroup, epilog="Example: gen-profile crane.toml --export plc --out deploy")
-@version_option
+@options.version
 def cli() -> None:
     """Design motion profiles that leave no sway, prove them by co-simulation, and export them.
 
@@ -56,21 +37,19 @@ def cli() -> None:
 
 
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
-@spec_options
-@export_option("Format to write (see gen-profile formats)")
-@folder_option
-@click.option("--cycle-time", metavar="SECONDS", help="Cycle of the controller, and SYNC period of the bus.")
-@click.option("--plc-layout", metavar="LAYOUT", help="Table of a PLC block: segments, samples or counts.")
-@click.option("--csv-dialect", metavar="NAME", help="rfc4180, excel-de, sew, kollmorgen or lenze.")
-@click.option(
-    "--csv-columns", metavar="NAME,…", help="Of position, velocity, acceleration, jerk; all by default."
-)
-@click.option("--method", metavar="NAME", help="Solver (auto, indirect or direct), or a shaper such as zvd.")
-@click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
-@click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
-@certify_option
+@options.spec
+@options.export("Format to write (see gen-profile formats)")
+@options.folder
+@option("--cycle-time SECONDS", "Cycle of the controller, and SYNC period of the bus.")
+@option("--plc-layout LAYOUT", "Table of a PLC block: segments, samples or counts.")
+@option("--csv-dialect NAME", "rfc4180, excel-de, sew, kollmorgen or lenze.")
+@option("--csv-columns NAME,…", "Of position, velocity, acceleration, jerk; all by default.")
+@option("--method NAME", "Solver (auto, indirect or direct), or a shaper such as zvd.")
+@option("--no-check", "Skip the co-simulation; the manifest then says unverified.")
+@option("--keep-failed", "Write the artefacts even where the check fails.")
+@options.certify
 @signing_option("manifest")
-@output_options
+@options.output
 def design(
     chosen: SpecChoice,
     formats: tuple[str, ...],
@@ -91,7 +70,7 @@ def design(
         stated["export.csv_columns"] = [name.strip() for name in columns.split(",")]
     stated |= {"can.sync_period": export["cycle_time"], "solver.method": method}
     spec = chosen.changed(stated).spec()
-    require_formats(formats)
+    options.require_formats(formats)
     key = signing_key(key_path)
     from gen_profile.cli import words
     from gen_profile.designs.design import design as run
@@ -128,15 +107,15 @@ def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
 
 
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
-@spec_options
-@plot_option
-@click.option("--all", "every", is_flag=True, help="Draw all methods, not only the most telling ones.")
-@click.option(
+@options.spec
+@options.plot
+@option("--all", "Draw all methods, not only the most telling ones.", into="every")
+@option(
     "--base",
-    type=click.Choice(["quintic", "septic", "jerk-limited"]),
-    help="What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
+    "What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
+    click.Choice(["quintic", "septic", "jerk-limited"]),
 )
-@output_options
+@options.output
 def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | None) -> None:
     """Compare optimal profiles with shapers."""
     spec = chosen.changed({"solver.base": base}).spec()
@@ -150,37 +129,30 @@ def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | N
 
 
 @cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")
-@spec_options
-@click.option(
-    "--parameter",
-    "parameters",
-    metavar="NAME",
+@options.spec
+@option(
+    "--parameter NAME",
+    "What is off: once for a curve, twice for a map; the first uncertain parameter by default.",
+    into="parameters",
     multiple=True,
-    help="What is off: once for a curve, twice for a map; the first uncertain parameter by default.",
 )
-@click.option(
-    "--method",
-    "methods",
-    metavar="NAME",
+@option(
+    "--method NAME",
+    "Method to try, as compare names them. Repeatable; all by default.",
+    into="methods",
     multiple=True,
-    help="Method to try, as compare names them. Repeatable; all by default.",
 )
-@click.option(
-    "--range",
-    "half_range",
-    metavar="SHARE",
-    type=Number(0.0, 0.9, min_open=True),
-    help="Greatest relative error, such as 0.3; one and a half times the spec's range by default.",
+@option(
+    "--range SHARE",
+    "Greatest relative error, such as 0.3; one and a half times the spec's range by default.",
+    Number(0.0, 0.9, min_open=True),
+    into="half_range",
 )
-@click.option(
-    "--points",
-    type=Count(3, 1001),
-    help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
-)
-@plot_option
-@click.option("--csv", "path", type=OutputFile(), help="Write the numbers as a table.")
-@output_options
-def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, **options: Any) -> None:
+@option("--points", "Errors tried per parameter; 61 of a curve, 25 of a map by default.", Count(3, 1001))
+@options.plot
+@option("--csv", "Write the numbers as a table.", OutputFile(), into="path")
+@options.output
+def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, **given: Any) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     spec = chosen.spec()
     from gen_profile.artefacts.writing import deliver
@@ -188,7 +160,7 @@ def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, *
     from gen_profile.comparison.robustness import robustness as run
 
     with progress() as tell:
-        curves = run(spec, **options, progress=tell)
+        curves = run(spec, **given, progress=tell)
         draw(curves, picture, tell)
         if path is not None:
             deliver(path, curves.table().encode("utf-8"))
@@ -197,23 +169,25 @@ def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, *
 
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
 @click.argument("artefact", type=PathType())
-@spec_options
-@click.option("--samples", type=Count(0, 1_000_000), help="Draw N machines, in place of check.samples.")
-@click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
-@click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
-@repeatable("--scale", "AXIS=FACTOR", "Judge the motion smaller along an axis, as a playback block plays it.")
-@repeatable("--mirror", "AXIS", "Judge the motion the other way along an axis.")
-@repeatable("--offset", "AXIS=DISTANCE", "Judge the motion begun elsewhere along an axis, in m or rad.")
-@click.option("--csv", "table_path", type=OutputFile(), help="Write all scenarios as a table, one row each.")
-@certify_option
-@click.option("--certificate", type=InputFile(), help="Check a certificate again, and nothing else.")
-@histories_option("Prove a planner block on N histories of commands.")
-@click.option("--history", metavar="N", type=int, help="Run only this history of a planner block's proof.")
-@scheduler_option("run a planner block's histories")
-@block_plot_option
+@options.spec
+@option("--samples", "Draw N machines, in place of check.samples.", Count(0, 1_000_000))
+@option("--scenario N", "Try only the scenario of this number (row).", int)
+@option("--strict", "Let faults in the timing of setpoints count as well.")
+@options.repeatable(
+    "--scale AXIS=FACTOR", "Judge the motion smaller along an axis, as a playback block plays it."
+)
+@options.repeatable("--mirror AXIS", "Judge the motion the other way along an axis.")
+@options.repeatable("--offset AXIS=DISTANCE", "Judge the motion begun elsewhere along an axis, in m or rad.")
+@option("--csv", "Write all scenarios as a table, one row each.", OutputFile(), into="table_path")
+@options.certify
+@option("--certificate", "Check a certificate again, and nothing else.", InputFile())
+@options.histories("Prove a planner block on N histories of commands.")
+@option("--history N", "Run only this history of a planner block's proof.", int)
+@options.scheduler("run a planner block's histories")
+@options.block_plot
 @signed_by_option
-@output_options
-def check(artefact: Path, chosen: SpecChoice, *, public_path: Path | None, **options: Any) -> None:
+@options.output
+def check(artefact: Path, chosen: SpecChoice, *, public_path: Path | None, **given: Any) -> None:
     """Replay, co-simulate and judge an artefact.
 
     The spec comes from the manifest beside the artefact unless one is named.
@@ -227,22 +201,22 @@ def check(artefact: Path, chosen: SpecChoice, *, public_path: Path | None, **opt
 
     judgement: Judgement | BlockJudgement
     unproved: Sequence[str] = ()
-    if options["certificate"] is not None:
-        _require_only(options, ("certificate",), "a check by co-simulation, without --certificate")
-        _repeat_proof(artefact, spec, options["certificate"])
+    if given["certificate"] is not None:
+        _require_only(given, ("certificate",), "a check by co-simulation, without --certificate")
+        _repeat_proof(artefact, spec, given["certificate"])
         return
     if is_planner_block(artefact):
-        _require_only(options, BLOCK_OPTIONS, "a motion, and this is a planner block")
-        judgement = _check_block(artefact, spec, **{name: options[name] for name in BLOCK_OPTIONS})
+        _require_only(given, BLOCK_OPTIONS, "a motion, and this is a planner block")
+        judgement = _check_block(artefact, spec, **{name: given[name] for name in BLOCK_OPTIONS})
         text, document = words.block_judgement(judgement), judgement.to_dict()
     else:
-        _require_only(options, (*MOTION_OPTIONS, "certify"), "a planner block, and this is none")
-        judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
-        if options["certify"] and judgement.variant is not None:
+        _require_only(given, (*MOTION_OPTIONS, "certify"), "a planner block, and this is none")
+        judgement = _check_motion(artefact, spec, **{name: given[name] for name in MOTION_OPTIONS})
+        if given["certify"] and judgement.variant is not None:
             raise SpecError(
                 "--certify: is for the motion as planned, without --scale, --mirror and --offset."
             )
-        certify = options["certify"] and judgement.check.passed
+        certify = given["certify"] and judgement.check.passed
         certificate = _certified(judgement.path, spec) if certify else None
         text, document = words.judgement(judgement, certificate), judgement.to_dict()
         document["certificate"] = certificate and certificate.to_dict()
@@ -259,23 +233,23 @@ MOTION_OPTIONS = ("samples", "scenario", "strict", "scale", "mirror", "offset", 
 BLOCK_OPTIONS = ("histories", "history", "scheduler", "picture")
 
 
-def _require_only(options: Mapping[str, Any], known: Sequence[str], other: str) -> None:
+def _require_only(given: Mapping[str, Any], known: Sequence[str], other: str) -> None:
     """Refuse options that mean nothing here."""
-    for name, value in options.items():
+    for name, value in given.items():
         if name not in known and value not in (None, False, ()):
             option = {"table_path": "csv", "picture": "plot"}.get(name, name)
             raise SpecError(f"--{option}: is for {other}.")
 
 
 def _check_motion(
-    artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **options: Any
+    artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **given: Any
 ) -> Judgement:
     from gen_profile.artefacts.writing import deliver
     from gen_profile.verification.check import check_artefact, scenario_table
 
     with progress() as tell:
         tell("checking by co-simulation")
-        judgement = check_artefact(artefact, spec, row=scenario, progress=tell, **options)
+        judgement = check_artefact(artefact, spec, row=scenario, progress=tell, **given)
     if table_path is not None:
         deliver(table_path, scenario_table(judgement).encode("utf-8"))
     return judgement
@@ -298,13 +272,11 @@ def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path) -> None:
     print_outcome({"certificate": proved.to_dict()}, words.certificate(artefact, proved))
 
 
-def _check_block(
-    artefact: Path, spec: Spec | None, *, picture: Path | None, **options: Any
-) -> BlockJudgement:
+def _check_block(artefact: Path, spec: Spec | None, *, picture: Path | None, **given: Any) -> BlockJudgement:
     from gen_profile.proof.check import check_block
 
     with progress() as tell:
-        judgement = check_block(artefact, spec, **options, progress=tell)
+        judgement = check_block(artefact, spec, **given, progress=tell)
         if picture is not None:
             from gen_profile.charts.proof import draw
 
@@ -313,7 +285,7 @@ def _check_block(
 
 
 @cli.command(epilog="Example: gen-profile formats")
-@output_options
+@options.output
 def formats() -> None:
     """List the export formats."""
     from gen_profile_exporters.registry import formats as known
@@ -325,8 +297,8 @@ def formats() -> None:
 
 @cli.command(epilog="Example: gen-profile plants gantry-crane --plot crane.png")
 @click.argument("name", metavar="[NAME]", required=False)
-@plot_option
-@output_options
+@options.plot
+@options.output
 def plants(name: str | None, picture: Path | None) -> None:
     """List the machines with their axes, loads and parameters, or a single one."""
     from gen_profile.plants.registry import find_plant, plant_types
@@ -375,9 +347,9 @@ def _plant_words(plant: Plant) -> str:
 
 
 @cli.command(epilog="Example: gen-profile presets double-pendulum-crane --out bay-4.toml")
-@click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_presets)
-@click.option("--out", "path", type=OutputFile(), help="Write it to a new file, in place of stdout.")
-@output_options
+@click.argument("name", metavar="[NAME]", required=False, shell_complete=options.complete_presets)
+@option("--out", "Write it to a new file, in place of stdout.", OutputFile(), into="path")
+@options.output
 def presets(name: str | None, path: Path | None) -> None:
     """List the built-in specs, or print one to begin your own with."""
     from gen_profile.spec.reading import preset_text

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
+from gen_profile.cli.options import OutputFile, SpecChoice, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
@@ -20,30 +21,21 @@ PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86
 
 @cli.command(epilog="Example: gen-profile fmu ssp --preset paper --fmi 3 --out paper.ssp")
 @click.argument("kind", type=click.Choice(KINDS))
-@spec_options
-@click.option(
-    "--fmi", "version", type=click.Choice(("2", "3")), default="2", help="Version of FMI; 2 by default."
-)
-@click.option(
+@options.spec
+@option("--fmi", "Version of FMI; 2 by default.", click.Choice(("2", "3")), into="version", default="2")
+@option(
     "--input",
-    "input_name",
-    type=click.Choice(INPUTS),
-    help="What a plant's drives are asked for; setpoint (interpolated positions) by default.",
+    "What a plant's drives are asked for; setpoint (interpolated positions) by default.",
+    click.Choice(INPUTS),
+    into="input_name",
 )
-@click.option(
-    "--platform",
-    type=click.Choice(PLATFORMS),
-    help="What to compile for; this computer by default.",
+@option("--platform", "What to compile for; this computer by default.", click.Choice(PLATFORMS))
+@option("--source-only", "Put no binary in, for TwinCAT and real-time targets.")
+@option(
+    "--out", "FMU or SSP to write; named after the spec in this folder by default.", OutputFile(), into="path"
 )
-@click.option("--source-only", is_flag=True, help="Put no binary in, for TwinCAT and real-time targets.")
-@click.option(
-    "--out",
-    "path",
-    type=OutputFile(),
-    help="FMU or SSP to write; named after the spec in this folder by default.",
-)
-@click.option("--author", metavar="NAME", help="Who made the model; gen-profile by default.")
-@output_options
+@option("--author NAME", "Who made the model; gen-profile by default.")
+@options.output
 def fmu(
     kind: str,
     chosen: SpecChoice,

@@ -84,8 +84,8 @@ class OutputFile(InputFile):
         if ctx is not None and ctx.resilient_parsing:  # of a line that is still being typed
             return path
         if not path.parent.exists():
-            option = "" if param is None else f"{param.opts[0]} {path}: "
-            raise OutputError(f"{option}there is no folder {path.parent}; make it, or name another one.")
+            name = "" if param is None else f"{param.opts[0]} {path}: "
+            raise OutputError(f"{name}there is no folder {path.parent}; make it, or name another one.")
         require_place(path)
         return path
 
@@ -174,29 +174,44 @@ def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> 
     return completed(presets(), incomplete)
 
 
-def preset_option(text: str) -> Callable[[Command], Command]:
+def option(
+    name: str, words: str, value: Any = None, *, into: str | None = None, **more: Any
+) -> Callable[[Command], Command]:
+    """Take an option such as ``--out DIR``; one that names neither a DIR nor a type is a flag."""
+    own_name, _, metavar = name.partition(" ")
+    names = [own_name] if into is None else [own_name, into]
+    is_flag = not metavar and value is None
+    return click.option(*names, metavar=metavar or None, type=value, is_flag=is_flag, help=words, **more)
+
+
+def repeatable(name: str, words: str, *, into: str | None = None) -> Callable[[Command], Command]:
+    """Take an option that may be given more than once; its values go into one parameter."""
+    return option(name, f"{words} Repeatable.", into=into, multiple=True)
+
+
+def preset(text: str) -> Callable[[Command], Command]:
     """Take a preset by its name."""
-    return click.option("--preset", metavar="NAME", shell_complete=complete_presets, help=text)
+    return option("--preset NAME", text, shell_complete=complete_presets)
 
 
-def bitrate_option(channel: str) -> Callable[[Command], Command]:
+def bitrate(channel: str) -> Callable[[Command], Command]:
     """Take the bit rate of a CAN channel."""
     words = f"Of the {channel} in bit/s, where no system sets it; 500000 by default."
-    return click.option("--bitrate", type=Count(10_000, 1_000_000), default=500_000, help=words)
+    return option("--bitrate", words, Count(10_000, 1_000_000), default=500_000)
 
 
-def spec_output_option(name: str) -> Callable[[Command], Command]:
+def spec_output(name: str) -> Callable[[Command], Command]:
     """Take the file of a spec that is written, which may be the one that was read."""
     words = f"Spec to write; ./{name} by default."
-    return click.option("--out", type=OutputFile(replaces="spec_path"), default=name, help=words)
+    return option("--out", words, OutputFile(replaces="spec_path"), default=name)
 
 
-def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def spec(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add what every command that takes a spec takes; the command gets it as `chosen`."""
 
     @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=PathType())
-    @preset_option("Use a built-in spec (see gen-profile presets).")
-    @repeatable("--set", "KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
+    @preset("Use a built-in spec (see gen-profile presets).")
+    @repeatable("--set KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
     @wraps(command)
     def choosing(
         *, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], **options: Any
@@ -207,71 +222,58 @@ def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return choosing
 
 
-def repeatable(
-    option: str, metavar: str, text: str, *, into: str | None = None
-) -> Callable[[Command], Command]:
-    """Make an option that may be given more than once; its values go into one parameter."""
-    words = f"{text} Repeatable."
-    return click.option(option, into or option[2:], metavar=metavar, multiple=True, help=words)
-
-
-def with_options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Add several options, which the help lists in this order."""
+def together(*several: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Take several options, which the help lists in this order."""
 
     def decorate(command: Any) -> Any:
-        for option in reversed(options):
-            command = option(command)
+        for each in reversed(several):
+            command = each(command)
         return command
 
     return decorate
 
 
-def version_option(command: Command) -> Command:
+def version(command: Command) -> Command:
     """Add ``--version``, which tells the commit, too, where the distribution was built from a checkout."""
 
     def show(context: click.Context, _: click.Parameter, asked: bool) -> None:
         if asked and not context.resilient_parsing:
-            from importlib.metadata import version
+            from importlib import metadata
             from importlib.resources import files
 
             commit = files("gen_profile") / "commit.txt"  # of hatch_build.py
             built_from = f" ({commit.read_text('utf-8').strip()})" if commit.is_file() else ""
-            click.echo(version("gen-profile") + built_from)
+            click.echo(metadata.version("gen-profile") + built_from)
             context.exit()
 
-    option = click.option(
-        "--version", is_flag=True, expose_value=False, is_eager=True, callback=show, help="Show the version."
-    )
-    return option(command)
+    return option("--version", "Show the version.", expose_value=False, is_eager=True, callback=show)(command)
 
 
-def scheduler_option(work: str) -> Callable[..., Any]:
+def scheduler(work: str) -> Callable[..., Any]:
     """Name the Dask scheduler whose workers do some work."""
-    return click.option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help=f"Dask scheduler whose workers {work}, such as tcp://10.0.0.1:8786, in place of this computer.",
+    return option(
+        "--scheduler ADDRESS",
+        f"Dask scheduler whose workers {work}, such as tcp://10.0.0.1:8786, in place of this computer.",
     )
 
 
-def export_option(
+def export(
     what: str, default: str = "csv", complete: Completion = _complete_formats
 ) -> Callable[[Command], Command]:
     """Add the choice of formats, and say what becomes of each."""
-    return click.option(
-        "--export",
-        "formats",
-        metavar="FORMAT",
+    return option(
+        "--export FORMAT",
+        f"{what}. Repeatable; {default} by default.",
+        into="formats",
         multiple=True,
         default=(default,),
         shell_complete=complete,
-        help=f"{what}. Repeatable; {default} by default.",
     )
 
 
-def histories_option(text: str) -> Callable[[Command], Command]:
+def histories(text: str) -> Callable[[Command], Command]:
     """Take a number of histories of commands, on which a planner block is proved."""
-    return click.option("--histories", type=Count(1, 1_000_000), help=text)
+    return option("--histories", text, Count(1, 1_000_000))
 
 
 def require_formats(names: Iterable[str]) -> None:
@@ -287,34 +289,31 @@ def require_formats(names: Iterable[str]) -> None:
         find_exporter(name)
 
 
-folder_option = click.option(
-    "--out",
-    "folder",
-    metavar="DIR",
-    type=PathType(),
+folder = option(
+    "--out DIR",
+    "Folder to write to; ./gen-profile-out by default.",
+    PathType(),
+    into="folder",
     default="gen-profile-out",
-    help="Folder to write to; ./gen-profile-out by default.",
 )
-plot_option = click.option("--plot", "picture", type=PictureFile(), help="Draw it (png, svg or pdf).")
-block_plot_option = click.option(
+plot = option("--plot", "Draw it (png, svg or pdf).", PictureFile(), into="picture")
+block_plot = option(
     "--plot",
-    "picture",
-    type=PictureFile(),
-    help="Draw a planner block's worst history (or --history), and the worst over the live parameters.",
+    "Draw a planner block's worst history (or --history), and the worst over the live parameters.",
+    PictureFile(),
+    into="picture",
 )
-certify_option = click.option(
-    "--certify", is_flag=True, help="Prove it for all machines in the ranges, and write a certificate."
-)
+certify = option("--certify", "Prove it for all machines in the ranges, and write a certificate.")
 
 
-def output_options(command: Command) -> Command:
+def output(command: Command) -> Command:
     """Add how every command says what came of it; let none write over what it reads."""
 
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
-    @click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks.")
+    @option("--json", "Print one JSON document on stdout.", into="as_json")
+    @option("--debug", "Log details, and show tracebacks.", expose_value=False)
     @wraps(command)
     def careful(*, as_json: bool, **values: Any) -> Any:
-        del as_json  # which is for `print_outcome`
+        # `as_json` is for `print_outcome`
         _require_apart(click.get_current_context())
         return command(**values)
 

@@ -12,24 +12,10 @@ import click
 from click.shell_completion import CompletionItem
 
 from gen_profile.bounded_file import DOCUMENT, read_bounded
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
-from gen_profile.cli.options import (
-    InputFile,
-    OutputFile,
-    PathType,
-    SpecChoice,
-    block_plot_option,
-    completed,
-    export_option,
-    folder_option,
-    histories_option,
-    output_options,
-    repeatable,
-    scheduler_option,
-    spec_options,
-    with_options,
-)
+from gen_profile.cli.options import InputFile, OutputFile, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, signing_key, signing_option
@@ -45,7 +31,7 @@ CLEARED = "\r\x1b[K"  # the line, of a terminal
 def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import containers
 
-    return completed(dict.fromkeys((*containers(), "c", "linux", "openplc")), incomplete)
+    return options.completed(dict.fromkeys((*containers(), "c", "linux", "openplc")), incomplete)
 
 
 @cli.group(
@@ -59,16 +45,16 @@ def planner() -> None:
 
 
 @planner.command(epilog="Example: gen-profile planner --preset bay-crane --export siemens-scl --out deploy")
-@spec_options
-@export_option("Form of the block: plc, another that holds one, c, linux or openplc", "plc", _complete_forms)
-@folder_option
-@histories_option("Prove it on N histories of commands; on 200 by default.")
-@scheduler_option("run the histories")
-@click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
-@click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")
-@block_plot_option
+@options.spec
+@options.export("Form of the block: plc, another that holds one, c, linux or openplc", "plc", _complete_forms)
+@options.folder
+@options.histories("Prove it on N histories of commands; on 200 by default.")
+@options.scheduler("run the histories")
+@option("--no-check", "Skip the proof; the manifest then says unverified.")
+@option("--keep-failed", "Write the block even where the proof fails.")
+@options.block_plot
 @signing_option("manifest")
-@output_options
+@options.output
 def write(
     chosen: SpecChoice,
     formats: tuple[str, ...],
@@ -78,7 +64,7 @@ def write(
     no_check: bool,
     picture: Path | None,
     key_path: Path | None,
-    **options: Any,
+    **given: Any,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
     spec = chosen.spec()
@@ -99,7 +85,7 @@ def write(
             histories=histories or HISTORIES,
             check=not no_check,
             progress=tell,
-            **options,
+            **given,
         )
         if picture is not None and outcome.proof is not None:
             from gen_profile.charts.proof import draw
@@ -122,34 +108,29 @@ def write(
     epilog="Example: gen-profile planner play deploy/bay-3.st --commands commands.csv --out setpoints.csv"
 )
 @click.argument("block", type=PathType())
-@click.option(
+@option(
     "--commands",
-    "commands_path",
-    type=InputFile(),
+    "CSV with time_s, command, value (or value_AXIS) and live parameters; a row holds until the next.",
+    InputFile(),
+    into="commands_path",
     required=True,
-    help="CSV with time_s, command, value (or value_AXIS) and live parameters; a row holds until the next.",
 )
-@click.option(
-    "--out",
-    "path",
-    type=OutputFile(),
-    required=True,
-    help="CSV of the setpoints to write, one row per cycle.",
+@option(
+    "--out", "CSV of the setpoints to write, one row per cycle.", OutputFile(), into="path", required=True
 )
-@click.option(
+@option(
     "--events",
-    "events_path",
-    type=OutputFile(),
-    help="CSV of the block's events to write, if it keeps them (planner.events).",
+    "CSV of the block's events to write, if it keeps them (planner.events).",
+    OutputFile(),
+    into="events_path",
 )
-@click.option(
+@option(
     "--sensor",
-    "sensor_path",
-    type=InputFile(),
-    help="CSV with time_s, value (of several axes value_AXIS): what sensors show; "
-    "each row holds until the next.",
+    "CSV with time_s, value (of several axes value_AXIS): what sensors show; each row holds until the next.",
+    InputFile(),
+    into="sensor_path",
 )
-@output_options
+@options.output
 def play(
     block: Path, commands_path: Path, path: Path, events_path: Path | None, sensor_path: Path | None
 ) -> None:
@@ -184,7 +165,7 @@ def play(
 
 @planner.command(epilog="Example: gen-profile planner explain events.csv")
 @click.argument("events", type=InputFile())
-@output_options
+@options.output
 def explain(events: Path) -> None:
     """Say in words what a planner block's events mean: a CSV with time_s, code, value."""
     from gen_profile.planner.events import read_events
@@ -208,23 +189,16 @@ def _read(path: Path, what: str = "commands") -> str:
         raise OutputError(f"Cannot read the {what} {path}: it is no UTF-8 text.") from error
 
 
-planner_options = with_options(
-    click.option(
-        "--planner",
-        "block",
-        metavar="BLOCK",
-        type=PathType(),
-        help="Stream what this written planner block issues.",
-    ),
-    click.option(
+planner_options = options.together(
+    option("--planner BLOCK", "Stream what this written planner block issues.", PathType(), into="block"),
+    option(
         "--commands",
-        "commands_path",
-        type=InputFile(),
-        help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
+        "CSV of commands for --planner, as of planner play; without it, the keyboard.",
+        InputFile(),
+        into="commands_path",
     ),
-    repeatable(
-        "--live-parameter",
-        "NAME=VALUE",
+    options.repeatable(
+        "--live-parameter NAME=VALUE",
         "What a live parameter of --planner is from the start.",
         into="live_parameters",
     ),
@@ -276,7 +250,6 @@ def status_line() -> Iterator[Progress]:
     import shutil
 
     def tell(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
-        del done, total, remark
         width = shutil.get_terminal_size().columns - 1
         click.echo(f"{CLEARED}{stage[:width]}", err=True, nl=False)
 

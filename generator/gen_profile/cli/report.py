@@ -9,17 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    Number,
-    OutputFile,
-    PathType,
-    SpecChoice,
-    export_option,
-    output_options,
-    repeatable,
-    spec_options,
-)
+from gen_profile.cli.options import Number, OutputFile, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.errors import OutputError, SpecError
@@ -29,42 +21,38 @@ if TYPE_CHECKING:
 
 
 @cli.command(epilog="Example: gen-profile report crane.toml --out crane.html")
-@spec_options
-@click.option(
+@options.spec
+@option(
     "--out",
-    "path",
-    type=OutputFile(),
-    help="File to write, .html or .pdf; an .html named after the spec in this folder by default.",
+    "File to write, .html or .pdf; an .html named after the spec in this folder by default.",
+    OutputFile(),
+    into="path",
 )
-@repeatable(
-    "--field",
-    "NAME=VALUE",
+@options.repeatable(
+    "--field NAME=VALUE",
     "What the page shall also say, as Customer=ACME; without a value, a line to sign.",
     into="fields",
 )
-@export_option("Format whose file is checked and named by its hash (see gen-profile formats)")
-@click.option(
-    "--measured",
-    "log",
-    metavar="LOG.csv",
-    type=PathType(),
-    help="What the machine really did: columns time_s, <axis>_position_mm, <load>_sway_mm, <load>_angle_deg.",
+@options.export("Format whose file is checked and named by its hash (see gen-profile formats)")
+@option(
+    "--measured LOG.csv",
+    "What the machine really did: columns time_s, <axis>_position_mm, <load>_sway_mm, <load>_angle_deg.",
+    PathType(),
+    into="log",
 )
-@click.option(
-    "--measured-start",
-    "log_start",
-    metavar="SECONDS",
-    type=Number(),
-    help="When the move begins in the log; found by itself by default.",
+@option(
+    "--measured-start SECONDS",
+    "When the move begins in the log; found by itself by default.",
+    Number(),
+    into="log_start",
 )
-@click.option(
-    "--columns",
-    "log_columns",
-    metavar="MEANING=COLUMN,…",
-    help="Which column of the log holds what, as in time_ms=Zeit,payload_sway_mm=4; by names by default.",
+@option(
+    "--columns MEANING=COLUMN,…",
+    "Which column of the log holds what, as in time_ms=Zeit,payload_sway_mm=4; by names by default.",
+    into="log_columns",
 )
-@click.option("--no-compare", is_flag=True, help="Leave other methods out, which takes less time.")
-@output_options
+@option("--no-compare", "Leave other methods out, which takes less time.")
+@options.output
 def report(
     chosen: SpecChoice,
     path: Path | None,
@@ -77,13 +65,13 @@ def report(
     from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.report.print import printed, require_browser
 
-    options = {**log, "compared": not no_compare}
+    given = {**log, "compared": not no_compare}
     if chosen.path is not None and _holds_block(chosen.path):
         name, make, words = _of_block(chosen.path)
     elif chosen.path is not None and _is_artefact(chosen.path):
-        name, make, words = _of_artefact(chosen.path, **options)
+        name, make, words = _of_artefact(chosen.path, **given)
     else:
-        name, make, words = _of_design(chosen.spec(), formats, **options)
+        name, make, words = _of_design(chosen.spec(), formats, **given)
     out = path or Path(f"{name}.html")
     on_paper = out.suffix.lower() == ".pdf"
     if not on_paper and out.suffix.lower() not in {".html", ".htm"}:
@@ -115,11 +103,11 @@ for parameter in report.params:
 _Subject = tuple[str, Callable[..., Any], Callable[[Any, Path], str]]
 
 
-def _of_design(spec: Spec, formats: tuple[str, ...], **options: Any) -> _Subject:
+def _of_design(spec: Spec, formats: tuple[str, ...], **given: Any) -> _Subject:
     from gen_profile.cli import words
     from gen_profile.report.build import report as run
 
-    return spec.name, partial(run, spec, formats, **options), words.report
+    return spec.name, partial(run, spec, formats, **given), words.report
 
 
 def _of_block(path: Path) -> _Subject:
@@ -134,15 +122,15 @@ def _of_block(path: Path) -> _Subject:
     return path.stem, partial(planner_report, path), words.planner_report
 
 
-def _of_artefact(path: Path, **options: Any) -> _Subject:
+def _of_artefact(path: Path, **given: Any) -> _Subject:
     """Make a report of the design that a file comes from."""
     from gen_profile.cli import words
     from gen_profile.report.build import artefact_report
 
-    for name, option in {"preset": "--preset", "overrides": "--set", "formats": "--export"}.items():
+    for name, flag in {"preset": "--preset", "overrides": "--set", "formats": "--export"}.items():
         if _given(name):
-            raise SpecError(f"{option}: is for a spec; {path} is of the one in its manifest.")
-    return path.name.partition(".")[0], partial(artefact_report, path, **options), words.report
+            raise SpecError(f"{flag}: is for a spec; {path} is of the one in its manifest.")
+    return path.name.partition(".")[0], partial(artefact_report, path, **given), words.report
 
 
 def _given(name: str | None) -> bool:

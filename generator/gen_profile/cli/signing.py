@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_profile.cli.options import InputFile
+from gen_profile.cli.options import InputFile, option
 from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
     from gen_profile.artefacts.signature import Key
 
-signed_by_option = click.option(
-    "--signed-by", "public_path", type=InputFile(), help="Refuse what this public key has not signed."
+signed_by_option = option(
+    "--signed-by", "Refuse what this public key has not signed.", InputFile(), into="public_path"
 )
 
 
 def signing_option(what: str) -> Callable[[Any], Any]:
     """Take the key that signs a manifest, or something else."""
     words = f"Sign the {what} with this secret key, made by minisign -GW."
-    return click.option("--sign", "key_path", type=InputFile(), help=words)
+    return option("--sign", words, InputFile(), into="key_path")
 
 
 def signing_key(path: Path | None) -> Key | None:

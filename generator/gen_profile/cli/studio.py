@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, controller_options
-from gen_profile.cli.options import Count, PathType, output_options, spec_options
+from gen_profile.cli.options import Count, PathType, option
 from gen_profile.cli.outcome import as_json
 from gen_profile.cli.progress import progress
 from gen_profile.errors import SpecError
@@ -22,23 +23,17 @@ if TYPE_CHECKING:
 
 
 @cli.command(epilog="Example: gen-profile studio bay-3.toml")
-@spec_options
-@click.option(
-    "--port",
-    type=Count(0, 65535),
-    default=0,
-    help="Port on the loopback interface; any that is free by default.",
-)
-@click.option("--no-browser", is_flag=True, help="Open no browser; print the address and a code for one.")
-@click.option(
-    "--watch",
-    "artefact",
-    type=PathType(),
-    metavar="FILE",
-    help="Watch the controller --to, which uses this file's table, as deploy --watch does.",
+@options.spec
+@option("--port", "Port on the loopback interface; any that is free by default.", Count(0, 65535), default=0)
+@option("--no-browser", "Open no browser; print the address and a code for one.")
+@option(
+    "--watch FILE",
+    "Watch the controller --to, which uses this file's table, as deploy --watch does.",
+    PathType(),
+    into="artefact",
 )
 @controller_options(required=False)
-@output_options
+@options.output
 def studio(
     chosen: SpecChoice, port: int, *, no_browser: bool, artefact: Path | None, **controller: Any
 ) -> None:

@@ -6,17 +6,9 @@ from pathlib import Path
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    Count,
-    OutputFile,
-    PathType,
-    SpecChoice,
-    export_option,
-    output_options,
-    scheduler_option,
-    spec_options,
-)
+from gen_profile.cli.options import Count, OutputFile, PathType, SpecChoice, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 
@@ -25,33 +17,27 @@ from gen_profile.cli.progress import progress
     epilog="Example: gen-profile sweep crane.toml --vary move.distance=0.5:10:20 --vary plant.L1=2:8:25 "
     "--export plc --out library"
 )
-@spec_options
-@click.option(
-    "--vary",
-    "axes",
-    metavar="KEY=LO:HI:N",
+@options.spec
+@option(
+    "--vary KEY=LO:HI:N",
+    "A key of the spec and its values: N from LO to HI, or KEY=VALUE,VALUE,… Repeatable: all "
+    "combinations; the last one is solved along.",
+    into="axes",
     multiple=True,
     required=True,
-    help="A key of the spec and its values: N from LO to HI, or KEY=VALUE,VALUE,… Repeatable: all "
-    "combinations; the last one is solved along.",
 )
-@export_option("Format to write (see gen-profile formats)")
-@click.option(
-    "--out",
-    "folder",
-    metavar="DIR|FILE.sqlite",
-    type=PathType(),
-    default="gen-profile-sweep",
-    help="Folder to write to, or one file for everything; ./gen-profile-sweep by default. A sweep begun "
+@options.export("Format to write (see gen-profile formats)")
+@option(
+    "--out DIR|FILE.sqlite",
+    "Folder to write to, or one file for everything; ./gen-profile-sweep by default. A sweep begun "
     "there goes on.",
+    PathType(),
+    into="folder",
+    default="gen-profile-sweep",
 )
-@scheduler_option("do it")
-@click.option(
-    "--workers",
-    type=Count(min=1),
-    help="Processes of this computer; one per processor by default.",
-)
-@output_options
+@options.scheduler("do it")
+@option("--workers", "Processes of this computer; one per processor by default.", Count(min=1))
+@options.output
 def sweep(
     chosen: SpecChoice,
     *,
@@ -85,13 +71,12 @@ def sweep(
     context_settings={"ignore_unknown_options": True},
 )
 @click.argument("words", metavar="DIR|FILE --KEY VALUE …", nargs=-1, type=click.UNPROCESSED)
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=PathType(file_okay=False),
-    help="Folder to write the profile to, with its manifest; it stays where it is by default.",
+@option(
+    "--out DIR",
+    "Folder to write the profile to, with its manifest; it stays where it is by default.",
+    PathType(file_okay=False),
 )
-@output_options
+@options.output
 def lookup(words: tuple[str, ...], out: Path | None) -> None:
     """Find the nearest safe profile of a sweep.
 
@@ -109,14 +94,14 @@ def lookup(words: tuple[str, ...], out: Path | None) -> None:
 
 @cli.command(epilog="Example: gen-profile library swept --out crane.st")
 @click.argument("folder", metavar="DIR|FILE", type=PathType())
-@click.option(
+@option(
     "--out",
-    "path",
-    type=OutputFile(),
+    "File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
+    OutputFile(),
+    into="path",
     default="library.st",
-    help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )
-@output_options
+@options.output
 def library(folder: Path, path: Path) -> None:
     """Put a sweep's PLC blocks into one.
 

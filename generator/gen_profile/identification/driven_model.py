@@ -49,7 +49,7 @@ class DrivenModel(SwingModel):
 
     def guess(self, parameters: Mapping[str, float], until: float) -> Array:
         """Find the start that this machine agrees with best, as if it had hung at rest."""
-        del until  # it takes a whole motion to tell when that began
+        # it takes a whole motion to tell when that began
         starts, _ = self.guesses([parameters])
         return np.asarray(starts[0])
 

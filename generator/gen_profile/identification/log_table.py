@@ -53,10 +53,13 @@ class LogTable:
         Of what is no blank line; at least one. It tells each one's line in the file, too.
     decimal_comma : bool
         Whether a comma may stand for a decimal point.
+    source : str
+        Where it comes from, for errors.
     """
 
     rows: "_Rows"
     decimal_comma: bool
+    source: str
 
     def cell(self, row: int, place: int) -> str:
         """Text of a cell; empty where the row ends before."""
@@ -90,7 +93,7 @@ class LogTable:
         fits = ((names & set(cells)) if names else len(cells) >= most for cells in self.rows)
         return next((row for row, fit in enumerate(fits) if fit), 0)
 
-    def place(self, head: int, column: str, source: str) -> int:
+    def place(self, head: int, column: str) -> int:
         """Find a column by its name in a row of names, or by its number from 1.
 
         Raises
@@ -106,9 +109,7 @@ class LogTable:
         hint: str = Phrase("; there are {rows}, without names.", rows=len(self.rows[head]))
         if names:
             hint = suggestion(column, names)
-        raise OutputError(
-            "{source}: there is no column {column!r}{hint}", source=source, column=column, hint=hint
-        )
+        raise self._fault("{source}: there is no column {column!r}{hint}", column=column, hint=hint)
 
     def unit(self, head: int, place: int) -> str:
         """Read a column's unit off its name or off the cell below that; empty where neither tells one."""
@@ -125,7 +126,7 @@ class LogTable:
         """Tell whether a row holds more than numbers."""
         return any(math.isnan(self.number(row, place)) for place in range(len(self.rows[row])))
 
-    def numbers(self, head: int, places: Sequence[int], source: str) -> Array:
+    def numbers(self, head: int, places: Sequence[int]) -> Array:
         """Read columns of numbers, the first of which are times, below a row; shape (rows, columns).
 
         What stands above the first time is passed over, and rows in which a logger left a cell empty. Dates
@@ -139,7 +140,7 @@ class LogTable:
         time, values = places[0], array("d")
         below = range(head + self.is_head(head), len(self.rows))
         first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
-        self._require_separate(head, first, source)
+        self._require_separate(head, first)
         for row in range(first, len(self.rows)):
             held = [self.cell(row, place) for place in places]
             if not all(held):
@@ -155,14 +156,14 @@ class LogTable:
                     template = (
                         "{source}, row {row}: {name} holds {text!r}, which is no number of a log{hint}."
                     )
-                    raise OutputError(template, source=source, row=line, name=name, text=text[:40], hint=hint)
+                    raise self._fault(template, row=line, name=name, text=text[:40], hint=hint)
             values.extend(values_here)
         table = np.array(values).reshape(-1, len(places))
         if len(table) and math.isnan(self.number(first, time)):  # a date
             table[:, 0] -= table[0, 0]
         return table
 
-    def _require_separate(self, head: int, first: int, source: str) -> None:
+    def _require_separate(self, head: int, first: int) -> None:
         """Refuse numbers whose decimal commas separate columns, too: they are twice as many as the names."""
         names, cells = len(self.rows[head]), self.rows[first] if first < len(self.rows) else ()
         whole = all(cell.lstrip("+-").isdecimal() for cell in cells)
@@ -171,8 +172,10 @@ class LogTable:
                 "{source}, row {row}: holds {count} numbers below {names} names; where decimals have commas, "
                 "separate columns by semicolons or tabs."
             )
-            line = self.rows.line(first)
-            raise OutputError(template, source=source, row=line, count=len(cells), names=names)
+            raise self._fault(template, row=self.rows.line(first), count=len(cells), names=names)
+
+    def _fault(self, template: str, **values: object) -> OutputError:
+        return OutputError(template, source=self.source, **values)
 
 
 def read_text(path: Path, option: str) -> str:
@@ -233,7 +236,7 @@ def read_table(text: str, source: str) -> LogTable:
         raise OutputError("{source}: the log is empty.", source=source)
     common = (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines))
     rows.separator = next(common, ",")
-    return LogTable(rows=rows, decimal_comma=rows.separator != ",")
+    return LogTable(rows=rows, decimal_comma=rows.separator != ",", source=source)
 
 
 class _Rows(Sequence[Sequence[str]]):

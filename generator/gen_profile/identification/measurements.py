@@ -205,13 +205,13 @@ def parse_swing(
     """
     cells = read_table(text, source)
     head = cells.head(columns)
-    places = [cells.place(head, column, source) for column in columns]
+    places = [cells.place(head, column) for column in columns]
     known = ((per_second, "time", TIME_UNITS), (per_unit, quantity, units_of(SI_UNITS[quantity])))
     scales = [
         per or _per_stated(cells.cell(head, place), cells.unit(head, place), source, measured, units)
         for place, (per, measured, units) in zip(places, known, strict=True)
     ]
-    table = cells.numbers(head, places, source) / scales
+    table = cells.numbers(head, places) / scales
     return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
 
 

@@ -22,7 +22,7 @@ from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, 
 
 def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the two ropes' equations of motion (module docstring)."""
-    del q_a, dq_a  # the ropes feel the cart's acceleration only
+    # the ropes feel the cart's acceleration only
     (theta1, theta2), (dtheta1, dtheta2) = q_u, dq_u
     mass = p.m1 + p.m2
     coupling = p.m2 * p.L2 * np.cos(theta2)
@@ -43,7 +43,6 @@ def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNam
 
 def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Sway relative to the cart, height below it and rope angle, of hook and payload."""
-    del q_a
     theta1, theta2 = q_u
     hook_sway = p.L1 * np.sin(theta1)
     hook_height = -p.L1 * np.cos(theta1)

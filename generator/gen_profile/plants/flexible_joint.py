@@ -21,14 +21,13 @@ from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, 
 
 def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the arm's equation of motion (module docstring)."""
-    del q_a, dq_a  # the arm feels the hub's acceleration only
+    # the arm feels the hub's acceleration only
     (alpha,), (rate,) = q_u, dq_u
     return Equations(M_uu=[[p.J]], M_au=[[-p.J]], K_u=[-p.k * alpha], G_u=[-p.c * rate])
 
 
 def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Arc by which the arm's tip trails the hub, in m, and the joint's angle."""
-    del q_a
     (alpha,) = q_u
     return Outputs(sway=[p.R * alpha], height=[0.0], angle=[alpha])
 

@@ -21,7 +21,7 @@ from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, 
 
 def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the payload's equations of motion (module docstring)."""
-    del q_a, dq_a  # the rope feels the trolley's acceleration only
+    # the rope feels the trolley's acceleration only
     (theta_x, theta_y), (rate_x, rate_y) = q_u, dq_u
     sx, cx, sy, cy = np.sin(theta_x), np.cos(theta_x), np.sin(theta_y), np.cos(theta_y)
     damping = p.c / (p.m * p.L)
@@ -38,7 +38,6 @@ def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNam
 
 def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Sway of the payload in both directions, its height below the trolley, and the rope's two angles."""
-    del q_a
     theta_x, theta_y = q_u
     height = -p.L * np.cos(theta_x) * np.cos(theta_y)
     return Outputs(

@@ -75,7 +75,7 @@ def _equations(masses: int) -> Callable[..., Equations]:
     numbers = range(1, masses + 1)
 
     def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
-        del q_a, dq_a  # the chain feels the axis' acceleration only
+        # the chain feels the axis' acceleration only
         mass, stiffness, damping = ([getattr(p, f"{name}{i}") for i in numbers] for name in "mkc")
         springs, dampers = _forces(stiffness, q_u), _forces(damping, dq_u)
         return Equations(
@@ -100,7 +100,6 @@ def _steps(values: Vector) -> list[Scalar]:
 
 def _outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Distance by which every mass trails its place behind the axis."""
-    del q_a, p
     nothing = [0.0 for _ in q_u]
     return Outputs(sway=list(q_u), height=nothing, angle=nothing)
 

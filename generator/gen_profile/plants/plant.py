@@ -129,7 +129,6 @@ class Mechanics:
 
 
 def _no_bodies(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
-    del q_u, q_a, p
     return Mechanics(mass=[], place=[])
 
 

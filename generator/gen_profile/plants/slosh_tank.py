@@ -42,7 +42,7 @@ SURFACE = 17  # points of the liquid's drawn surface
 
 def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the pendulums' equations of motion (module docstring)."""
-    del q_a, dq_a  # the liquid feels the tank's acceleration only
+    # the liquid feels the tank's acceleration only
     lengths, dampings = zip(*(_pendulum(odd, p) for odd in ODD), strict=True)
     return Equations(
         M_uu=[[lengths[0], 0.0], [0.0, lengths[1]]],
@@ -67,7 +67,6 @@ def _pendulum(odd: int, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
 
 def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Rise of the liquid at the trailing wall, and the first mode's angle."""
-    del q_a
     rise = sum(_rises(q_u, p))
     return Outputs(sway=[rise], height=[rise], angle=[q_u[0]])
 

@@ -7,6 +7,7 @@ from math import inf
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.proof import statements
 from gen_profile.proof.followed import (
     AHEAD,
     ENABLED,
@@ -32,22 +33,8 @@ from gen_profile.proof.followed import (
     slowing,
 )
 from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
-from gen_profile.proof.statements import (
-    blocked,
-    events,
-    numbers,
-    promises,
-    remains,
-    slowed,
-    stops,
-    taken_over,
-    truths,
-    velocities,
-)
 
-MORE = (
-    0.1  # of the greatest velocity: by so much, after its first pulses, a plan may exceed a slow stick (0.05)
-)
+MORE = 0.1  # of the greatest velocity, by which a plan may exceed a slow stick after its first pulses (0.05)
 BACK = 0.03  # likewise, at which an axis may go back (0.013)
 LATER = {kind: f"{kind}, on average" for kind in ON_AVERAGE}  # what is measured but not judged by one
 STILL = 1e-6  # m, from a target that an axis need not leave for
@@ -129,16 +116,16 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         _velocity_limits,
         _sticks,
         _quick_stops,
-        truths,
-        velocities,
-        stops,
-        numbers,
-        promises,
-        remains,
-        events,
-        blocked,
-        slowed,
-        taken_over,
+        statements.truths,
+        statements.velocities,
+        statements.stops,
+        statements.numbers,
+        statements.promises,
+        statements.remains,
+        statements.events,
+        statements.blocked,
+        statements.slowed,
+        statements.taken_over,
     ):
         yield from judge(followed, motion)
     yield from _reactions(followed, motion, reactions)

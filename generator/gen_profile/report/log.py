@@ -120,7 +120,7 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     head, known = _known_columns(table, spec, where, columns)
     known.sort(key=lambda pair: pair[1].quantity != "time")
     places = [place for place, _ in known]
-    numbers = table.numbers(head, places, where)
+    numbers = table.numbers(head, places)
     signals = {
         (column.quantity, column.owner): values / column.divisor
         for (_, column), values in zip(known, numbers.T, strict=True)
@@ -162,7 +162,7 @@ def _known_columns(
         known = {meaning: _required(meaning, spec, where) for meaning in chosen}
     _require(known, names, spec, where)
     if columns is not None:
-        places = [table.place(head, column, where) for column in chosen.values()]
+        places = [table.place(head, column) for column in chosen.values()]
         known = {
             meaning: _required(_in_stated_unit(meaning, table.unit(head, place), where), spec, where)
             for meaning, place in zip(chosen, places, strict=True)

@@ -56,7 +56,7 @@ def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measure
     if ignored := ", ".join(measured.log.ignored):
         words.append(Phrase("Columns that were left alone: {ignored}.", ignored=ignored))
     caption = "Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on."
-    figure = Figure(caption=caption, panels=[*_panels(spec, evaluation, measured)])
+    figure = Figure(caption, [*_panels(spec, evaluation, measured)])
     return Section(title="What the machine did", words=[" ".join(words)], blocks=[_table(measured), figure])
 
 
@@ -93,16 +93,16 @@ def _share(sway: MeasuredSway) -> float:
 
 
 def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Iterator[Panel]:
-    bands = [Band(low=measured.arrival, high=measured.arrival)]
+    bands = [Band(measured.arrival, measured.arrival)]
     names = [axis.name for axis in spec.machine().actuated]
     for axis, signal in measured.positions.items():
         unit, factor = place_unit(spec, names.index(axis))
         title, label = Phrase("Position of {axis}", axis=axis), Phrase("position ({unit})", unit=unit)
-        yield Panel(title=title, y_label=label, lines=_lines(signal, factor), bands=bands)
+        yield Panel(title, label, _lines(signal, factor), bands=bands)
         title = Phrase("Deviation of {axis}", axis=axis)
         label = Phrase("deviation (m{unit})", unit=signal.unit)
         deviation = _line("measured", signal.times, 1e3 * signal.deviation, MEASURED)
-        yield Panel(title=title, y_label=label, lines=[deviation], bands=bands)
+        yield Panel(title, label, [deviation], bands=bands)
     loads = list(spec.machine().loads)
     for load, sway in measured.sways.items():
         lines = _lines(sway.signal, 1e3)
@@ -110,13 +110,13 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
         if measured.nearest:
             like = evaluation.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
             name = Phrase("planned, {name}", name=machine(evaluation.machines[measured.nearest].name))
-            lines.append(Line(name=name, x=times, y=1e3 * like, style=NEAREST))
+            lines.append(Line(name, times, 1e3 * like, NEAREST))
         levels = sway_levels(spec, load, measured.arrival, float(times[-1]))
         title = Phrase("Sway of the {load}", load=load)
-        yield Panel(title=title, y_label="sway (mm)", lines=lines, levels=levels, bands=bands)
+        yield Panel(title, "sway (mm)", lines, levels=levels, bands=bands)
     for load, signal in measured.angles.items():
         title = Phrase("Angle of the {load}", load=load)
-        yield Panel(title=title, y_label="angle (mrad)", lines=_lines(signal, 1e3), bands=bands)
+        yield Panel(title, "angle (mrad)", _lines(signal, 1e3), bands=bands)
 
 
 def _lines(signal: Signal, factor: float) -> list[Line]:
@@ -127,4 +127,4 @@ def _lines(signal: Signal, factor: float) -> list[Line]:
 def _line(name: str, times: Array, values: Array, style: Style) -> Line:
     """Draw a signal without samples that no screen would show."""
     kept = np.unique(np.linspace(0, len(times) - 1, DRAWN).round().astype(int))
-    return Line(name=name, x=times[kept], y=values[kept], style=style)
+    return Line(name, times[kept], values[kept], style)

@@ -202,7 +202,6 @@ def _wind(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Hold the ranges of the check to what can be tried, and to what tries it."""
-    del plant
     changed = spec.checked_ranges()
     if len(changed) > MOST_CORNERS:
         template = (

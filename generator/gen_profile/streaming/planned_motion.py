@@ -21,17 +21,8 @@ from gen_profile.spec.model import Spec
 from gen_profile.streaming.status import StatusLine
 from gen_profile.suggestion import suggestion
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, scaling
 from gen_profile_exporters.can.frames import Integers
-from gen_profile_exporters.can.scaling import (
-    Demand,
-    exact,
-    exact_counts,
-    magnitude_counts,
-    quick_stop_deceleration,
-    setpoints,
-    travel_counts,
-)
 from gen_profile_exporters.can.sensor_frame import values_in
 from gen_profile_exporters.can.streaming.plan import Step, cycle_of
 from gen_profile_exporters.exporter import Target, target_of
@@ -291,7 +282,7 @@ class PlannedMotion:
         sampled = SampledProfile(
             cycle_time=period, position=columns[0], velocity=columns[1], acceleration=columns[2]
         )
-        scaled = setpoints(sampled, self.target)
+        scaled = scaling.setpoints(sampled, self.target)
         row = 1 if csv else 2  # a velocity leads from one position to the next
         at_sync = scaled.position[1]
         over = self._ends or self._operator.over
@@ -329,10 +320,10 @@ def _sensor_inputs(spec: Spec, axes: Sequence[BlockAxis], cycle: float) -> tuple
     return shown, round((sensor.delay[1] - sensor.delay[0]) / cycle)
 
 
-def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> Demand:
+def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> scaling.Demand:
     """Find what the planner may ask of its axes."""
     limits, can = [spec.limits.of(number) for number in numbers], target.can
-    return Demand(
+    return scaling.Demand(
         start=None,
         ends=tuple(
             _ends(own.travel or (0.0, 0.0), axis, can) for own, axis in zip(limits, target.axes, strict=True)
@@ -340,7 +331,9 @@ def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> Demand:
         velocity=_counted([own.velocity for own in limits], target),
         acceleration=_counted([own.acceleration for own in limits], target),
         quick_stop=tuple(
-            quick_stop_deceleration(magnitude_counts(quick_limits(spec, number)[0], axis), can, axis)
+            scaling.quick_stop_deceleration(
+                scaling.magnitude_counts(quick_limits(spec, number)[0], axis), can, axis
+            )
             for number, axis in zip(numbers, target.axes, strict=True)
         ),
     )
@@ -349,7 +342,7 @@ def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> Demand:
 def _counted(limits: Sequence[float | None], target: Target) -> tuple[float, ...]:
     """Scale limits, which are all stated, or there would be no block."""
     return tuple(
-        float(magnitude_counts(limit, axis))
+        float(scaling.magnitude_counts(limit, axis))
         for limit, axis in zip(limits, target.axes, strict=True)
         if limit is not None
     )
@@ -357,10 +350,10 @@ def _counted(limits: Sequence[float | None], target: Target) -> tuple[float, ...
 
 def _ends(travel: tuple[float, float], axis: AxisScale, can: CanSpec) -> tuple[int, int]:
     """Scale an axis's travel, which its drive's must hold."""
-    ends = exact_counts(np.array(travel), exact(axis.counts_per_si))
+    ends = scaling.exact_counts(np.array(travel), scaling.exact(axis.counts_per_si))
     require_within(INT32, ends, f"axis {axis.name}", TOO_FAR, can.sync_period)
     least, greatest = int(ends.min()), int(ends.max())
-    drive = travel_counts(axis, can)
+    drive = scaling.travel_counts(axis, can)
     if drive is not None and not (drive[0] <= least and greatest <= drive[1]):
         raise SpecError(
             f"can.travel.{axis.name}: it must hold the planner's travel of {travel[0]:g} to "

@@ -11,17 +11,9 @@ from typing import Any, cast
 
 import attrs
 
+from gen_profile import errors
 from gen_profile.cluster import require_versions
 from gen_profile.designs.design import Design, design_in_memory
-from gen_profile.errors import (
-    CosimulationError,
-    ExportError,
-    GenProfileError,
-    InfeasibleProblem,
-    LimitViolation,
-    SolverDiverged,
-    SpecError,
-)
 from gen_profile.one_thread import one_thread
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec
@@ -32,13 +24,13 @@ from gen_profile.verification.verdict import Check
 _ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
 EVERY = 50  # case is co-simulated by FMPy, too, which must agree with the compiled loop
 PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
-STATUSES: dict[type[GenProfileError], str] = {
-    SpecError: "faulty spec",
-    InfeasibleProblem: "infeasible",
-    SolverDiverged: "diverged",
-    LimitViolation: "limit broken",
-    ExportError: "not exportable",
-    CosimulationError: "not simulated",
+STATUSES: dict[type[errors.GenProfileError], str] = {
+    errors.SpecError: "faulty spec",
+    errors.InfeasibleProblem: "infeasible",
+    errors.SolverDiverged: "diverged",
+    errors.LimitViolation: "limit broken",
+    errors.ExportError: "not exportable",
+    errors.CosimulationError: "not simulated",
 }
 
 
@@ -125,7 +117,7 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcom
         with _ALONE, one_thread(), on_processors(1):
             outcome, files = design_in_memory(recipe.spec(values), recipe.formats, by_fmpy=case % EVERY == 0)
         return CaseOutcome(record=_record(case, values, outcome), files=files)
-    except GenProfileError as error:
+    except errors.GenProfileError as error:
         return failed(case, values, STATUSES.get(type(error), CRASHED), str(error))
     except Exception as error:
         return failed(case, values, CRASHED, f"Internal error ({type(error).__name__}: {error}).")

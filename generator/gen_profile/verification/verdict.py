@@ -202,7 +202,8 @@ class Check(Drawable, Tabled, Examination):
                     "allow more."
                 )
             yield self._exceeded(template, finding, load, finding.residual[load], self.limit[load])
-        swaying, load = max(findings, key=self._share_on_the_way), self._end_load_name()
+        swaying = max(findings, key=self._share_on_the_way)
+        load = list(self.limit)[-1] if self.directions == 1 else "load"
         if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:
             template = (
                 "The {load} sways by {found:.4g} mm on the way ({name}), and {limit:.4g} mm are allowed "
@@ -218,9 +219,6 @@ class Check(Drawable, Tabled, Examination):
     def _error(self) -> str:
         micrometres = float(f"{1e6 * self.error_bound:.2g}")
         return f"{micrometres:g} µm" if micrometres < FINE else f"{micrometres / 1e3:g} mm"
-
-    def _end_load_name(self) -> str:
-        return list(self.limit)[-1] if self.directions == 1 else "load"
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON and the manifest."""

@@ -44,9 +44,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         ".startup.csv": startup.table(lists),
         **{f".node{node}.cdcf": startup.concise_dcf(entries) for node, entries in lists.items()},
     }
-    return tuple(
-        File(filename=f"{target.name}{suffix}", content=content) for suffix, content in contents.items()
-    )
+    return tuple(File(f"{target.name}{suffix}", content) for suffix, content in contents.items())
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:

@@ -207,7 +207,6 @@ class _Network(canopen.Network):
         self._periodic: list[_Periodic] = []
 
     def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> Any:
-        del remote
         interval = round(period * NANOSECONDS)
         task = _Periodic(can_id, bytes(data), interval, self._clock.now() + interval)
         self._periodic.append(task)

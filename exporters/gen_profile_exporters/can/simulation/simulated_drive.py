@@ -204,7 +204,6 @@ class SimulatedDrive:
             self._pack_feedback()
 
     def _written(self, index: int, subindex: int, od: object, data: bytes) -> None:
-        del od
         self._values.pop((index, subindex), None)
         if index == 0x1016:
             self._master_heard = None  # the next heartbeat is the first one

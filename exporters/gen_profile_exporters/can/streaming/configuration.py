@@ -17,19 +17,11 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, startup
 from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.following_window import useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Demand, magnitude_counts
-from gen_profile_exporters.can.startup import (
-    AT_ONCE,
-    NO_REMOTE_REQUEST,
-    OFF,
-    PDO_PARAMETERS,
-    Entry,
-    startup_lists,
-)
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
     HEARTBEAT_WATCHED,
@@ -56,13 +48,53 @@ SCALING = {0x608F, 0x6091, 0x6092}  # of positions, in the drive
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(eq=False)
 class Node:
-    """One drive as the configuration sees it: its place on the bus and among the axes."""
+    """One drive as the configuration sees it: its place on the bus and among the axes, and its objects."""
 
+    link: Link
     number: int
     column: int
     name: str
+
+    def read(self, index: int, sub: int = 0, bits: int = 32) -> int:
+        """Read a number that it must have."""
+        data = self.upload(index, sub, bits)
+        if data is None:
+            raise self.unfit(f"the drive has no object {index:04X}h:{sub:02X}.")
+        return int.from_bytes(data, "little")
+
+    def upload(self, index: int, sub: int, bits: int = 32, *, optional: bool = False) -> bytes | None:
+        """Read an object of some bits, whose answer may have room for more; None where it has none."""
+        try:
+            data: bytes = self.link.sdo(self.number).upload(index, sub)
+        except SdoAbortedError as error:
+            if error.code in (NOT_GIVEN if optional else NOT_THERE):
+                return None
+            raise self.unfit(f"the drive refuses to tell {index:04X}h:{sub:02X} ({error}).") from error
+        except (SdoError, struct.error) as error:
+            raise self.silent(error) from error
+        return data[: bits // 8]
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write an object; a drive may refuse it, for what counts is what is read back."""
+        try:
+            self.link.sdo(self.number).download(index, sub, data)
+        except SdoAbortedError:
+            return
+        except (SdoError, struct.error) as error:
+            raise self.silent(error) from error
+
+    def unfit(self, words: str) -> StreamAborted:
+        """Say why its axis cannot be moved."""
+        return StreamAborted(f"axis {self.name}: {words}")
+
+    def silent(self, error: Exception) -> StreamAborted:
+        """Say that it gives no answer that means anything."""
+        return self.unfit(
+            f"node {self.number} does not answer properly ({error}); check power, cabling, bit rate and node "
+            "id."
+        )
 
 
 def configure(
@@ -101,22 +133,22 @@ def configure(
     StreamAborted
         A drive is another one, in fault, cannot be set up, watches nothing, or stands elsewhere.
     """
-    lists = startup_lists(demand, target)
-    for node in (nodes := _nodes(target)):
+    lists = startup.startup_lists(demand, target)
+    for node in (nodes := _nodes(link, target)):
         link.send(nmt(PRE_OPERATIONAL, node.number))
-        _require_identity(link, node, target)
+        _require_identity(node, target)
         if reset_fault:
-            _reset_fault(link, node)
-        watched = _upload(link, node, *HEARTBEAT_WATCHED, optional=True)
+            _reset_fault(node)
+        watched = node.upload(*HEARTBEAT_WATCHED, optional=True)
         if patience := time_of_ours(watched):  # its streamer was killed just now, and it stops by itself
-            _wait_while(link, node, MOVING, patience + STOP_PATIENCE)
-        _require_rest(link, node)
+            _wait_while(node, MOVING, patience + STOP_PATIENCE)
+        _require_rest(node)
         restoration.remember_watch(node.number, watched)
-        _download(link, node, *HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
+        node.download(*HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
     link.meanwhile = meanwhile
     for node in nodes:
-        _set(link, node, lists[node.number], restoration)
-    return tuple(_require_fit(link, node, target, demand) for node in nodes)
+        _set(node, lists[node.number], restoration)
+    return tuple(_require_fit(node, target, demand) for node in nodes)
 
 
 def positions(link: Link, target: Target, demand: Demand) -> tuple[int, ...]:
@@ -127,17 +159,17 @@ def positions(link: Link, target: Target, demand: Demand) -> tuple[int, ...]:
     StreamAborted
         A drive is another one, or counts in other units than the spec says.
     """
-    lists = startup_lists(demand, target)
-    for node in (nodes := _nodes(target)):
-        _require_identity(link, node, target)
+    lists = startup.startup_lists(demand, target)
+    for node in (nodes := _nodes(link, target)):
+        _require_identity(node, target)
         for entry in lists[node.number]:
-            held = _upload(link, node, entry.index, entry.sub) if entry.index in SCALING else entry.data
+            held = node.upload(entry.index, entry.sub) if entry.index in SCALING else entry.data
             if held != entry.data:
-                raise StreamAborted(
-                    f"axis {node.name}: the drive holds another {entry.index:04X}h:{entry.sub:02X} than the "
+                raise node.unfit(
+                    f"the drive holds another {entry.index:04X}h:{entry.sub:02X} than the "
                     f"spec ({entry.meaning}), and counts in other units; set that in the drive."
                 )
-    return tuple(_signed(_read(link, node, 0x6064)) for node in nodes)
+    return tuple(_signed(node.read(0x6064)) for node in nodes)
 
 
 def start(link: Link, target: Target) -> None:
@@ -171,134 +203,129 @@ def nmt(command: int, node: int) -> can.Message:
     return frames.message(frames.NMT, bytes([command, node]))
 
 
-def _nodes(target: Target) -> list[Node]:
+def _nodes(link: Link, target: Target) -> list[Node]:
     return [
-        Node(number=number, column=column, name=axis.name)
+        Node(link, number, column, axis.name)
         for column, (number, axis) in enumerate(zip(frames.nodes(target), target.axes, strict=True))
     ]
 
 
-def _require_fit(link: Link, node: Node, target: Target, demand: Demand) -> int:
+def _require_fit(node: Node, target: Target, demand: Demand) -> int:
     """Find a drive that was set up fit to follow; return where its axis stands."""
     mode = MODES[target.can.mode]
-    if (shown := _read(link, node, 0x6061, bits=8)) != mode:
-        raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
+    if (shown := node.read(0x6061, bits=8)) != mode:
+        raise node.unfit(f"the drive shows mode {shown} (6061h) instead of {mode}.")
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
-        _require_window(link, node, target, demand)
-    _require_travel(link, node, demand)
-    _require_homed(link, node, target)
-    return _require_start(link, node, target, demand)
+        _require_window(node, target, demand)
+    _require_travel(node, demand)
+    _require_homed(node, target)
+    return _require_start(node, target, demand)
 
 
-def _require_identity(link: Link, node: Node, target: Target) -> None:
-    device = _read(link, node, 0x1000)
+def _require_identity(node: Node, target: Target) -> None:
+    device = node.read(0x1000)
     if device & 0xFFFF != CIA_402:
-        raise StreamAborted(
-            f"axis {node.name}: node {node.number} is no CiA 402 drive (1000h is {device:08X}h)."
-        )
+        raise node.unfit(f"node {node.number} is no CiA 402 drive (1000h is {device:08X}h).")
     serial = target.can.serial.get(node.name)
     identity = ((1, target.can.vendor, "vendor"), (2, target.can.product, "product"), (4, serial, "serial"))
     for sub, wanted, what in identity:
-        if wanted is not None and (actual := _read(link, node, 0x1018, sub)) != wanted:
-            raise StreamAborted(
-                f"axis {node.name}: node {node.number} is another drive: its {what} is {actual:08X}h, and "
+        if wanted is not None and (actual := node.read(0x1018, sub)) != wanted:
+            raise node.unfit(
+                f"node {node.number} is another drive: its {what} is {actual:08X}h, and "
                 f"can.{what} asks for {wanted:08X}h; check node ids and cabling."
             )
-    if not _read(link, node, 0x6502) >> (MODES[target.can.mode] - 1) & 1:
-        raise StreamAborted(
-            f"axis {node.name}: the drive does not know the mode {target.can.mode} (6502h); choose another "
-            "one in can.mode."
+    if not node.read(0x6502) >> (MODES[target.can.mode] - 1) & 1:
+        raise node.unfit(
+            f"the drive does not know the mode {target.can.mode} (6502h); choose another one in can.mode."
         )
 
 
-def _reset_fault(link: Link, node: Node) -> None:
+def _reset_fault(node: Node) -> None:
     """Reset a fault, by a rising edge, and give the drive time for it."""
-    if state_of(_read(link, node, 0x6041, bits=16)) is not State.FAULT:
+    if state_of(node.read(0x6041, bits=16)) is not State.FAULT:
         return
-    channel = link.sdo(node.number)
+    channel = node.link.sdo(node.number)
     try:
         for word in (Controlword.DISABLE_VOLTAGE, Controlword.FAULT_RESET, Controlword.DISABLE_VOLTAGE):
             channel.download(0x6040, 0, word.to_bytes(2, "little"))
     except (SdoError, struct.error) as error:
-        raise _silent(node, error) from error
-    _wait_while(link, node, FAULTS, RESET_PATIENCE)
+        raise node.silent(error) from error
+    _wait_while(node, FAULTS, RESET_PATIENCE)
 
 
-def _wait_while(link: Link, node: Node, states: Container[State], patience: int) -> None:
+def _wait_while(node: Node, states: Container[State], patience: int) -> None:
     """Wait as long as a drive is in one of some states, at most for so long, in ns."""
-    deadline = link.clock.now() + patience
-    while state_of(_read(link, node, 0x6041, bits=16)) in states and link.clock.now() < deadline:
-        link.wait_until(link.clock.now() + LOOK_AGAIN)
+    clock = node.link.clock
+    deadline = clock.now() + patience
+    while state_of(node.read(0x6041, bits=16)) in states and clock.now() < deadline:
+        node.link.wait_until(clock.now() + LOOK_AGAIN)
 
 
-def _require_rest(link: Link, node: Node) -> None:
-    state = state_of(word := _read(link, node, 0x6041, bits=16))
+def _require_rest(node: Node) -> None:
+    state = state_of(word := node.read(0x6041, bits=16))
     if state is State.UNKNOWN:
-        raise StreamAborted(
-            f"axis {node.name}: the drive tells the statusword {word:04X}h, which is no state of CiA 402; "
+        raise node.unfit(
+            f"the drive tells the statusword {word:04X}h, which is no state of CiA 402; "
             "find out in its manual what it means."
         )
     if state in FAULTS:
-        raise StreamAborted(
-            f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there "
+        raise node.unfit(
+            f"the drive is in the state {state.words!r}; find out why, and reset it there "
             "or ask for it (reset_fault)."
         )
     if state in MOVING:
-        raise StreamAborted(
-            f"axis {node.name}: the drive is in the state {state.words!r}: another controller commands it, "
+        raise node.unfit(
+            f"the drive is in the state {state.words!r}: another controller commands it, "
             "or left it so; have it switched off there (controlword 6040h = 0)."
         )
 
 
-def _set(link: Link, node: Node, entries: Sequence[Entry], restoration: Restoration) -> None:
+def _set(node: Node, entries: Sequence[startup.Entry], restoration: Restoration) -> None:
     """Write the list in its order where something differs, and require what the drive then holds."""
     final = {(entry.index, entry.sub): entry for entry in entries}
-    held = _held(link, node, final)
+    held = _held(node, final)
     changed = [(entry.index, entry.sub) for entry, _ in _differing(held, final)]
     if not changed:
         return
 
     def read(index: int, sub: int) -> bytes | None:
-        return _upload(link, node, index, sub, optional=True)
+        return node.upload(index, sub, optional=True)
 
     restoration.remember(node.number, settings_of(held, changed, read))
     touched = {pdo_of(index) for index, _ in changed}  # and so put back, whole where they are PDOs
     for entry in entries:
         if pdo_of(entry.index) in touched and not entry.fixed:
-            _download(link, node, entry.index, entry.sub, _written(entry, held))
-    if differing := _differing(_held(link, node, final), final):
+            node.download(entry.index, entry.sub, _written(entry, held))
+    if differing := _differing(_held(node, final), final):
         entry, kept = differing[0]
         holds = "nothing" if kept is None else f"{int.from_bytes(kept, 'little'):X}h"
-        raise StreamAborted(
-            f"axis {node.name}: {entry.index:04X}h:{entry.sub:02X} ({entry.meaning}) must hold "
+        raise node.unfit(
+            f"{entry.index:04X}h:{entry.sub:02X} ({entry.meaning}) must hold "
             f"{int.from_bytes(entry.data, 'little'):X}h, but the drive keeps {holds} there; set the drive, "
             "or adapt the spec to it."
         )
 
 
-def _written(entry: Entry, held: Mapping[Place, bytes | None]) -> bytes:
+def _written(entry: startup.Entry, held: Mapping[Place, bytes | None]) -> bytes:
     """Tell what to write; a PDO is switched off with what it held, as that must not change before."""
     before = held[entry.index, entry.sub]
     if before is None or not _switches_off(entry):
         return entry.data
-    kept = int.from_bytes(before, "little") | entry.value & NO_REMOTE_REQUEST
-    return (OFF | kept).to_bytes(4, "little")
+    kept = int.from_bytes(before, "little") | entry.value & startup.NO_REMOTE_REQUEST
+    return (startup.OFF | kept).to_bytes(4, "little")
 
 
-def _switches_off(entry: Entry) -> bool:
-    return entry.index in PDO_PARAMETERS and entry.sub == 1 and bool(entry.value & OFF)
+def _switches_off(entry: startup.Entry) -> bool:
+    return entry.index in startup.PDO_PARAMETERS and entry.sub == 1 and bool(entry.value & startup.OFF)
 
 
-def _held(link: Link, node: Node, final: Mapping[Place, Entry]) -> dict[Place, bytes | None]:
-    return {
-        place: _upload(link, node, *place, entry.bits, optional=entry.optional)
-        for place, entry in final.items()
-    }
+def _held(node: Node, final: Mapping[Place, startup.Entry]) -> dict[Place, bytes | None]:
+    return {place: node.upload(*place, entry.bits, optional=entry.optional) for place, entry in final.items()}
 
 
 def _differing(
-    held: Mapping[Place, bytes | None], final: Mapping[Place, Entry]
-) -> list[tuple[Entry, bytes | None]]:
+    held: Mapping[Place, bytes | None], final: Mapping[Place, startup.Entry]
+) -> list[tuple[startup.Entry, bytes | None]]:
     wanted = {place: entry.data for place, entry in final.items()}
     same = {place for place, entry in final.items() if _same(entry, held[place])}
     if _interpolation_period(held) == _interpolation_period(wanted):  # 40 × 0.1 ms are 4 × 1 ms, too
@@ -306,16 +333,16 @@ def _differing(
     return [(entry, held[place]) for place, entry in final.items() if place not in same]
 
 
-def _same(entry: Entry, data: bytes | None) -> bool:
+def _same(entry: startup.Entry, data: bytes | None) -> bool:
     if data is None:
         return entry.optional
     if _switches_off(entry):
-        return bool(int.from_bytes(data, "little") & OFF)
-    if entry.index in PDO_PARAMETERS and entry.sub == 1:
+        return bool(int.from_bytes(data, "little") & startup.OFF)
+    if entry.index in startup.PDO_PARAMETERS and entry.sub == 1:
         apart = int.from_bytes(data, "little") ^ int.from_bytes(entry.data, "little")
         return not apart & COB_ID_BITS
-    if entry.index in PDO_PARAMETERS and entry.sub == 2 and entry.value in AT_ONCE:
-        return data[0] in AT_ONCE
+    if entry.index in startup.PDO_PARAMETERS and entry.sub == 2 and entry.value in startup.AT_ONCE:
+        return data[0] in startup.AT_ONCE
     return data == entry.data
 
 
@@ -326,48 +353,45 @@ def _interpolation_period(objects: Mapping[Place, bytes | None]) -> Decimal | No
     return Decimal(int.from_bytes(digits, "little")).scaleb(int.from_bytes(exponent, "little", signed=True))
 
 
-def _require_window(link: Link, node: Node, target: Target, demand: Demand) -> None:
+def _require_window(node: Node, target: Target, demand: Demand) -> None:
     """Require a window that stops the axis soon; ours is beside it, but the drive's works without the bus."""
-    window, widest = _read(link, node, 0x6065), useful(demand, target)[node.column]
+    window, widest = node.read(0x6065), useful(demand, target)[node.column]
     scale = abs(target.axes[node.column].counts_per_si)
     cure = f"set {widest / scale:.3g} ({widest} counts) or less there, or state can.following_error"
     if window in {0, WINDOW_OFF}:
-        raise StreamAborted(
-            f"axis {node.name}: the drive does not watch its following error (6065h is {window:X}h); {cure}."
-        )
+        raise node.unfit(f"the drive does not watch its following error (6065h is {window:X}h); {cure}.")
     if window > widest:
-        raise StreamAborted(
-            f"axis {node.name}: the drive's following error window of {window / scale:.3g} (6065h is "
+        raise node.unfit(
+            f"the drive's following error window of {window / scale:.3g} (6065h is "
             f"{window:X}h) is wider than is useful for this motion; {cure}."
         )
 
 
-def _require_travel(link: Link, node: Node, demand: Demand) -> None:
-    ends = [_upload(link, node, 0x607D, sub, optional=True) for sub in (1, 2)]
+def _require_travel(node: Node, demand: Demand) -> None:
+    ends = [node.upload(0x607D, sub, optional=True) for sub in (1, 2)]
     if ends[0] is None or ends[1] is None:
         return
     low, high = (int.from_bytes(end, "little", signed=True) for end in ends if end is not None)
     least, greatest = demand.ends[node.column]
     if low < high and not (low <= least and greatest <= high):
-        raise StreamAborted(
-            f"axis {node.name}: the motion from {least} to {greatest} counts leaves the drive's "
+        raise node.unfit(
+            f"the motion from {least} to {greatest} counts leaves the drive's "
             f"travel of {low} to {high} counts (607Dh)."
         )
 
 
-def _require_homed(link: Link, node: Node, target: Target) -> None:
+def _require_homed(node: Node, target: Target) -> None:
     if target.can.homed is None:
         return
     index, sub, bits = target.can.homed
-    if (held := _read(link, node, index, sub)) & bits != bits:
-        raise StreamAborted(
-            f"axis {node.name}: it is not homed, as can.homed asks ({index:04X}h:{sub:02X} is {held:X}h); "
-            "home it."
+    if (held := node.read(index, sub)) & bits != bits:
+        raise node.unfit(
+            f"it is not homed, as can.homed asks ({index:04X}h:{sub:02X} is {held:X}h); home it."
         )
 
 
-def _require_start(link: Link, node: Node, target: Target, demand: Demand) -> int:
-    actual = _signed(_read(link, node, 0x6064))
+def _require_start(node: Node, target: Target, demand: Demand) -> int:
+    actual = _signed(node.read(0x6064))
     axis = target.axes[node.column]
     if demand.start is None:
         _require_inside(actual, node, axis, demand)
@@ -375,8 +399,8 @@ def _require_start(link: Link, node: Node, target: Target, demand: Demand) -> in
     first = demand.start[node.column]
     allowed = magnitude_counts(target.can.start_tolerance, axis)
     if abs(actual - first) > allowed:
-        raise StreamAborted(
-            f"axis {node.name}: it stands at {actual / axis.counts_per_si:.6g}, and the motion starts at "
+        raise node.unfit(
+            f"it stands at {actual / axis.counts_per_si:.6g}, and the motion starts at "
             f"{first / axis.counts_per_si:.6g} ({abs(actual - first)} counts apart, {allowed} allowed by "
             "can.start_tolerance); home it, or move it there."
         )
@@ -387,51 +411,10 @@ def _require_inside(actual: int, node: Node, axis: AxisScale, demand: Demand) ->
     least, greatest = demand.ends[node.column]
     if not least <= actual <= greatest:
         ends = sorted(end / axis.counts_per_si for end in (least, greatest))
-        raise StreamAborted(
-            f"axis {node.name}: it stands at {actual / axis.counts_per_si:.6g}, outside the planner's travel "
+        raise node.unfit(
+            f"it stands at {actual / axis.counts_per_si:.6g}, outside the planner's travel "
             f"of {ends[0]:.6g} to {ends[1]:.6g}; move it there by other means."
         )
-
-
-def _read(link: Link, node: Node, index: int, sub: int = 0, bits: int = 32) -> int:
-    data = _upload(link, node, index, sub, bits)
-    if data is None:
-        raise StreamAborted(f"axis {node.name}: the drive has no object {index:04X}h:{sub:02X}.")
-    return int.from_bytes(data, "little")
-
-
-def _upload(
-    link: Link, node: Node, index: int, sub: int, bits: int = 32, *, optional: bool = False
-) -> bytes | None:
-    """Read an object of some bits, whose answer may have room for more; None where the drive has none."""
-    try:
-        data: bytes = link.sdo(node.number).upload(index, sub)
-    except SdoAbortedError as error:
-        if error.code in (NOT_GIVEN if optional else NOT_THERE):
-            return None
-        raise StreamAborted(
-            f"axis {node.name}: the drive refuses to tell {index:04X}h:{sub:02X} ({error})."
-        ) from error
-    except (SdoError, struct.error) as error:
-        raise _silent(node, error) from error
-    return data[: bits // 8]
-
-
-def _download(link: Link, node: Node, index: int, sub: int, data: bytes) -> None:
-    """Write an object; a drive may refuse it, for what counts is what is read back."""
-    try:
-        link.sdo(node.number).download(index, sub, data)
-    except SdoAbortedError:
-        return
-    except (SdoError, struct.error) as error:
-        raise _silent(node, error) from error
-
-
-def _silent(node: Node, error: Exception) -> StreamAborted:
-    return StreamAborted(
-        f"axis {node.name}: node {node.number} does not answer properly ({error}); check power, cabling, "
-        "bit rate and node id."
-    )
 
 
 def _signed(value: int) -> int:

@@ -142,7 +142,6 @@ class StreamPlan:
 
     def begin(self, rest_counts: Sequence[int]) -> Step:
         """Begin where the motion does; the axes were led there."""
-        del rest_counts
         return self._step(0)
 
     def step(self, cycle: int) -> Step | None:

@@ -78,7 +78,7 @@ def _at_rest(link: Link, measured: Mapping[int, Standing]) -> set[int]:
     while waiting and link.clock.now() < deadline:
         for node in sorted(waiting):
             try:
-                if _is_off(link, node):
+                if state_of(_asked(link, node, pdos.STATUSWORD)) not in MOVING:
                     measured[node].take(_asked(link, node, pdos.ACTUAL_POSITION), link.clock.now())
                     at_rest |= {node} if measured[node].proved() else set()
             except SILENCE:
@@ -86,10 +86,6 @@ def _at_rest(link: Link, measured: Mapping[int, Standing]) -> set[int]:
         waiting -= at_rest
         link.wait_until(link.clock.now() + PATIENCE // 100)
     return at_rest
-
-
-def _is_off(link: Link, node: int) -> bool:
-    return state_of(_asked(link, node, pdos.STATUSWORD)) not in MOVING
 
 
 def _asked(link: Link, node: int, field: pdos.Field) -> int:

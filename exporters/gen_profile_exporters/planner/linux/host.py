@@ -51,10 +51,7 @@ def linux_files(text: str, file: str) -> tuple[File, ...]:
     return (
         *c_files(text, file),
         *(
-            File(
-                filename=f"{file}_{name}",
-                content=filled(f"planner/linux/{template}", **values).encode("ascii"),
-            )
+            File(f"{file}_{name}", filled(f"planner/linux/{template}", **values).encode("ascii"))
             for name, template in (
                 ("linux.c", "host.c"),
                 ("opcua.py", "opcua.txt"),

@@ -9,19 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli, design
 from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
-from gen_profile.cli.options import (
-    Number,
-    PathType,
-    SpecChoice,
-    output_options,
-    preset_option,
-    repeatable,
-    require_formats,
-)
+from gen_profile.cli.options import Number, PathType, SpecChoice, option
 from gen_profile.cli.outcome import as_json, print_outcome
 from gen_profile.cli.report import report
 from gen_profile.errors import GenProfileError, OutputError
@@ -53,35 +46,24 @@ Words = tuple[str, ...]
 
 @cli.command(epilog="Example: gen-profile commission crane.toml --export plc --to opc.tcp://10.0.0.5:4840")
 @click.argument("path", metavar="SPEC.toml", type=PathType())
-@preset_option("What a spec that is not there begins as.")
-@repeatable("--set", "KEY=VALUE", "A key of it.", into="overrides")
-@click.option(
-    "--swing", metavar="CSV|URL", help="Log of a free swing, or a phone's address, as for log-swing."
-)
-@click.option(
-    "--for",
-    "seconds",
-    metavar="SECONDS",
-    type=Number(min=1.0),
-    default=60.0,
-    help="To log the phone for; 60 s.",
-)
-@repeatable("--export", "FORMAT", "Format to write.", into="formats")
-@click.option(
-    "--to", "url", metavar="URL", help="Controller to deploy to, as for deploy; an empty text for none."
-)
-@click.option("--yes", is_flag=True, help="Ask nothing: what no option answers stays as it is.")
-@output_options
-def commission(path: Path, *, yes: bool, **options: Any) -> None:
+@options.preset("What a spec that is not there begins as.")
+@options.repeatable("--set KEY=VALUE", "A key of it.", into="overrides")
+@option("--swing CSV|URL", "Log of a free swing, or a phone's address, as for log-swing.")
+@option("--for SECONDS", "To log the phone for; 60 s.", Number(min=1.0), into="seconds", default=60.0)
+@options.repeatable("--export FORMAT", "Format to write.", into="formats")
+@option("--to URL", "Controller to deploy to, as for deploy; an empty text for none.", into="url")
+@option("--yes", "Ask nothing: what no option answers stays as it is.")
+@options.output
+def commission(path: Path, *, yes: bool, **given: Any) -> None:
     """Go from a tape measure to a controller, step by step.
 
     Measure, log a swing, identify, design, prove, report, deploy, and record it. What no option answers is
     asked; SPEC.toml is made where it is not there, and gone on with where it is.
     """
     require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
-    run = _Guide(click.get_current_context(), options, yes)
-    require_formats(options["formats"])
-    run.require_log(options["swing"] or "")
+    run = _Guide(click.get_current_context(), given, yes)
+    options.require_formats(given["formats"])
+    run.require_log(given["swing"] or "")
     with redirect_stdout(sys.stderr) if as_json() else nullcontext():
         _announce("1. The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
@@ -90,11 +72,11 @@ def commission(path: Path, *, yes: bool, **options: Any) -> None:
         log, signal = run.logged(path)
         url = run.answer("url", "Controller to deploy to, as opc.tcp://HOST:PORT; nothing for none", "")
         run.write(path, ('export.plc_tables="variables"',) * bool(url))
-        if log is not None or readings or options["periods"]:
+        if log is not None or readings or given["periods"]:
             _announce("3. What that tells of the machine")
             run.call(identify, spec_path=path, out=path, log=log, readings=readings, **signal)
         _announce("4. The motion, proved on every machine of the ranges")
-        formats = options["formats"] or run.answer("", "Formats (gen-profile formats)", "plc").split()
+        formats = given["formats"] or run.answer("", "Formats (gen-profile formats)", "plc").split()
         run.call(design, spec_path=path, formats=formats)
         files = run.files()
         page = path.with_suffix(".html")

@@ -9,19 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    InputFile,
-    Number,
-    PathType,
-    SpecChoice,
-    output_options,
-    plot_option,
-    repeatable,
-    require_formats,
-    spec_options,
-    spec_output_option,
-)
+from gen_profile.cli.options import InputFile, Number, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.errors import SpecError
@@ -34,29 +24,25 @@ if TYPE_CHECKING:
 def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add how a table of a swing is read; the command gets what reads one of a spec's machine as `read`."""
 
-    @click.option(
-        "--columns", metavar="TIME,VALUE", default="1,2", help="Columns of the log: names, or numbers."
-    )
-    @click.option(
-        "--signal",
-        metavar="SIGNAL",
-        default="angle",
-        help="What the log's values are: angle, sway or rate (of the angle), of the first load or, as in "
+    @option("--columns TIME,VALUE", "Columns of the log: names, or numbers.", default="1,2")
+    @option(
+        "--signal SIGNAL",
+        "What the log's values are: angle, sway or rate (of the angle), of the first load or, as in "
         "rate:hook, of another.",
+        default="angle",
     )
-    @click.option(
-        "--unit",
-        metavar="UNIT",
-        help="Unit of the log's values: rad, deg, m, mm, um, rad/s or deg/s; by default what their column's "
+    @option(
+        "--unit UNIT",
+        "Unit of the log's values: rad, deg, m, mm, um, rad/s or deg/s; by default what their column's "
         "name says; for counts the size of one, as in '0.09 deg'.",
     )
-    @click.option(
+    @option(
         "--time-unit",
-        type=click.Choice(["s", "ms", "us"]),
-        help="Unit of its times; by default what their column's name says, or s.",
+        "Unit of its times; by default what their column's name says, or s.",
+        click.Choice(["s", "ms", "us"]),
     )
     @wraps(command)
-    def reading(*, columns: str, signal: str, unit: str | None, time_unit: str | None, **options: Any) -> Any:
+    def reading(*, columns: str, signal: str, unit: str | None, time_unit: str | None, **given: Any) -> Any:
         time, comma, value = columns.partition(",")
         if not comma:
             raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
@@ -64,47 +50,36 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
         from gen_profile.identification.identify import read_swing
 
         read = partial(read_swing, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit)
-        return command(read=read, **options)
+        return command(read=read, **given)
 
     return reading
 
 
 @cli.command(epilog="Example: gen-profile identify crane.toml --measured L1=6.2±0.1 --period 51.3±0.3/10")
-@spec_options
-@repeatable(
-    "--measured",
-    "NAME=VALUE±U",
+@options.spec
+@options.repeatable(
+    "--measured NAME=VALUE±U",
     "A parameter read off a tape or scale, with its standard deviation (+- will do for ±).",
     into="readings",
 )
-@repeatable(
-    "--period",
-    "[MODE:]S±U[/N]",
+@options.repeatable(
+    "--period [MODE:]S±U[/N]",
     "N small swings by stopwatch, of the slowest mode (1) by default.",
     into="periods",
 )
-@click.option(
-    "--swing",
-    "log",
-    metavar="CSV",
-    type=PathType(),
-    help="A swing logged while the axes stood still.",
-)
+@option("--swing CSV", "A swing logged while the axes stood still.", PathType(), into="log")
 @log_options
-@click.option(
-    "--after",
-    metavar="SECONDS",
-    type=Number(),
+@option(
+    "--after SECONDS",
+    "Leave out what the log holds before this time; of dates, so long after the first.",
+    Number(),
     default=0.0,
-    help="Leave out what the log holds before this time; of dates, so long after the first.",
 )
-@repeatable("--free", "NAME", "Identify a parameter that was not read directly.")
-@click.option(
-    "--at", metavar="POSITION,…", help="Where the axes stood, in m or rad; at the move's target by default."
-)
-@spec_output_option("identified.toml")
-@plot_option
-@output_options
+@options.repeatable("--free NAME", "Identify a parameter that was not read directly.")
+@option("--at POSITION,…", "Where the axes stood, in m or rad; at the move's target by default.")
+@options.spec_output("identified.toml")
+@options.plot
+@options.output
 def identify(
     chosen: SpecChoice,
     *,
@@ -158,33 +133,23 @@ def _positions(text: str) -> list[float]:
 @cli.command(
     epilog="Example: gen-profile learn crane.toml run.csv --played deploy/crane.st --signal rate:hook"
 )
-@spec_options
+@options.spec
 @click.argument("logs", metavar="[LOG.csv]...", nargs=-1, type=PathType())
-@click.option(
-    "--played",
-    required=True,
-    type=InputFile(),
-    help="The file whose setpoints the axes followed in these runs.",
-)
-@repeatable(
-    "--seen", "LOAD=M±M", "Greatest sway in m after a run as it was seen, within a bound (+- will do for ±)."
+@option("--played", "The file whose setpoints the axes followed in these runs.", InputFile(), required=True)
+@options.repeatable(
+    "--seen LOAD=M±M", "Greatest sway in m after a run as it was seen, within a bound (+- will do for ±)."
 )
 @log_options
-@spec_output_option("learned.toml")
-@repeatable(
-    "--export",
-    "FORMAT",
+@options.spec_output("learned.toml")
+@options.repeatable(
+    "--export FORMAT",
     "Design for the ranges that are left, check, and write in this format.",
     into="formats",
 )
-@click.option(
-    "--folder",
-    metavar="DIR",
-    type=PathType(),
-    default="gen-profile-out",
-    help="Folder for that; ./gen-profile-out by default.",
+@option(
+    "--folder DIR", "Folder for that; ./gen-profile-out by default.", PathType(), default="gen-profile-out"
 )
-@output_options
+@options.output
 def learn(
     chosen: SpecChoice,
     *,
@@ -208,7 +173,7 @@ def learn(
     from gen_profile.verification.check import replayed
 
     spec, rewritten = _to_change(chosen)
-    require_formats(formats)
+    options.require_formats(formats)
     sights = [parse_reading(one, "seen") for one in seen]
     with progress() as tell:
         tell("reading the runs")

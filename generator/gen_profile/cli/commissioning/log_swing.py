@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, client_options
-from gen_profile.cli.options import Count, Number, OutputFile, bitrate_option, output_options
+from gen_profile.cli.options import Count, Number, OutputFile, option
 from gen_profile.cli.outcome import print_outcome, print_warnings
 from gen_profile.errors import OutputError, SpecError
 
@@ -26,26 +27,14 @@ DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and colu
 
 @cli.command("log-swing", epilog="Example: gen-profile log-swing http://192.168.0.42:8080 --out run.csv")
 @click.argument("source")
-@click.option("--out", type=OutputFile(), default="swing.csv", help="Log to write; ./swing.csv by default.")
-@click.option(
-    "--for",
-    "seconds",
-    type=Number(min=1.0),
-    metavar="SECONDS",
-    help="Log so long, not until Ctrl-C.",
-)
-@click.option(
-    "--node", metavar="NODEID", help="Of an OPC UA server, as ns=4;s=GVL.rAngle; on CAN the encoder's number."
-)
-@click.option(
-    "--counts", type=Count(1, 2**32), help="Of a turn of the encoder; it is asked for them by default."
-)
-@bitrate_option("CAN channel")
-@click.option(
-    "--unit", default="rad", metavar="UNIT", help="Of its values, for the column's name; rad by default."
-)
+@option("--out", "Log to write; ./swing.csv by default.", OutputFile(), default="swing.csv")
+@option("--for SECONDS", "Log so long, not until Ctrl-C.", Number(min=1.0), into="seconds")
+@option("--node NODEID", "Of an OPC UA server, as ns=4;s=GVL.rAngle; on CAN the encoder's number.")
+@option("--counts", "Of a turn of the encoder; it is asked for them by default.", Count(1, 2**32))
+@options.bitrate("CAN channel")
+@option("--unit UNIT", "Of its values, for the column's name; rad by default.", default="rad")
 @client_options
-@output_options
+@options.output
 def log_swing(
     source: str,
     *,

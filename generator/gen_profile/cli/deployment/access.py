@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import click
 
-from gen_profile.cli.options import Count, PathType, with_options
+from gen_profile.cli import options
+from gen_profile.cli.options import Count, PathType, option
 from gen_profile.errors import SpecError
 from gen_profile.plugins import require_installed
 
@@ -34,46 +35,38 @@ PACKAGES = {
 
 
 # a user, and the certificate of this side
-access_options = with_options(
-    click.option(
-        "--certificate",
-        type=PathType(),
-        metavar="FILE",
-        help="PEM file with the certificate and key of this side; made if it is not there.",
+access_options = options.together(
+    option(
+        "--certificate FILE",
+        "PEM file with the certificate and key of this side; made if it is not there.",
+        PathType(),
     ),
-    click.option("--user", default="", metavar="NAME", help=f"User there; password in {PASSWORD}, or asked."),
+    option("--user NAME", f"User there; password in {PASSWORD}, or asked.", default=""),
 )
 # what a server is trusted by, and how it is spoken to
-client_options = with_options(
-    click.option(
-        "--fingerprint", default="", metavar="SHA256", help="Of the server's certificate, as compared."
-    ),
+client_options = options.together(
+    option("--fingerprint SHA256", "Of the server's certificate, as compared.", default=""),
     access_options,
-    click.option(
+    option(
         "--security",
-        type=click.Choice(["sign-and-encrypt", "sign", "none"]),
+        "Of the connection; sign-and-encrypt by default.",
+        click.Choice(["sign-and-encrypt", "sign", "none"]),
         default="sign-and-encrypt",
-        help="Of the connection; sign-and-encrypt by default.",
     ),
 )
 
 
 def controller_options(*, required: bool) -> Callable[[Any], Any]:
     """Take which controller, which block in it, and how it is reached, as `Access` has them."""
-    return with_options(
-        click.option(
-            "--to",
-            "url",
-            metavar="URL",
+    return options.together(
+        option(
+            "--to URL",
+            "Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
+            into="url",
             required=required,
-            help="Controller, as opc.tcp://HOST:PORT, ads://NETID:PORT or s7://HOST/RACK/SLOT.",
         ),
-        click.option(
-            "--db", "data_block", type=Count(1, MOST_BLOCKS), help="Data block of the block's arrays, for S7."
-        ),
-        click.option(
-            "--instance", default="", metavar="PATH", help="Which block, where the server shows several."
-        ),
+        option("--db", "Data block of the block's arrays, for S7.", Count(1, MOST_BLOCKS), into="data_block"),
+        option("--instance PATH", "Which block, where the server shows several.", default=""),
         client_options,
     )
 

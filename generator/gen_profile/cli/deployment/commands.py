@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import (
     MOST_BLOCKS,
@@ -19,7 +20,7 @@ from gen_profile.cli.deployment.access import (
     password,
     require_protocol,
 )
-from gen_profile.cli.options import Count, Number, OutputFile, PathType, output_options
+from gen_profile.cli.options import Count, Number, OutputFile, PathType, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
@@ -40,19 +41,15 @@ if TYPE_CHECKING:
 )
 @click.argument("artefact", type=PathType())
 @controller_options(required=True)
-@click.option("--verify", is_flag=True, help="Only tell whether the controller uses this table.")
-@click.option(
-    "--watch", is_flag=True, help="Verify, then hold every setpoint to what was proved until Ctrl-C."
-)
-@click.option("--for", "seconds", type=Number(min=0.1), metavar="SECONDS", help="Watch so long.")
-@click.option(
-    "--log", metavar="CSV", type=OutputFile(), help="Write what is watched, a row for each cycle seen."
-)
-@click.option("--rollback", is_flag=True, help="Go back to this table, which the idle buffer holds.")
-@click.option("--by", default="", metavar="NAME", help="Who deploys, for the record; the user by default.")
+@option("--verify", "Only tell whether the controller uses this table.")
+@option("--watch", "Verify, then hold every setpoint to what was proved until Ctrl-C.")
+@option("--for SECONDS", "Watch so long.", Number(min=0.1), into="seconds")
+@option("--log CSV", "Write what is watched, a row for each cycle seen.", OutputFile())
+@option("--rollback", "Go back to this table, which the idle buffer holds.")
+@option("--by NAME", "Who deploys, for the record; the user by default.", default="")
 @signing_option("record")
 @signed_by_option
-@output_options
+@options.output
 def deploy(
     artefact: Path,
     *,
@@ -64,7 +61,7 @@ def deploy(
     by: str,
     key_path: Path | None,
     public_path: Path | None,
-    **options: Any,
+    **given: Any,
 ) -> None:
     """Put a playback block's table, a library's, or a planner's numbers into a controller.
 
@@ -78,7 +75,7 @@ def deploy(
         )
     if not watch and (seconds is not None or log is not None):
         raise SpecError("--for, --log: are for --watch; add that, or leave them out.")
-    access = Access(**options)
+    access = Access(**given)
     key = signing_key(key_path)
     require_signature(artefact, public_path)
     if watch:
@@ -192,33 +189,30 @@ def _user() -> str:
 
 @cli.command("plc-sim", epilog="Example: gen-profile plc-sim deploy/bay-3.st")
 @click.argument("artefact", type=PathType())
-@click.option(
-    "--port", type=Count(1, MOST_PORT), default=4840, help="Port on the loopback interface; 4840 by default."
-)
+@option("--port", "Port on the loopback interface; 4840 by default.", Count(1, MOST_PORT), default=4840)
 @access_options
-@click.option("--no-security", is_flag=True, help="Let any program of this computer in.")
-@click.option(
+@option("--no-security", "Let any program of this computer in.")
+@option(
     "--db",
-    "data_block",
-    type=Count(1, MOST_BLOCKS),
-    help="Speak S7 in place of OPC UA, with the block's arrays in this data block, and bExecute in M0.0.",
+    "Speak S7 in place of OPC UA, with the block's arrays in this data block, and bExecute in M0.0.",
+    Count(1, MOST_BLOCKS),
+    into="data_block",
 )
-@click.option("--ads", is_flag=True, help="Speak ADS in place of OPC UA, with the block as MAIN.fbMotion.")
-@output_options
-def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, **options: Any) -> None:
+@option("--ads", "Speak ADS in place of OPC UA, with the block as MAIN.fbMotion.")
+@options.output
+def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, **given: Any) -> None:
     """Simulate a controller that runs a playback block, behind an OPC UA, ADS or S7 server."""
-    given = options["user"] or options["certificate"] is not None
-    if options["no_security"] and given:
+    if given["no_security"] and (given["user"] or given["certificate"] is not None):
         raise SpecError("--no-security: lets everybody in; leave --user and --certificate out.")
     if ads and data_block is not None:
         raise SpecError("--ads, --db: are of two protocols; leave one of them out.")
-    if (ads or data_block is not None) and not options["no_security"]:
-        option, protocol = ("--ads", "ADS") if ads else ("--db", "S7")
+    if (ads or data_block is not None) and not given["no_security"]:
+        flag, protocol = ("--ads", "ADS") if ads else ("--db", "S7")
         raise SpecError(
-            f"{option}: {protocol} has no security; add --no-security, which lets any program of this "
+            f"{flag}: {protocol} has no security; add --no-security, which lets any program of this "
             "computer in."
         )
-    make = _simulated(data_block, ads=ads, **options)
+    make = _simulated(data_block, ads=ads, **given)
     from gen_profile.deployment.table import read_table
 
     def ready(address: str) -> None:
@@ -251,7 +245,7 @@ def _simulated(
         return partial(SimulatedS7Controller, number=data_block, port=port)
     from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 
-    options = PlcSimOptions(
+    server = PlcSimOptions(
         port=port, secure=not no_security, certificate=certificate, user=user, password=password(user)
     )
-    return partial(SimulatedOpcUaController, options=options)
+    return partial(SimulatedOpcUaController, options=server)

@@ -9,15 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    OutputFile,
-    SpecChoice,
-    output_options,
-    repeatable,
-    spec_options,
-    with_options,
-)
+from gen_profile.cli.options import OutputFile, SpecChoice, option
 from gen_profile.cli.outcome import lead_nowhere, print_outcome
 from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
@@ -32,45 +26,35 @@ FEW_ROWS, CELL = 10_000, 16  # of a log of unknown length, and bytes of a number
 _MISSES = ("extrapolate", "hold", "stop")
 
 
-_bus_options = with_options(
-    click.option(
-        "--interface", metavar="NAME", help="Interface as python-can names it: socketcan, pcan, slcan …"
-    ),
-    click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
+_bus_options = options.together(
+    option("--interface NAME", "Interface as python-can names it: socketcan, pcan, slcan …"),
+    option("--channel NAME", "Channel of that interface, such as can0."),
 )
 
 
 @cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
-@spec_options
+@options.spec
 @_bus_options
 @planner_options
-@click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
-@click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
-@click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
-@click.option("--to-start", is_flag=True, help="Move slowly to the motion's start from anywhere, and end.")
-@repeatable("--jog", "AXIS=DISTANCE", "Move slowly by a distance in m (or rad) from anywhere, and end.")
-@click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
-@click.option(
-    "--self-test",
-    is_flag=True,
-    help="First measure, for as long as the motion lasts, whether this machine can hold the cycle.",
+@option("--mode", "Mode of the drives, for a spec.", click.Choice(["csp", "ip", "csv"]))
+@option("--node N", "CANopen node of the first axis, for a spec.", int)
+@option("--simulate-drive", "Let simulated drives move the machine's FMU.")
+@option("--to-start", "Move slowly to the motion's start from anywhere, and end.")
+@options.repeatable("--jog AXIS=DISTANCE", "Move slowly by a distance in m (or rad) from anywhere, and end.")
+@option("--reset-fault", "Reset drives in fault first; know why they were.")
+@option(
+    "--self-test", "First measure, for as long as the motion lasts, whether this machine can hold the cycle."
 )
-@click.option(
+@option(
     "--live",
-    type=click.Choice(["terminal", "browser"]),
-    help="Draw the motion while it runs: here, or on a page of this machine.",
+    "Draw the motion while it runs: here, or on a page of this machine.",
+    click.Choice(["terminal", "browser"]),
 )
-@click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
-@click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
-@click.option(
-    "--log",
-    "table",
-    metavar="CSV",
-    type=OutputFile(),
-    help="Write planned and actual positions side by side.",
-)
-@output_options
-def stream(table: Path | None, **options: Any) -> None:
+@option("--dry-run", "Print the plan, and touch no bus.")
+@option("--accept-unverified", "Stream what was exported without its check.")
+@option("--log CSV", "Write planned and actual positions side by side.", OutputFile(), into="table")
+@options.output
+def stream(table: Path | None, **given: Any) -> None:
     """Stream setpoints to CiA 402 drives, and stop them safely.
 
     Takes the log that --export can wrote, with its manifest beside it, a spec, which is designed and checked
@@ -81,11 +65,11 @@ def stream(table: Path | None, **options: Any) -> None:
     from gen_profile.streaming import stream as run
 
     require_installed("Streaming needs canopen", "can", "canopen")
-    request = StreamRequest(**options)
+    request = StreamRequest(**given)
     request.require_sense()
     with progress() as tell:
         source = request.source(tell)
-        if request.moves_slowly:
+        if request.to_start or request.jog:
             slow = request.slow_motion(source, tell)
             if slow is None:
                 print_outcome(*at_start(source))
@@ -115,14 +99,12 @@ def stream(table: Path | None, **options: Any) -> None:
 @cli.command(
     "drive-sim", epilog="Example: gen-profile drive-sim --preset paper --interface socketcan --channel vcan0"
 )
-@spec_options
+@options.spec
 @_bus_options
-@click.option(
-    "--miss", type=click.Choice(_MISSES), default="extrapolate", help="What it does without a setpoint."
-)
-@click.option("--own-mapping", is_flag=True, help="Start with another PDO mapping than CiA 402 proposes.")
-@click.option("--eds", type=OutputFile(), help="Write its EDS, and end.")
-@output_options
+@option("--miss", "What it does without a setpoint.", click.Choice(_MISSES), default="extrapolate")
+@option("--own-mapping", "Start with another PDO mapping than CiA 402 proposes.")
+@option("--eds", "Write its EDS, and end.", OutputFile())
+@options.output
 def drive_sim(
     chosen: SpecChoice,
     interface: str | None,
@@ -225,10 +207,10 @@ def _conclude(outcome: StreamOutcome, table: Path | None) -> None:
         sys.exit(code)
 
 
-def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Exception | None:
+def _refusal(say: Callable[..., None], *arguments: Any, **given: Any) -> Exception | None:
     """Say something, and return why it was not taken, if it was not."""
     try:
-        say(*arguments, **options)
+        say(*arguments, **given)
     except (OSError, OutputError) as error:
         return error
     return None

@@ -47,11 +47,6 @@ class StreamRequest:
     dry_run: bool
     accept_unverified: bool
 
-    @property
-    def moves_slowly(self) -> bool:
-        """Whether a slow motion from anywhere takes the place of the planned one."""
-        return self.to_start or bool(self.jog)
-
     def require_sense(self) -> None:
         """Refuse options that do not go together, before anything is begun.
 
