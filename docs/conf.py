@@ -15,11 +15,12 @@ import gen_profile
 NAVIGATION = {
     "Tutorials": "tutorial-crane tutorial-research tutorial-drive",
     "How to": (
-        "standalone machines plc sweeps planner soft-plc deploy can fmu studio report python troubleshooting"
+        "standalone machines plc sweeps planner planner-sensor soft-plc deploy can fmu studio report python"
+        " troubleshooting"
     ),
     "Examples": "/examples/README",
     "Reference": "command-line spec formats api glossary",
-    "Explanation": "check certificate shapers solvers planner-algorithm paper architecture",
+    "Explanation": "check certificate shapers solvers planner-algorithm planner-proof paper architecture",
     "Project": "/CHANGELOG /CONTRIBUTING /SECURITY",
 }
 
