@@ -1,0 +1,36 @@
+"""A planner block's stops: one is planned before it is ordered, and is planned in less time while it is under way."""
+
+import numpy as np
+import pytest
+from exporters.counted_block import CountedBlock, compile_counting
+
+from gen_profile.planner.design import planner_block
+from gen_profile.spec.reading import preset_spec
+
+CYCLE, SLOT = 0.004, 0.272  # s, that of a rope of 6 m
+MOMENTS = np.linspace(3.0, 10.0, 9)  # s, on the way
+
+
+def stopped(compiled, moment):
+    """When a stop is first obeyed, how long it takes from then on as it was told, and as it took."""
+    issued = []
+    for order in ({}, {"bStop": 1.0}):
+        block = CountedBlock(compiled, fActPosition=2.0, fL1=6.0, fm2=2000.0)
+        block.hold(round(5.0 / CYCLE))
+        block.hold(round(moment / CYCLE), bExecute=1.0, fTarget=35.0)
+        issued.append(block.hold(round(20.0 / CYCLE), **order))
+    goes_on, stops = issued
+    begun = int(np.flatnonzero(np.abs(stops["fPosition"] - goes_on["fPosition"]) > 1e-9)[0])
+    rests = int(np.flatnonzero(stops["fVelocity"])[-1]) + 1
+    assert stops["operations"].max() <= 12_000
+    return begun * CYCLE, stops["fTimeToGo"][begun], (rests - begun) * CYCLE
+
+
+@pytest.mark.slow
+def test_a_stop_begins_with_the_next_slot_and_ends_no_later_than_it_first_told():
+    """Planned only once it was ordered, it began up to 0.07 s after that slot, and ended when it was first told."""
+    compiled = compile_counting(planner_block(preset_spec("bay-crane")).text)
+    delays, told, took = np.transpose([stopped(compiled, moment) for moment in MOMENTS])
+    assert delays.max() <= SLOT
+    assert (took <= told + CYCLE).all()
+    assert (took < told - SLOT / 2).any()
