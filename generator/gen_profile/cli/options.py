@@ -180,7 +180,7 @@ def option(
     """Take an option such as ``--out DIR``; one that names neither a DIR nor a type is a flag."""
     own_name, _, metavar = name.partition(" ")
     names = [own_name] if into is None else [own_name, into]
-    is_flag = not metavar and value is None
+    is_flag = (not metavar and value is None) or None  # for Click, False lets the value be left out
     return click.option(*names, metavar=metavar or None, type=value, is_flag=is_flag, help=words, **more)
 
 
