@@ -1,4 +1,4 @@
-"""A planner block's stops: one is planned before it is ordered, and is planned in less time while it is under way."""
+"""A planner block's stops: one is planned before it is ordered, and in less time while it is under way."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ MOMENTS = np.linspace(3.0, 10.0, 9)  # s, on the way
 
 
 def stopped(compiled, moment):
-    """When a stop is first obeyed, how long it takes from then on as it was told, and as it took."""
+    """When a stop is first obeyed, how long it takes from then on as it states, and as it takes."""
     issued = []
     for order in ({}, {"bStop": 1.0}):
         block = CountedBlock(compiled, fActPosition=2.0, fL1=6.0, fm2=2000.0)
@@ -27,10 +27,10 @@ def stopped(compiled, moment):
 
 
 @pytest.mark.slow
-def test_a_stop_begins_with_the_next_slot_and_ends_no_later_than_it_first_told():
-    """Planned only once it was ordered, it began up to 0.07 s after that slot, and ended when it was first told."""
+def test_a_stop_begins_with_the_next_slot_and_ends_no_later_than_first_stated():
+    """Planned only once it was ordered, it began up to 0.07 s later, and ended when it was first stated."""
     compiled = compile_counting(planner_block(preset_spec("bay-crane")).text)
-    delays, told, took = np.transpose([stopped(compiled, moment) for moment in MOMENTS])
+    delays, stated, took = np.transpose([stopped(compiled, moment) for moment in MOMENTS])
     assert delays.max() <= SLOT
-    assert (took <= told + CYCLE).all()
-    assert (took < told - SLOT / 2).any()
+    assert (took <= stated + CYCLE).all()
+    assert (took < stated - SLOT / 2).any()

@@ -33,7 +33,12 @@ FORMER = {  # machine: how many are drawn, seed, number
         (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
         (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
         (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
+        (400, 13, 106),  # it stood as long as its rope changed, as that was taken over again and again
+        (400, 12, 20),  # stop ends 10⁹ m away in a cycle without bEnable, in which a pulse had been weighed
         (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
+    ],
+    "wide": [
+        (400, 10, 87),  # 4 s against a stick of two axes, one of which was too fast for a plan
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
