@@ -23,6 +23,7 @@ UNWATCHED = {
     "distributed.admin.system-monitor.interval": "10s",
 }
 ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
+START_TIME = "10 minutes"  # that a process of this computer has to start, as others may keep it busy
 RENEWAL = 5000  # ms between looks for processes that ended while they started, which Dask gives up
 
 
@@ -36,7 +37,9 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
     stack = ExitStack()
     try:
         cluster: LocalCluster | str
+        answer_time, silent = ANSWER_TIME, f"scheduler {scheduler}: no worker answers"
         if scheduler is None:
+            answer_time, silent = START_TIME, f"workers: no process of this computer started in {START_TIME}"
             stack.enter_context(_script_hidden())
             with interrupts_collected():  # Dask cannot end processes that are about to start
                 cluster = stack.enter_context(_local_cluster(workers))
@@ -44,10 +47,10 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
         else:
             cluster = scheduler
         try:
-            client = stack.enter_context(Client(cluster, timeout=ANSWER_TIME, set_as_default=False))
-            client.wait_for_workers(1, timeout=ANSWER_TIME)
+            client = stack.enter_context(Client(cluster, timeout=answer_time, set_as_default=False))
+            client.wait_for_workers(1, timeout=answer_time)
         except (OSError, ValueError) as error:
-            raise SpecError(f"scheduler {scheduler}: no worker answers ({error}).") from error
+            raise SpecError(f"{silent} ({error}).") from error
         if scheduler is None:
             client.run(_ignore_interrupts)  # a terminal sends Ctrl-C to them, too; this process ends them
         yield client

@@ -33,7 +33,8 @@ AXES = (
 def sweep(folder, *arguments):
     one = ("--workers", "1")  # a second process takes longer to start than it saves
     words = ("sweep", "--preset", "paper-beta0", "--set", CYCLE, *arguments, *one, "--out", folder)
-    assert run_here(*words).code == 0
+    outcome = run_here(*words)
+    assert outcome.code == 0, outcome.err
     return folder
 
 
