@@ -10,6 +10,7 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.streaming.status import in_units
+from gen_profile.suggestion import number_meant
 
 FRACTION = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
 ARROWS = "← →", "↓ ↑"  # of the first axis and the second
@@ -73,16 +74,17 @@ class Keys:
             return self._target()
         if key in ERASE:
             self.typed = self.typed[:-1]
-        elif key in b"0123456789.-" or (key == b"," and len(self._axes) > 1):
-            self.typed += key.decode("ascii")
+        elif key.isascii() and key.decode("ascii").isprintable():
+            self.typed += key.decode("ascii")  # all of it: 3,5 without its comma would be 35 m
         return None
 
     def _target(self) -> Command | None:
         text, self.typed = self.typed, ""
+        parts = text.split(",") if len(self._axes) > 1 else [text]
         try:
-            values = tuple(float(part) for part in text.split(","))
+            values = tuple(float(part) for part in parts)
         except ValueError:
-            self.shown = f"{text} is no number"
+            self.shown = f"{text} is no number{number_meant(text)}"
             return None
         if len(values) != len(self._axes):
             self.shown = f"{text}: a position for each of {len(self._axes)} axes, please"
