@@ -174,6 +174,12 @@ def test_heads_in_other_languages_and_places(head, columns):
     np.testing.assert_allclose(log.sways["payload"], 1e-3 * (5.5 + np.arange(20)))
 
 
+@pytest.mark.parametrize("head", ["Winkel [°]", "Winkel (Grad)", "angle_degrees", "hook_angle [deg]"])
+def test_units_are_told_as_loggers_spell_them(head):
+    log = parse_log(table(["Zeit", head], TIMES, [9.0] * 20), "log.csv", paper(), None)
+    np.testing.assert_allclose([*log.angles.values()][0], np.radians(9.0))
+
+
 def test_counts_are_as_large_as_is_said():
     text = table(["a", "b", "c"], TIMES, [100.0] * 20, [-40.0] * 20)
     log = parse_log(text, "log.csv", paper(), "time_s=a,hook_angle_0.09deg=b,payload_sway_.5 mm=c")
