@@ -1,7 +1,5 @@
 """A log of sensors, cycle by cycle what a planner block is given of them."""
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -12,6 +10,7 @@ import numpy as np
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
+from gen_profile.planner.written_table import read_rows
 
 TIME, VALUE = "time_s", "value"
 
@@ -64,21 +63,14 @@ def read_sensor_log(text: str, axes: Sequence[BlockAxis]) -> SensorLog:
     """
     if not axes:
         raise SpecError("sensor: the block has none; state planner.sensor in the spec that it is written of.")
-    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
-    names, columns = [name.strip() for name in rows.fieldnames or ()], [TIME, *(a.of(VALUE) for a in axes)]
-    if missing := [name for name in columns if name not in names]:
-        raise SpecError(
-            f"sensor: there is no column {missing[0]}; the first line must be {','.join(columns)}."
-        )
-    rows.fieldnames = names
+    columns = [TIME, *(axis.of(VALUE) for axis in axes)]
+    _, rows = read_rows(text, "sensor", columns)
     readings = []
-    for row in rows:
+    for line, row in rows:
         try:
             readings.append([float(row[name] or "") for name in columns])
         except ValueError:
-            raise SpecError(
-                f"sensor, line {rows.line_num}: {' and '.join(columns)} must be numbers."
-            ) from None
+            raise SpecError(f"sensor, line {line}: {' and '.join(columns)} must be numbers.") from None
     if not readings:
         raise SpecError(f"sensor: there is no row; write one such as 0.0{',0.01' * len(axes)}.")
     times, *values = np.array(readings).T
