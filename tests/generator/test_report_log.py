@@ -177,7 +177,7 @@ def test_heads_in_other_languages_and_places(head, columns):
 @pytest.mark.parametrize("head", ["Winkel [°]", "Winkel (Grad)", "angle_degrees", "hook_angle [deg]"])
 def test_units_are_told_as_loggers_spell_them(head):
     log = parse_log(table(["Zeit", head], TIMES, [9.0] * 20), "log.csv", paper(), None)
-    np.testing.assert_allclose([*log.angles.values()][0], np.radians(9.0))
+    np.testing.assert_allclose(next(iter(log.angles.values())), np.radians(9.0))
 
 
 def test_counts_are_as_large_as_is_said():

@@ -75,7 +75,7 @@ class LogTable:
         return value if math.isfinite(value) else math.nan
 
     def seconds(self, row: int, place: int) -> float:
-        """Time of a cell: a number, or a moment in s, as of ISO 8601, day first, or a time of day; else NaN."""
+        """Time of a cell: a number, a date (ISO 8601, or day first) or a time of day, in s; else NaN."""
         value = self.number(row, place)
         if not math.isnan(value):
             return value
@@ -87,7 +87,7 @@ class LogTable:
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
     def head(self, columns: Collection[str]) -> int:
-        """Find the row of these columns' names; where all are numbers, the last above the values but units."""
+        """Find the row of these columns' names; where all are numbers, the last above values and units."""
         if names := {column for column in columns if not column.isdecimal()}:
             return next((row for row, cells in enumerate(self.rows) if names & set(cells)), 0)
         places, above = [int(column) - 1 for column in columns], list[int]()
