@@ -12,6 +12,7 @@ from gen_profile.problem.linearization import linearize
 
 LOGGED, FOUND = Style(colour=PALETTE[1], dash="points"), Style(colour=PALETTE[0], width=1.0)
 LEFT, CHANCE = Style(colour=PALETTE[1], width=1.0), Style(colour=INK, dash="dash", width=1.0)
+GAP = 10.0  # times as long as samples are apart: over it no curve is drawn
 BELOW = 1.5  # decades that are shown below what chance does
 
 
@@ -24,11 +25,15 @@ def identification_figure(identified: Identification) -> Figure:
     shown = spectrum(log.times, left, float(natural[-1]))
     amplitude, chance = (2.0 * np.sqrt(power / len(left)) for power in (shown.power, shown.threshold))
     greatest = max(float(amplitude.max()), float(np.max(chance)))
-    logged = Line(name="logged", x=log.times, y=log.values, style=LOGGED)
-    found = Line(name="machine found", x=log.times, y=swing, style=FOUND)
+    steps = np.diff(log.times)
+    gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1
+    times = np.insert(log.times, gaps, 0.5 * (log.times[gaps - 1] + log.times[gaps]))
+    values, swing, left = (np.insert(row, gaps, np.nan) for row in (log.values, swing, left))
+    logged = Line(name="logged", x=times, y=values, style=LOGGED)
+    found = Line(name="machine found", x=times, y=swing, style=FOUND)
     template = "{quantity} of {load} ({unit})"
     label = Phrase(template, quantity=log.quantity, load=log.load, unit=log.unit)
-    rest = Line(name="left", x=log.times, y=left, style=LEFT)
+    rest = Line(name="left", x=times, y=left, style=LEFT)
     of_rest = Phrase("left of it ({unit})", unit=log.unit)
     spectral = [
         Line(name="left", x=shown.frequencies, y=amplitude, style=LEFT),
