@@ -175,6 +175,17 @@ def test_a_log_of_another_way_is_refused(spec, motion, factor):
         compare_measured(spec, evaluate(spec, motion), log, motion.duration)
 
 
+def test_values_that_stick_out_of_a_log_are_told_with_their_time(spec, motion):
+    times = np.linspace(0.0, 8.0, 401)
+    position = motion(times).position[:, 0]
+    position[50:60] += 65.535
+    log = MeasuredLog(source="log.csv", times=times, positions={"cart": position}, sways={}, angles={})
+    with pytest.raises(
+        OutputError, match=r"cart is at 65\.\d+ m at 1(\.\d+)? s, and the move leads it to 0\.\d+ m then"
+    ):
+        compare_measured(spec, evaluate(spec, motion), log, motion.duration, start=None)
+
+
 @pytest.mark.parametrize("columns", [("position", "payload"), ("payload",), ("angles",)])
 def test_a_sensor_that_counts_the_other_way_is_told(tmp_path, spec, motion, columns):
     log(tmp_path / "log.csv", motion, spec.plant.parameters, columns=columns)

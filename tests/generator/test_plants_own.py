@@ -197,6 +197,7 @@ UNSOUND = {
     "the unit of phi": {"unactuated": [Coordinate(name="phi", unit="deg")]},
     "at least one actuated": {"actuated": ()},
     "directions must be from 1": {"directions": 2},
+    "its loads must be several: write ('load',)": {"loads": "load"},
 }
 
 

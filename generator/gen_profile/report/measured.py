@@ -224,9 +224,19 @@ def _require_alike(evaluation: MotionEvaluation, log: MeasuredLog, start: float)
     signal, motion = log.positions[name], evaluation.motion
     begin, end = motion.start[column], motion.target[column]
     during = (log.times >= start) & (log.times <= start + motion.duration)
-    off = (signal - motion(log.times - start).position[:, column])[during] / (end - begin)
+    planned = motion(log.times - start).position[:, column]
+    off = (signal - planned)[during] / (end - begin)
     if np.ptp(signal) < LEAST_WAY * abs(end - begin) or (off**2).sum() > UNLIKE**2 * len(off):
         unit = evaluation.swing.plant.actuated[column].unit
+        if max(abs(signal[0] - begin), abs(signal[-1] - end)) < LEAST_WAY * abs(end - begin):
+            worst = int(np.argmax(np.abs(np.where(during, signal - planned, 0.0))))
+            template = (
+                "measured {source}: {axis} is at {found:.4g} {unit} at {time:.4g} s, and the move leads it "
+                "to {there:.4g} {unit} then; leave out values that were not measured, and look whether this "
+                "is a log of this move."
+            )
+            values = {"found": signal[worst], "time": log.times[worst], "there": planned[worst], "unit": unit}
+            raise OutputError(template, source=log.source, axis=name, **values)
         template = (
             "measured {source}: {axis} goes from {first:.4g} to {last:.4g} {unit} in the log, and from "
             "{begin:.4g} to {end:.4g} {unit} in the move; look at the unit and the sign of its column, and "
