@@ -12,8 +12,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.events import COLUMNS, events_of
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import SENSED, BlockAxis, live_inputs, sensed_axes
-from gen_profile.planner.sensor_log import SensorLog, read_sensor_log
-from gen_profile.planner.written_table import read_rows
+from gen_profile.planner.sensor_log import SensorLog, read_rows, read_sensor_log
 from gen_profile.suggestion import number_meant
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")

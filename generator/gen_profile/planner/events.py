@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
-from gen_profile.planner.written_table import read_rows
+from gen_profile.planner.sensor_log import read_rows
 from gen_profile.suggestion import number_meant
 
 KEPT = 16
