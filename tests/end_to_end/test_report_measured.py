@@ -190,9 +190,9 @@ def test_values_that_stick_out_of_a_log_are_told_with_their_time(spec, motion):
 def test_a_sensor_that_counts_the_other_way_is_told(tmp_path, spec, motion, columns):
     log(tmp_path / "log.csv", motion, spec.plant.parameters, columns=columns)
     read = read_log(tmp_path / "log.csv", spec)
-    turned = {name: {k: -v for k, v in getattr(read, name).items()} for name in ("sways", "angles")}
+    reversed_swings = {name: {k: -v for k, v in getattr(read, name).items()} for name in ("sways", "angles")}
     with pytest.raises(OutputError, match=r"as planned, but the other way round: .* negate the column"):
-        compare_measured(spec, evaluate(spec, motion), attrs.evolve(read, **turned), motion.duration)
+        compare_measured(spec, evaluate(spec, motion), attrs.evolve(read, **reversed_swings), motion.duration)
 
 
 @pytest.mark.slow
