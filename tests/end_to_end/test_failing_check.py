@@ -44,7 +44,7 @@ def test_loads_that_swing_beyond_all_measure_are_told_once_with_the_cure(tmp_pat
     """As a jib does at 1 rad/s, which was meant for the trolley, in m/s."""
     (tmp_path / "tower.toml").write_text(TOWER)
     outcome = run_process("planner", tmp_path / "tower.toml", "--histories", "16", "--out", tmp_path / "out")
-    sentences = [line for line in outcome.stderr.splitlines() if "finite" in line]
+    sentences = [line for line in outcome.err.splitlines() if "finite" in line]
     assert outcome.code == 4 and len(sentences) == 1
     assert sentences[0].endswith("lower the limits of the axes.")
 
