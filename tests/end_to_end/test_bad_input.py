@@ -66,6 +66,14 @@ ARGUMENTS = {
         [r".* unknown preset 'papre'; did you mean 'paper'\?.*"],
     ),
     "unknown format": (["--export", "cvs"], [r"--export: unknown format 'cvs'; did you mean 'csv'\?.*"]),
+    "command of a group": (
+        ["explain", "events.csv"],
+        [r"There is no command or spec explain; did you mean 'planner explain'\?"],
+    ),
+    "command that is none": (
+        ["draw", "bay.st"],
+        [r"There is no command or spec draw \(known: .*check, .*\)\."],
+    ),
     "missing file": (["bay.toml"], [r"Cannot read the spec bay\.toml: No such file or directory\."]),
     "name too long": ([300 * "x"], [r"Cannot read the spec x+: File name too long\."]),
     "folder as spec": (["."], [r"Cannot read the spec \.: Is a directory\."]),

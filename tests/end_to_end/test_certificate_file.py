@@ -176,6 +176,14 @@ def test_a_file_that_does_not_make_the_move_is_not_certified(copied):
         gp.certify_artefact(artefact)
 
 
+def test_where_no_certificate_can_lie_none_is_sought(copied):
+    artefact, beside = copied
+    beside.unlink()
+    beside.mkdir()
+    with pytest.raises(OutputError, match="no regular file"):
+        gp.certify_artefact(artefact, progress=lambda *_: pytest.fail("the proof began"))
+
+
 def test_a_file_that_leaves_the_travel_is_not_certified(copied):
     artefact, beside = copied
     rows = artefact.read_text().splitlines()

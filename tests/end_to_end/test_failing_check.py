@@ -23,6 +23,32 @@ def tree(folder):
     }
 
 
+TOWER = """
+name = "tower"
+plant = { type = "tower-crane", L = 20.0 }
+move = { start = [0.0, 10.0], target = [1.57, 30.0], duration = 60.0 }
+planner = { live = { L = [4.0, 30.0] } }
+check = { residual_sway = 0.3 }
+export = { cycle_time = 0.01 }
+
+[limits]
+velocity = 1.0
+acceleration = 0.15
+jerk = 0.5
+axis.slew.travel = [-3.2, 3.2]
+axis.trolley.travel = [3.0, 50.0]
+"""
+
+
+def test_loads_that_swing_beyond_all_measure_are_told_once_with_the_cure(tmp_path):
+    """As a jib does at 1 rad/s, which was meant for the trolley, in m/s."""
+    (tmp_path / "tower.toml").write_text(TOWER)
+    outcome = run_process("planner", tmp_path / "tower.toml", "--histories", "16", "--out", tmp_path / "out")
+    sentences = [line for line in outcome.err.splitlines() if "finite" in line]
+    assert outcome.code == 4 and len(sentences) == 1
+    assert sentences[0].endswith("lower the limits of the axes.")
+
+
 @pytest.mark.parametrize("words", [(), ("--json",)])
 def test_a_failed_check_leaves_nothing_and_says_why(tmp_path, words):
     outcome = run_here(*STRICT, "--out", tmp_path / "new" / "deploy", *words)

@@ -75,6 +75,14 @@ def test_the_verdict_comes_first(browser, paper):
     assert words[2].startswith("PASSED. After the move the hook sways by 2.193 mm at most (L1 −20 %)")
 
 
+def test_bars_of_one_column_can_be_compared(browser, paper):
+    browser.open(paper)
+    ends = browser.run("""
+        return [...document.querySelectorAll('table')].map((table) => [...table.querySelectorAll('.bar')]
+            .map((bar) => Math.round(bar.getBoundingClientRect().left)));""")
+    assert {len(set(column)) for column in ends if len(column) > 1} == {1}
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])
 def test_it_is_accessible(browser, paper, scheme, width):

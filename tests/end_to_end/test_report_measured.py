@@ -2,6 +2,7 @@
 
 import json
 
+import attrs
 import numpy as np
 import pytest
 from command_line import run_here
@@ -9,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.motion_evaluation import evaluate
-from gen_profile.report.log import MeasuredLog
+from gen_profile.report.log import MeasuredLog, read_log
 from gen_profile.report.measured import compare_measured
 from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
@@ -172,6 +173,26 @@ def test_a_log_of_another_way_is_refused(spec, motion, factor):
         OutputError, match=f"cart goes from 0 to {0.3 * factor:.4g} m in the log, and from 0 to 0.3"
     ):
         compare_measured(spec, evaluate(spec, motion), log, motion.duration)
+
+
+def test_values_that_stick_out_of_a_log_are_told_with_their_time(spec, motion):
+    times = np.linspace(0.0, 8.0, 401)
+    position = motion(times).position[:, 0]
+    position[50:60] += 65.535
+    log = MeasuredLog(source="log.csv", times=times, positions={"cart": position}, sways={}, angles={})
+    with pytest.raises(
+        OutputError, match=r"cart is at 65\.\d+ m at 1(\.\d+)? s, and the move leads it to 0\.\d+ m then"
+    ):
+        compare_measured(spec, evaluate(spec, motion), log, motion.duration, start=None)
+
+
+@pytest.mark.parametrize("columns", [("position", "payload"), ("payload",), ("angles",)])
+def test_a_sensor_that_counts_the_other_way_is_told(tmp_path, spec, motion, columns):
+    log(tmp_path / "log.csv", motion, spec.plant.parameters, columns=columns)
+    read = read_log(tmp_path / "log.csv", spec)
+    reversed_swings = {name: {k: -v for k, v in getattr(read, name).items()} for name in ("sways", "angles")}
+    with pytest.raises(OutputError, match=r"as planned, but the other way round: .* negate the column"):
+        compare_measured(spec, evaluate(spec, motion), attrs.evolve(read, **reversed_swings), motion.duration)
 
 
 @pytest.mark.slow

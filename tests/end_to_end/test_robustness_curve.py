@@ -8,6 +8,7 @@ import pytest
 from command_line import run_here
 from pictures import colours
 
+from gen_profile.charts.robustness import robustness_figure
 from gen_profile.comparison.robustness import Robustness, error_grid, robustness
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.simulation import PlantSimulation
@@ -124,6 +125,15 @@ def test_a_map_is_drawn_and_told(tmp_path):
     assert "worst over L1, m2" in outcome.out and "from … to" not in outcome.out
     assert len((tmp_path / "m.csv").read_text("utf-8").splitlines()) == 10
     assert len(colours(tmp_path / "map.png")[0]) > 50
+
+
+@pytest.mark.parametrize(("most", "headroom"), [(0.01, 1.0), (1.7, 1.7), (40.0, 3.0)])
+def test_the_colours_of_maps_go_as_far_as_there_is_something_to_see(most, headroom):
+    errors = dict.fromkeys(("L1", "m2"), np.linspace(-0.1, 0.1, 3))
+    left = np.zeros((3, 3, 2))
+    left[2, 0] = most * 0.003
+    figure = robustness_figure(Robustness(spec=SPEC, errors=errors, residual={"x": left}))
+    assert figure.panels[0].headroom == pytest.approx(headroom)
 
 
 def test_nothing_is_drawn_where_no_method_has_a_motion(tmp_path):

@@ -408,6 +408,12 @@ class TestSlowMotions:
         assert self.streamed(deployed).document["state"] == "done"
         assert 0.01 < peak / (np.abs(np.diff(ways)).max() / 1e6 / 0.02) <= 0.1 * (1 + 1e-3)
 
+    def test_a_jog_in_millimetres_is_told_the_travel(self):
+        travel = ("--preset", "paper", "--set", "limits.travel=[-0.1, 0.5]")
+        outcome = run_here("stream", *travel, "--simulate-drive", "--jog", "cart=50")
+        assert outcome.code == 2
+        assert "jog cart=50: leads to 50, beyond limits.travel (-0.1 to 0.5)" in outcome.errors[-1]
+
     def test_jogging(self, deployed, drive_away):
         document = self.streamed(deployed, "--jog", "cart=-0.01").document
         assert document["state"] == "done"

@@ -256,6 +256,8 @@ def test_every_variable_of_openplc_has_an_address_of_its_own(block, inputs):
         ("time_s,command,value,L1,L1\n0,stop,,5,6\n", "two columns are called 'L1'"),
         ("time_s,command,value\n0,position,1,5\n", "line 2: holds more cells than the first line has names"),
         ("time_s,command,value\n0,position\n", "line 2: value must be a number, found ''."),
+        (f"time_s,command,value\n0,stop,{'x' * 200_000}", "commands, line 2: it is no table"),
+        (f"time_s,{'x' * 200_000}", "commands, line 1: it is no table"),
         ('time_s,command,value\n0,position,"1,5"\n', "found '1,5'; write a decimal point: 1.5"),
         ("time_s,command,value\n2,stop,\n\n1,stop,\n", "line 4: time_s goes back from 2 to 1"),
         ("time_s,command,value\n1e6,stop,\n", "comes at 1e+06 s, and at most 40000 s are played in one go"),
@@ -264,6 +266,12 @@ def test_every_variable_of_openplc_has_an_address_of_its_own(block, inputs):
 def test_commands_that_cannot_be_meant_are_refused_with_their_line(block, table, words):
     with pytest.raises(SpecError, match=re.escape(words)):
         play(block.text, table)
+
+
+def test_lines_may_end_as_in_any_system():
+    text = "time_s,command,value\n0.5,position,2\n3,stop,\n"
+    read = [read_commands(text.replace("\n", end), (BlockAxis(name=""),), ()) for end in ("\n", "\r\n", "\r")]
+    assert read[0] == read[1] == read[2] != ()
 
 
 def test_the_example_of_a_command_has_a_value_for_each_axis():

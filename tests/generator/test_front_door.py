@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.interpolate import BPoly, CubicSpline, PPoly
+from scipy.interpolate import BPoly, CubicSpline, PPoly, make_interp_spline
 
 import gen_profile as gp
 from gen_profile.charts.method_styles import method_styles
@@ -185,6 +185,15 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
         (lambda spec: gp.cosimulate(spec, STANDING, {"L1": -1.0}), "must be from 0.01 to 200 m, found -1"),
         (lambda spec: gp.cosimulate(spec, STANDING, {"L1": [0.4, 0.5]}), "residual_sways takes many"),
         (lambda spec: gp.linearize(spec.machine(), {"m1": 0.1}), "m2 must be a finite number"),
+        (lambda spec: gp.linearize(spec, {}), r"such as spec\.machine\(\) gives, found a Spec"),
+        (lambda spec: gp.identify(spec, ["L1=0.47±0.005"]), "what parse_reading, .* found 'L1=0.47"),
+        (
+            lambda spec: gp.read_swing("a.csv", spec, columns="time,angle"),
+            "columns: name two, .* 'time,angle'",
+        ),
+        (lambda spec: gp.read_swing("a.csv", spec, columns=(1, 2), time_unit="min"), "unknown unit 'min'"),
+        (lambda spec: gp.run_sweep(spec, ["plant.L1=1:2:3"], "plc", "unused"), "vary: give values by key"),
+        (lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(axis="cart"), "axis: .* found 'cart'"),
         (lambda spec: gp.design(spec, [], "unused"), "name at least one format"),
         (lambda spec: gp.design(spec, "plcc", "unused"), "unknown format 'plcc'; did you mean 'plc'"),
     ],
@@ -202,8 +211,24 @@ def test_a_cycle_that_cannot_be_is_told_in_a_sentence(cycle_time):
 
 
 def test_samples_without_axes_are_told_in_a_sentence():
-    with pytest.raises(gp.GenProfileError, match="two samples of at least one axis"):
+    with pytest.raises(gp.GenProfileError, match=r"two samples of one axis, found \(10,\)"):
         gp.SampledProfile(cycle_time=0.01, position=np.zeros(10))
+
+
+def test_what_is_no_spline_of_pieces_is_told_in_a_sentence():
+    with pytest.raises(gp.GenProfileError, match=r"PPoly\.from_spline makes of others, found a BSpline"):
+        gp.Profile.from_ppoly(make_interp_spline(np.linspace(0.0, 3.0, 9), np.linspace(0.0, 0.3, 9)))
+
+
+def test_one_measurement_needs_no_list_and_no_log_is_drawn_of_it(tmp_path):
+    found = gp.identify(gp.preset_spec("paper"), gp.parse_period("17.3±0.2/10"), "L1")
+    with pytest.raises(gp.OutputError, match="no log was identified from"):
+        gp.plot(found, tmp_path / "fit.svg")
+
+
+def test_none_takes_a_table_away():
+    limited = gp.evolve_spec(gp.preset_spec("paper"), limits={"velocity": 0.3})
+    assert gp.evolve_spec(limited, limits=None).limits.velocity is None
 
 
 def test_what_is_said_of_all_axes_replaces_what_was_said_of_one():
@@ -234,6 +259,8 @@ def test_a_spec_may_be_named_by_its_file(tmp_path):
     assert np.array_equal(by_path, by_spec)
     with pytest.raises(gp.OutputError, match=r"Cannot read the spec none\.toml"):
         gp.plan("none.toml")
+    with pytest.raises(gp.OutputError, match=r"a preset is called so: .* gp\.preset_spec\('paper'\)"):
+        gp.plan("paper")
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from generator.free_swings import inside, swing
 
+from gen_profile.charts.identification import identification_figure
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification import misfit
 from gen_profile.identification.estimation import estimate
@@ -129,6 +130,15 @@ def test_a_swing_that_nobody_lets_happen_is_in_another_unit(quantity, factor):
     values = factor * swing(HOIST.nominal(), TIMES, [0.1, 0.0])
     with pytest.raises(InfeasibleProblem, match=r"to either side, a swing of .*°: look at its unit"):
         estimate(hoist(), ["L0"], [], [log_of(values, quantity)])
+
+
+def test_nothing_is_drawn_where_a_log_has_a_gap():
+    logged = (TIMES < 5.0) | (TIMES > 7.0)
+    values = (swing(HOIST.nominal(), TIMES, [0.1, 0.0]) + NOISE)[logged]
+    log = SwingLog(times=TIMES[logged], values=values, quantity="angle", load="payload")
+    figure = identification_figure(identify(preset_spec("single-pendulum-crane"), log, "L0", (0.0, 4.0)))
+    for line in [line for panel in figure.panels[:2] for line in panel.lines]:
+        assert [5.0 < at < 7.0 for at in line.x[np.isnan(line.y)]] == [True]
 
 
 def test_what_a_stopwatch_rests_on_is_told():

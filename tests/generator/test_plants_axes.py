@@ -158,9 +158,12 @@ HOISTING = ["cost.sway_weight=0", "limits.velocity=1.3", "limits.axis.hoist.velo
         ),
         (
             "limits.axis.hoist.travel=[0.0, 5.0]",
-            "limits.axis.hoist.travel: must contain the move's start, found [0.0, 5.0].",
+            "limits.axis.hoist.travel: must contain move.start of hoist (7), found [0.0, 5.0].",
         ),
-        ("limits.travel=[0.0, 8.0]", "limits.travel: must contain the move's target, found [0.0, 8.0]."),
+        (
+            "limits.travel=[0.0, 8.0]",
+            "limits.travel: must contain move.target of cart (12), found [0.0, 8.0].",
+        ),
     ],
 )
 def test_faults_of_limits_by_axis(override, sentence):

@@ -161,7 +161,11 @@ def test_a_broken_machine_is_one_sentence(folder, text, why):
     [
         ("file = 3", "plant.file: must name a Python file, found 3."),
         ('file = "machines/none.py"', "plant.file: cannot read"),
-        ('file = "machines"', "plant.file: 'machines' must be a Python file such as my_machine.py."),
+        (
+            'file = "machines"',
+            "plant.file: 'machines' must be a Python file such as my_machine.py, named by ASCII letters, "
+            "digits, dots, underscores and hyphens.",
+        ),
         ('file = "machines/pendulum.py"\nfile_sha256 = 3', "plant.file_sha256: must be text, found 3."),
         ('file_sha256 = "00"', "plant.file: must name a Python file, found nothing."),
         (
@@ -193,6 +197,7 @@ UNSOUND = {
     "the unit of phi": {"unactuated": [Coordinate(name="phi", unit="deg")]},
     "at least one actuated": {"actuated": ()},
     "directions must be from 1": {"directions": 2},
+    "its loads must be several: write ('load',)": {"loads": "load"},
 }
 
 

@@ -241,7 +241,9 @@ def test_sensors_of_a_gantry_are_given_by_axis(gantry):
     x, y = (head.split(",").index(f"{axis}_sway_estimated_m") for axis in "xy")
     last = [float(cell) if "." in cell else 0.0 for cell in issued[180].split(",")]
     assert last[x] > 0.02 and last[y] < -0.04
-    with pytest.raises(SpecError, match="no column value_y; the first line must be time_s,value_x,value_y"):
+    with pytest.raises(
+        SpecError, match="no column value_y; the first line must name time_s, value_x, value_y"
+    ):
         play(*axes, sensor_text="time_s,value_x\n0.0,0.0\n")
 
 

@@ -5,6 +5,7 @@ import pytest
 from command_line import run_here
 
 from gen_profile.errors import OutputError, SpecError
+from gen_profile.identification.log_table import read_table
 from gen_profile.report.log import parse_log, read_log
 from gen_profile.spec.reading import preset_spec
 
@@ -172,6 +173,24 @@ def test_heads_in_other_languages_and_places(head, columns):
     log = parse_log(text, "log.csv", paper(), columns)
     np.testing.assert_allclose(log.times, TIMES)
     np.testing.assert_allclose(log.sways["payload"], 1e-3 * (5.5 + np.arange(20)))
+
+
+@pytest.mark.parametrize("head", ["Winkel [°]", "Winkel (Grad)", "angle_degrees", "hook_angle [deg]"])
+def test_units_are_told_as_loggers_spell_them(head):
+    log = parse_log(table(["Zeit", head], TIMES, [9.0] * 20), "log.csv", paper(), None)
+    np.testing.assert_allclose(next(iter(log.angles.values())), np.radians(9.0))
+
+
+HEAD = "t [ms];angle (°)"
+
+
+@pytest.mark.parametrize(
+    "head", [[HEAD], ["# 3", HEAD], ["Hall 3;27.11.2026", HEAD], ["Hall 3;1", "t;angle", "ms;[deg]"]]
+)
+def test_columns_by_number_have_the_units_that_stand_right_above_the_values(head):
+    cells = read_table("\n".join([*head, "0;", "40;1,5", "80;nan"]), "log.csv")
+    row = cells.head(("1", "2"))
+    assert [cells.unit(row, place) for place in (0, 1)] == ["ms", "deg"]
 
 
 def test_counts_are_as_large_as_is_said():

@@ -192,7 +192,11 @@ FAULTS = [
         r"limits\.travel: must be two rising numbers, such as \[0\.0, 10\.0\], found \[10, 0\]\.",
     ),
     ("move.shortest", True, r"move\.shortest: unknown key; write duration = \"minimum\"\."),
-    ("limits.travel", [0.0, 0.2], r"limits\.travel: must contain the move's target, found \[0\.0, 0\.2\]\."),
+    (
+        "limits.travel",
+        [0.0, 0.2],
+        r"limits\.travel: must contain move\.target of cart \(0\.3\), found \[0\.0, 0\.2\]\.",
+    ),
     ("robustness.nominal_zero", True, r"robustness\.nominal_zero: only with method = \"range\"\."),
     (
         "robustness",

@@ -320,7 +320,9 @@ class BlockFollower(AbstractContextManager["BlockFollower"]):
         )
         if outcome.status:
             reason = " ".join(self._messages)
-            raise CosimulationError(f"The FMU could not go on after cycle {outcome.cycles}: {reason}")
+            far = " The loads swing farther than can be followed; lower the limits of the axes."
+            cure = far if "no longer finite" in reason else ""
+            raise CosimulationError(f"The FMU could not go on after cycle {outcome.cycles}: {reason}{cure}")
         return BlockRun(
             axes=tuple(
                 AxisExtremes(**dict(zip(_EXTREMES, row, strict=True))) for row in kept["axes"].tolist()

@@ -115,7 +115,7 @@ def instance(fmu: PlantFmu) -> Instance:
         if status == fmi2OK:
             _logger.debug("%s: %s", category.decode("utf-8"), text)
         else:
-            _logger.warning("%s: %s", category.decode("utf-8"), text)
+            _logger.info("%s: %s", category.decode("utf-8"), text)
             messages.append(text)
 
     callbacks = fmi2CallbackFunctions()

@@ -11,7 +11,7 @@ import numpy as np
 
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
-from gen_profile.artefacts.writing import deliver
+from gen_profile.artefacts.writing import deliver, require_place
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.setpoint_limits import Asked, asked_of_axes
 from gen_profile.certificate.boxes import covers
@@ -80,6 +80,8 @@ def certify_artefact(
     True
     """
     artefact = _read(Path(path), spec)
+    if write:
+        require_place(certificate_path(artefact.path))  # before there is a proof to lose
     asked = asked_of_axes(artefact.spec, artefact.setpoints)
     certificate = _certificate(artefact, asked, attempt(artefact.spec, artefact.setpoints, progress))
     if write and certificate.proved:

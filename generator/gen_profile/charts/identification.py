@@ -12,6 +12,7 @@ from gen_profile.problem.linearization import linearize
 
 LOGGED, FOUND = Style(colour=PALETTE[1], dash="points"), Style(colour=PALETTE[0], width=1.0)
 LEFT, CHANCE = Style(colour=PALETTE[1], width=1.0), Style(colour=INK, dash="dash", width=1.0)
+GAP = 10.0  # times as long as samples are apart: over it no curve is drawn
 BELOW = 1.5  # decades that are shown below what chance does
 
 
@@ -24,11 +25,15 @@ def identification_figure(identified: Identification) -> Figure:
     shown = spectrum(log.times, left, float(natural[-1]))
     amplitude, chance = (2.0 * np.sqrt(power / len(left)) for power in (shown.power, shown.threshold))
     greatest = max(float(amplitude.max()), float(np.max(chance)))
-    logged = Line("logged", log.times, log.values, LOGGED)
-    found = Line("machine found", log.times, swing, FOUND)
+    steps = np.diff(log.times)
+    gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1
+    times = np.insert(log.times, gaps, 0.5 * (log.times[gaps - 1] + log.times[gaps]))
+    values, swing, left = (np.insert(row, gaps, np.nan) for row in (log.values, swing, left))
+    logged = Line("logged", times, values, LOGGED)
+    found = Line("machine found", times, swing, FOUND)
     template = "{quantity} of {load} ({unit})"
     label = Phrase(template, quantity=log.quantity, load=log.load, unit=log.unit)
-    rest = Line("left", log.times, left, LEFT)
+    rest = Line("left", times, left, LEFT)
     of_rest = Phrase("left of it ({unit})", unit=log.unit)
     spectral = [
         Line("left", shown.frequencies, amplitude, LEFT),

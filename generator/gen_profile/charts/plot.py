@@ -104,6 +104,8 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
             load = spec.machine().end_load_name
             title = f"{spec.name}: residual sway of the {load} on machines that are not as specified"
             return [robustness_figure(result)], spec.name, title
+        case Identification(logs=()):
+            raise OutputError("There is nothing to draw: no log was identified from.")
         case Identification(spec=spec):
             names = ", ".join(result.estimate.values)
             return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"

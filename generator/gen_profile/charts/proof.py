@@ -187,8 +187,12 @@ def map_figure(spec: Spec, proof: Proof) -> Figure:
         [live[name] for name in names],
         [proof.fraction(one) for one in proof.judged],
     )
-    caption = "Over what the block is given; white: no history there."
-    return Figure(caption, [panel], columns=1)
+    captions = (
+        "Every history.",
+        "Every history, over what the block is given.",
+        "Over what the block is given; white: no history there.",
+    )
+    return Figure(captions[len(names)], [panel], columns=1)
 
 
 def _labelled(spec: Spec, name: str) -> str:

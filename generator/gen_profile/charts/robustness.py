@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from gen_profile.charts.figure import Band, Figure, Level, Line, Map, Panel, Style, beside_limit
+from gen_profile.charts.figure import HEADROOM, Band, Figure, Level, Line, Map, Panel, Style, beside_limit
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.robustness import Robustness
 from gen_profile.errors import OutputError
@@ -39,6 +39,7 @@ def maps_figure(grid: Robustness) -> Figure:
     (across, x), (upwards, y) = grid.errors.items()
     stated = grid.spec.robustness.uncertain
     framed = across in stated and upwards in stated
+    most = max(float(grid.fraction(method).max()) for method in grid.residual)
     template = "{method} over {across} and {upwards}"
     panels = [
         Map(
@@ -50,6 +51,7 @@ def maps_figure(grid: Robustness) -> Figure:
             y=100.0 * y,
             values=100.0 * grid.fraction(method).T,
             limit=100.0,
+            headroom=min(HEADROOM, max(1.0, most)),
             frame=(100.0 * stated[across], 100.0 * stated[upwards]) if framed else None,
         )
         for method in grid.residual

@@ -29,10 +29,14 @@ class DefaultGroup(click.Group):
         return super().parse_args(ctx, args)
 
     def _refuse_mistyped(self, ctx: click.Context, args: list[str]) -> None:
-        """Refuse a first word that is nearly a command: the default would complain of the rest."""
+        """Refuse a first word that is meant as a command: the default would complain of the rest."""
         word = args[0] if args and not ctx.resilient_parsing else ""
         near = suggestion(word, self.commands)
-        if word.isidentifier() and "did you mean" in near and not Path(word).exists():
+        inner = (name for name, group in self.commands.items() if word in getattr(group, "commands", ()))
+        if group := next(inner, ""):
+            near = f"; did you mean '{group} {word}'?"
+        meant = "did you mean" in near or (len(args) > 1 and not args[1].startswith("-"))
+        if word.isidentifier() and meant and not Path(word).exists():
             raise SpecError(f"There is no command or spec {word}{near}")
 
     def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -143,7 +143,7 @@ def play(
     content, commands = read_block(block), _read(commands_path)
     with progress() as tell:
         tell("executing the block")
-        shown = None if sensor_path is None else _read(sensor_path)
+        shown = None if sensor_path is None else _read(sensor_path, "sensor log")
         setpoints = run(content, commands, with_events=events_path is not None, sensor_text=shown)
     deliver(path, setpoints.table.encode("ascii"))
     if events_path is not None:

@@ -76,7 +76,7 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         ("residual sway", f"{nominal} nominal, {worst} at worst"),
         *([] if outcome.check is None else (*_groups(outcome.check), *_wind(outcome.check))),
         ("check", _verdict(outcome.check)),
-        *(row for certificate in certificates.values() for row in _proved(certificate)),
+        *(row for path, proof in certificates.items() for row in (("file", path.name), *_proved(proof))),
         *_cost_of_lag(figures, outcome.spec.cost.effort),
     ]
     if outcome.spec.plant.defaults:

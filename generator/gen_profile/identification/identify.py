@@ -129,7 +129,7 @@ class Identification(Drawable):
 
 def read_swing(
     path: Path | str,
-    spec: Spec,
+    spec: Spec | Path | str,
     *,
     columns: tuple[str | int, str | int],
     signal: str = "angle",
@@ -143,6 +143,7 @@ def read_swing(
     ----------
     path : Path or str
         Table with a column of times and one of values.
+    spec : Spec, or the path of one
     columns : (str or int, str or int)
         Their names, or their numbers from 1.
     signal : str
@@ -159,7 +160,7 @@ def read_swing(
     Raises
     ------
     SpecError
-        The machine has no such signal.
+        The machine has no such signal, or a choice is wrong.
     OutputError
         The file cannot be read.
 
@@ -171,7 +172,12 @@ def read_swing(
     >>> gp.read_swing("swing.csv", gp.preset_spec("bay-crane"), columns=("time_s", "angle_deg"))
     <SwingLog times: (400,), values: (400,), quantity: angle, load: hook, ...>
     """
+    spec = as_spec(spec)
     loads = spec.machine().loads
+    if isinstance(columns, str) or len(columns) != len(("time", "value")):
+        raise SpecError(f"columns: name two, of times and values, such as (1, 2), found {columns!r}.")
+    if time_unit is not None and time_unit not in TIME_UNITS:
+        raise SpecError(f"time_unit: unknown unit {time_unit!r}{suggestion(time_unit, TIME_UNITS)}")
     quantity, _, named = signal.partition(":")
     load = named or loads[0]
     if quantity not in SI_UNITS:
@@ -209,7 +215,7 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
 
 def identify(
     spec: Spec | Path | str,
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Measurement] | Measurement,
     free: Sequence[str] | str = (),
     q_a: Sequence[float] | None = None,
     progress: Progress = no_progress,
@@ -220,7 +226,7 @@ def identify(
     ----------
     spec : Spec, or the path of one
         Its parameters are where the search starts; those that are not identified are taken as exact.
-    measurements : sequence of Measurement
+    measurements : sequence of Measurement, or Measurement
     free : sequence of str, or str
         Parameters to identify, beside those that were read directly.
     q_a : (m,) sequence of float, optional
@@ -243,6 +249,11 @@ def identify(
     """
     spec = as_spec(spec)
     plant = spec.machine()
+    measurements = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
+    for one in measurements:
+        if not isinstance(one, Measurement):
+            known = "parse_reading, parse_period and read_swing"
+            raise SpecError(f"measurements: what {known} give is expected, found {one!r}.")
     readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
     read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
     asked = {*as_names(free), *read}

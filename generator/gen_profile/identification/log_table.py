@@ -30,7 +30,9 @@ _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")
 _BEHIND = re.compile(r".+[_ ](ms|us|s|rad|deg|mm|um)", re.IGNORECASE)
 # what is a unit, and no remark, though it may be one that nothing here is measured in
 _UNIT = re.compile(r".*[/^²³·].*|[kmµ]?[VAWNg]|kg|t|%|k?Hz|m?bar|°C|K|min|h|ms|us|s|rad|deg|m|mm|um")
+_DAY_FIRST = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})(?!\d)")  # as in 27.11.2026
 MISSING = {"nan", "na", "n/a", "null", "none", "-", "--"}  # what loggers write where they have no value
+AS_ISO = "; write dates as 2026-11-27 10:00:00"
 LEAVE_EMPTY = "; leave the cell empty where nothing was measured"
 GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
 # what a file begins with that is no text, and what to do about it
@@ -76,22 +78,38 @@ class LogTable:
         return value if math.isfinite(value) else math.nan
 
     def seconds(self, row: int, place: int) -> float:
-        """Time of a cell: a number, or a date and time as of ISO 8601, which is given in s; else NaN."""
+        """Time of a cell: a number, a date (ISO 8601, or day first) or a time of day, in s; else NaN."""
         value = self.number(row, place)
         if not math.isnan(value):
             return value
+        text = _DAY_FIRST.sub(lambda day: f"{day[3]}-{day[2]:0>2}-{day[1]:0>2}", self.cell(row, place))
         try:
-            moment = datetime.fromisoformat(self.cell(row, place).replace(",", "."))
+            moment = datetime.fromisoformat(f"{'1970-01-01 ' * (text[2:3] == ':')}{text.replace(',', '.')}")
         except ValueError:
             return math.nan
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
     def head(self, columns: Collection[str]) -> int:
-        """Find the row of these columns' names; where all are numbers, the first with so many cells."""
-        names = {column for column in columns if not column.isdecimal()}
-        most = max((int(column) for column in columns if column.isdecimal()), default=0)
-        fits = ((names & set(cells)) if names else len(cells) >= most for cells in self.rows)
-        return next((row for row, fit in enumerate(fits) if fit), 0)
+        """Find the row of these columns' names; where all are numbers, the last above values and units."""
+        if names := {column for column in columns if not column.isdecimal()}:
+            return next((row for row, cells in enumerate(self.rows) if names & set(cells)), 0)
+        places, above = [int(column) - 1 for column in columns], list[int]()
+        for row in range(len(self.rows)):
+            if len(self.rows[row]) <= max(places, default=0):
+                continue
+            cells = [self.cell(row, place) for place in places]
+            if self._holds_values(row, places):
+                return above[-1] if above else row
+            units = above and all(not cell or _UNIT.fullmatch(_spelt(cell)) for cell in cells)
+            if any(cells) and not units:
+                above.append(row)
+        return above[0] if above else 0
+
+    def _holds_values(self, row: int, places: Sequence[int]) -> bool:
+        """Tell whether cells hold times, values or what stands for none, and not all of them that."""
+        known = [place for place in places if not math.isnan(self.seconds(row, place))]
+        others = {self.cell(row, place).lower() for place in places if place not in known}
+        return bool(known) and others <= {"", *MISSING}
 
     def place(self, head: int, column: str) -> int:
         """Find a column by its name in a row of names, or by its number from 1.
@@ -115,11 +133,10 @@ class LogTable:
         """Read a column's unit off its name or off the cell below that; empty where neither tells one."""
         if not self.is_head(head):
             return ""
-        below = self.cell(head + 1, place).strip("[]() ") if head + 1 < len(self.rows) else ""
+        below = self.cell(head + 1, place) if head + 1 < len(self.rows) else ""
         name = self.cell(head, place)
         match = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
-        unit = match[1] if match else below
-        unit = SPELLINGS.get(unit.lower(), unit)
+        unit = _spelt(match[1] if match else below)
         return unit if _UNIT.fullmatch(unit) else ""
 
     def is_head(self, row: int) -> bool:
@@ -153,6 +170,8 @@ class LogTable:
                         name = self.cell(head, place)
                     line = self.rows.line(row)
                     hint = LEAVE_EMPTY if text.lower() in MISSING else number_meant(text)
+                    if place == time and not hint and re.match(r"\d+[-/.:]\d", text):
+                        hint = AS_ISO
                     template = (
                         "{source}, row {row}: {name} holds {text!r}, which is no number of a log{hint}."
                     )
@@ -176,6 +195,12 @@ class LogTable:
 
     def _fault(self, template: str, **values: object) -> OutputError:
         return OutputError(template, source=self.source, **values)
+
+
+def _spelt(unit: str) -> str:
+    """Call a unit as it is called here, without brackets around it."""
+    bare = unit.strip("[]() ")
+    return SPELLINGS.get(bare.lower(), bare)
 
 
 def read_text(path: Path, option: str) -> str:

@@ -118,8 +118,13 @@ class Profile(Drawable):
         Raises
         ------
         GenProfileError
-            Its numbers are not finite, or its breakpoints do not rise.
+            It is no such spline, its numbers are not finite, or its breakpoints do not rise.
         """
+        if not (hasattr(spline, "x") and hasattr(spline, "c")):
+            raise GenProfileError(
+                "A spline with breakpoints x and coefficients c is expected, such as SciPy's PPoly, which "
+                f"PPoly.from_spline makes of others, found a {type(spline).__name__}."
+            )
         knots, c = np.asarray(spline.x, dtype=np.float64), np.asarray(spline.c, dtype=np.float64)
         coefficients = np.moveaxis(c.reshape(*c.shape[:2], -1)[::-1], 0, 1)
         powers = np.diff(knots[-2:]) ** np.arange(len(c))
@@ -280,7 +285,10 @@ class SampledProfile(Summarised, Tabled):
 
     def __attrs_post_init__(self) -> None:
         if self.position.ndim != 2 or len(self.position) < 2:
-            raise GenProfileError("A sampled profile needs at least two samples of at least one axis.")
+            raise GenProfileError(
+                "A sampled profile needs positions of the shape (samples, axes), at least two samples of one "
+                f"axis, found {self.position.shape}."
+            )
         for values in (self.velocity, self.acceleration, self.jerk):
             if values is not None and values.shape != self.position.shape:
                 raise GenProfileError("A sampled profile's columns differ in length.")

@@ -1,7 +1,5 @@
 """Playing a table of commands to a written planner block, and the table of setpoints that it issues."""
 
-import csv
-import io
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import chain
@@ -14,7 +12,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.events import COLUMNS, events_of
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import SENSED, BlockAxis, live_inputs, sensed_axes
-from gen_profile.planner.sensor_log import SensorLog, read_sensor_log
+from gen_profile.planner.sensor_log import SensorLog, read_rows, read_sensor_log
 from gen_profile.suggestion import number_meant
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")
@@ -76,26 +74,19 @@ def read_commands(text: str, axes: Sequence[BlockAxis], live: Collection[str]) -
     SpecError
         With the line and the cure.
     """
-    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
-    names = [name.strip() for name in rows.fieldnames or ()]
     required = (*FIRST, *(axis.of("value") for axis in axes))
-    if missing := [name for name in required if name not in names]:
-        raise SpecError(
-            f"commands: there is no column {missing[0]}; the first line must name {', '.join(required)}, "
-            "with commas between."
-        )
+    names, rows = read_rows(text, "commands", required)
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         raise SpecError(f"commands: two columns are called {twice[0]!r}.")
     if unknown := [name for name in names if name not in (*required, *live)]:
         known = ", ".join(live) or "none"
         raise SpecError(f"commands: the block has no live parameter {unknown[0]!r}; it has {known}.")
-    rows.fieldnames = names
     commands: list[Command] = []
-    for row in rows:
-        command = _command(row, rows.line_num, axes, live)
+    for line, row in rows:
+        command = _command(row, line, axes, live)
         if commands and command.time < commands[-1].time:
             back = f"time_s goes back from {commands[-1].time:g} to {command.time:g}"
-            raise SpecError(f"commands, line {rows.line_num}: {back}.")
+            raise SpecError(f"commands, line {line}: {back}.")
         commands.append(command)
     if not commands:
         raise SpecError(f"commands: there is no row; write one such as 0.0,position{',1.0' * len(axes)}.")

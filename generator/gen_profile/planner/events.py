@@ -1,7 +1,5 @@
 """The events that a planner block keeps for an operator's screen: from its outputs, and in words."""
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -9,6 +7,7 @@ from typing import NamedTuple
 
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
+from gen_profile.planner.sensor_log import read_rows
 from gen_profile.suggestion import number_meant
 
 KEPT = 16
@@ -74,13 +73,8 @@ def read_events(text: str) -> list[Event]:
     SpecError
         With the line and the cure.
     """
-    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
-    if missing := [name for name in COLUMNS if name not in (rows.fieldnames or ())]:
-        raise SpecError(
-            f"events: there is no column {missing[0]}; the first line must be {','.join(COLUMNS)}."
-        )
     events = []
-    for row in rows:
+    for line, row in read_rows(text, "events", COLUMNS)[1]:
         cells = [text for text in row.values() if isinstance(text, str)]  # those beyond the names in a list
         try:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
@@ -89,7 +83,7 @@ def read_events(text: str) -> list[Event]:
         if None in row or not (math.isfinite(time) and code.is_integer()):
             hint = next(filter(None, map(number_meant, cells)), "")
             raise SpecError(
-                f"events, line {rows.line_num}: a time, a whole number and a value are wanted, "
+                f"events, line {line}: a time, a whole number and a value are wanted, "
                 f"found {','.join(cells)!r}{hint}."
             )
         events.append(Event(time, int(code), value))

@@ -227,8 +227,11 @@ class Planner(Summarised):
         Raises
         ------
         SpecError
-            The block has no zones (``planner.zones``), or not so many.
+            The block has no zones (``planner.zones``), or not so many, or no such axis.
         """
+        if axis not in range(len(self._axes)):
+            last = len(self._axes) - 1
+            raise SpecError(f"axis: must be a place in `axes`, from 0 to {last}, found {axis!r}.")
         columns: dict[str, list[float]] = {}
         for what, rows, names in (("blocked", blocked, ZONES[:2]), ("slow", slow, ZONES[2:])):
             numbers = [[float(_column(what, value, 1)[0]) for value in row] for row in rows]

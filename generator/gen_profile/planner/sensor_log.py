@@ -1,10 +1,11 @@
-"""A log of sensors, cycle by cycle what a planner block is given of them."""
+"""Tables that people write for a planner block; a log of sensors, cycle by cycle what it is given of them."""
 
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import attrs
 import numpy as np
@@ -14,6 +15,52 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
 
 TIME, VALUE = "time_s", "value"
+Row = Mapping[str, Any]
+
+
+def read_rows(text: str, what: str, required: Sequence[str]) -> tuple[list[str], Iterator[tuple[int, Row]]]:
+    """Split a table whose lines end in any system's way.
+
+    Parameters
+    ----------
+    text : str
+    what : str
+        It is, for errors.
+    required : sequence of str
+        Columns that it must have.
+
+    Returns
+    -------
+    names : list of str
+        Of its columns.
+    rows : iterator of (int, mapping)
+        Each one's last line in the file, and its cells as `csv.DictReader` gives them.
+
+    Raises
+    ------
+    SpecError
+        A column is missing; while rows are taken, too: it is no table.
+    """
+    table = csv.DictReader(io.StringIO(text, newline=None), skipinitialspace=True)
+
+    def rows() -> Iterator[tuple[int, Row]]:
+        try:
+            table.fieldnames = [name.strip() for name in table.fieldnames or ()]
+            yield table.line_num, {}
+            for row in table:
+                yield table.line_num, row
+        except csv.Error as error:
+            raise SpecError(f"{what}, line {table.line_num + 1}: it is no table ({error}).") from error
+
+    found = rows()
+    next(found)  # the names
+    names = list(table.fieldnames or ())
+    if missing := [name for name in required if name not in names]:
+        raise SpecError(
+            f"{what}: there is no column {missing[0]}; the first line must name {', '.join(required)}, "
+            "with commas between."
+        )
+    return names, found
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -64,21 +111,14 @@ def read_sensor_log(text: str, axes: Sequence[BlockAxis]) -> SensorLog:
     """
     if not axes:
         raise SpecError("sensor: the block has none; state planner.sensor in the spec that it is written of.")
-    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
-    names, columns = [name.strip() for name in rows.fieldnames or ()], [TIME, *(a.of(VALUE) for a in axes)]
-    if missing := [name for name in columns if name not in names]:
-        raise SpecError(
-            f"sensor: there is no column {missing[0]}; the first line must be {','.join(columns)}."
-        )
-    rows.fieldnames = names
+    columns = [TIME, *(axis.of(VALUE) for axis in axes)]
+    _, rows = read_rows(text, "sensor", columns)
     readings = []
-    for row in rows:
+    for line, row in rows:
         try:
             readings.append([float(row[name] or "") for name in columns])
         except ValueError:
-            raise SpecError(
-                f"sensor, line {rows.line_num}: {' and '.join(columns)} must be numbers."
-            ) from None
+            raise SpecError(f"sensor, line {line}: {' and '.join(columns)} must be numbers.") from None
     if not readings:
         raise SpecError(f"sensor: there is no row; write one such as 0.0{',0.01' * len(axes)}.")
     times, *values = np.array(readings).T

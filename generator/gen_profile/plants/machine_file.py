@@ -48,7 +48,10 @@ def read_machine_file(path: Path, sha256: str | None = None) -> MachineFile:
         It cannot be read, is no Python file, or not the one that is meant.
     """
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.py", path.name):
-        raise SpecError(f"plant.file: {path.name!r} must be a Python file such as my_machine.py.")
+        raise SpecError(
+            f"plant.file: {path.name!r} must be a Python file such as my_machine.py, named by ASCII letters, "
+            "digits, dots, underscores and hyphens."
+        )
     try:
         file = MachineFile(name=path.name, content=read_bounded(path, DOCUMENT))
     except OSError as error:

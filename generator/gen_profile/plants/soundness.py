@@ -24,6 +24,10 @@ def faults_of(plant: Plant) -> tuple[str, ...]:
 def _form(plant: Plant) -> Iterator[str]:
     if not TYPE.fullmatch(plant.type):
         yield f"its type {plant.type!r} must be letters, digits, spaces, _ and -"
+    texts = {kind: names for kind in ("loads", "bodies") if isinstance(names := getattr(plant, kind), str)}
+    yield from (f"its {kind} must be several: write ({name!r},)" for kind, name in texts.items())
+    if texts:
+        return
     coordinates = [q.name for q in (*plant.actuated, *plant.unactuated)]
     for kind, names, pattern in (
         ("parameter", [q.name for q in plant.parameters], IDENTIFIER),

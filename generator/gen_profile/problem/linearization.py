@@ -91,6 +91,9 @@ def linearize(
     >>> gp.linearize(spec.machine(), spec.plant.parameters).frequencies.round(2)  # rad/s
     array([3.64, 9.02])
     """
+    if not isinstance(plant, Plant):
+        kind = type(plant).__name__
+        raise SpecError(f"A machine is expected, such as spec.machine() gives, found a {kind}.")
     for name in (parameter.name for parameter in plant.parameters):
         if not math.isfinite(parameters.get(name, math.nan)):
             raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")

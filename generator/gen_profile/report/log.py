@@ -20,7 +20,7 @@ from pathlib import Path
 import attrs
 
 from gen_profile.errors import OutputError
-from gen_profile.identification.log_table import LogTable, read_table, read_text
+from gen_profile.identification.log_table import SPELLINGS, LogTable, read_table, read_text
 from gen_profile.identification.measurements import LEAST_SAMPLES, SI_UNITS, require_angle, require_rising
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.spec.model import Spec
@@ -39,7 +39,7 @@ WORDS = {
 }
 _COLUMN = re.compile(
     r"(?:(?P<owner>\S.*?)[ _.])?(?P<quantity>" + "|".join(WORDS) + r")"
-    r"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts)[\])]?)?",
+    rf"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts|{'|'.join(SPELLINGS)})[\])]?)?",
     re.IGNORECASE,
 )
 # only where a person says so: in a file's own names a number may be a sensor's
@@ -219,7 +219,7 @@ def _meaning(name: str, spec: Spec, where: str) -> str:
         return ""
     if match is None or column is None:
         return ""
-    return "_".join(filter(None, (column.owner, column.quantity, (match["unit"] or "").lower())))
+    return "_".join(filter(None, (column.owner, column.quantity, _unit(match))))
 
 
 def _chosen(columns: str) -> dict[str, str]:
@@ -268,12 +268,18 @@ def _with_unit(table: LogTable, head: int, place: int) -> str:
     return f"{name}_{unit}"
 
 
+def _unit(match: re.Match[str]) -> str:
+    """Call the unit of a column's name as it is called here; empty where there is none."""
+    unit = (match["unit"] or "").lower()
+    return SPELLINGS.get(unit, unit)
+
+
 def _column(name: str, spec: Spec, where: str) -> _Column | None:
     """Tell what a column holds from its name; None where it is of none here."""
     match = _COLUMN.fullmatch(name)
     if match is None:
         return None
-    owner, unit = match["owner"] or "", (match["unit"] or "").lower()
+    owner, unit = match["owner"] or "", _unit(match)
     quantity = WORDS[match["quantity"].lower()]
     if quantity == "time":
         seconds = {"": 1.0, "s": 1.0, "ms": 1e3}

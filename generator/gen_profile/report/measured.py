@@ -175,6 +175,9 @@ def compare_measured(
     move = _the_move(evaluation, log, start)
     q_a, responses = evaluation.motion(move.times).position, evaluation.swing.at(move.times)
     plant, loads = spec.machine(), spec.machine().loads
+    for logged, planned in ((move.sways, responses[0].sway), (move.angles, responses[0].angle)):
+        for name, values in logged.items():
+            _require_sign(move.source, name, values, planned[:, loads.index(name)])
     sways = {**_sways_of_angles(spec, move, q_a), **move.sways}
 
     swung = _signals(move.times, sways, responses[0].sway, dict.fromkeys(loads, "m"))
@@ -221,9 +224,19 @@ def _require_alike(evaluation: MotionEvaluation, log: MeasuredLog, start: float)
     signal, motion = log.positions[name], evaluation.motion
     begin, end = motion.start[column], motion.target[column]
     during = (log.times >= start) & (log.times <= start + motion.duration)
-    off = (signal - motion(log.times - start).position[:, column])[during] / (end - begin)
+    planned = motion(log.times - start).position[:, column]
+    off = (signal - planned)[during] / (end - begin)
     if np.ptp(signal) < LEAST_WAY * abs(end - begin) or (off**2).sum() > UNLIKE**2 * len(off):
         unit = evaluation.swing.plant.actuated[column].unit
+        if max(abs(signal[0] - begin), abs(signal[-1] - end)) < LEAST_WAY * abs(end - begin):
+            worst = int(np.argmax(np.abs(np.where(during, signal - planned, 0.0))))
+            template = (
+                "measured {source}: {axis} is at {found:.4g} {unit} at {time:.4g} s, and the move leads it "
+                "to {there:.4g} {unit} then; leave out values that were not measured, and look whether this "
+                "is a log of this move."
+            )
+            values = {"found": signal[worst], "time": log.times[worst], "there": planned[worst], "unit": unit}
+            raise OutputError(template, source=log.source, axis=name, **values)
         template = (
             "measured {source}: {axis} goes from {first:.4g} to {last:.4g} {unit} in the log, and from "
             "{begin:.4g} to {end:.4g} {unit} in the move; look at the unit and the sign of its column, and "
@@ -231,6 +244,16 @@ def _require_alike(evaluation: MotionEvaluation, log: MeasuredLog, start: float)
         )
         values = {"first": signal[0] + 0.0, "last": signal[-1], "begin": begin, "end": end, "unit": unit}
         raise OutputError(template, source=log.source, axis=name, **values)
+
+
+def _require_sign(source: str, load: str, measured: Array, planned: Array) -> None:
+    """Refuse a swing that is the planned one the other way round, sensors' zeros aside."""
+    if float(np.var(measured + planned)) < UNLIKE**2 * float(np.var(planned)):
+        template = (
+            "measured {source}: the {load} swings as planned, but the other way round: sway and angle are "
+            "positive where the load trails the axis; negate the column."
+        )
+        raise OutputError(template, source=source, load=load)
 
 
 def _the_move(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> MeasuredLog:
@@ -306,12 +329,17 @@ def _best_start(evaluation: MotionEvaluation, log: MeasuredLog) -> float:
         planned = outputs[:, plant.loads.index(name)]
     times = log.times
 
-    def apart(start: float) -> float:
-        return float(np.mean((signal - np.interp(times - start, grid, planned)) ** 2))
+    def apart(start: float, sign: float = 1.0) -> float:
+        return float(np.mean((sign * signal - np.interp(times - start, grid, planned)) ** 2))
 
     first, last = float(times[0]) - 0.1 * duration, float(times[-1]) - 0.5 * duration
     starts = np.linspace(first, max(last, first + duration), STARTS)
-    best = int(np.argmin([apart(start) for start in starts]))
+    misfits = [apart(start) for start in starts]
+    if moving is None and min(misfits) > UNLIKE**2 * float(np.var(planned)):
+        reversed_misfits = [apart(start, -1.0) for start in starts]
+        start = starts[int(np.argmin(reversed_misfits))]
+        _require_sign(log.source, name, np.interp(grid + start, times, signal), planned)
+    best = int(np.argmin(misfits))
     step = starts[1] - starts[0]
     around = (starts[best] - step, starts[best] + step)
     refined = minimize_scalar(apart, bounds=around, method="bounded", options={"xatol": 1e-6})

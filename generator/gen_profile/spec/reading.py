@@ -39,7 +39,7 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
     overrides : sequence of str
         Such as ``"plant.L1=0.5"``.
     tables : mappings
-        Further values by table, such as ``move={"duration": 3.2}``; None takes a key away.
+        Further values by table, such as ``move={"duration": 3.2}``; None takes a key away, or a table.
 
     Raises
     ------
@@ -86,6 +86,8 @@ def read_text(path: Path) -> str:
     except OSError as error:
         near = meant(path.name, [other.name for other in path.parent.glob("*.toml")])
         cure = f"; did you mean {listed(near)}?" if near and isinstance(error, FileNotFoundError) else "."
+        if str(path) in presets():
+            cure = f"; a preset is called so: --preset {path}, or gp.preset_spec({str(path)!r})."
         raise OutputError(f"Cannot read the spec {path}: {error.strerror}{cure}") from error
     except UnicodeDecodeError as error:
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
@@ -320,8 +322,11 @@ def _plain(value: Any) -> Any:
 
 
 def _fill(document: Table, tables: Mapping[str, Any]) -> None:
-    """Set values by table; None takes a key away."""
+    """Set values by table; None takes a key away, or a table."""
     for name, values in _plain(tables).items():
+        if values is None:
+            document.pop(name, None)
+            continue
         if not isinstance(values, dict):
             document[name] = values
             continue

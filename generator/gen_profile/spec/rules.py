@@ -221,7 +221,7 @@ def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
 def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Hold the limits of every axis against the move."""
     move, limits = spec.move, spec.limits
-    for column, _ in enumerate(plant.actuated):
+    for column, axis in enumerate(plant.actuated):
         own = limits.of(column)
         if own.velocity is not None and abs(move.final_velocity[column]) > own.velocity:
             template = "must keep limits.velocity ({velocity:g}), found {found}"
@@ -232,7 +232,8 @@ def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
         low, high = own.travel
         for key, ends in (("start", move.start), ("target", move.target)):
             if not low <= ends[column] <= high:
-                problem = Phrase("must contain the move's {key}, found {found}", key=key, found=[low, high])
+                template = "must contain move.{key} of {axis} ({at:g}), found {found}"
+                problem = Phrase(template, key=key, axis=axis.name, at=ends[column], found=[low, high])
                 yield limits.place(column, "travel"), problem
 
 

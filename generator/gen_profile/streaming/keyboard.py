@@ -10,11 +10,13 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.streaming.status import in_units
+from gen_profile.suggestion import number_meant
 
 FRACTION = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
 ARROWS = "← →", "↓ ↑"  # of the first axis and the second
 CURSOR = {b"C": (0, 1), b"D": (0, -1), b"A": (1, 1), b"B": (1, -1)}  # keys' last bytes: axis, tenths more
-CURSOR_KEY = 3  # bytes of an escape sequence, also in application mode
+CURSOR_KEY = 3  # bytes of its escape sequence, also in application mode; other keys have more
+LETTERS = 0x40  # from which on a byte ends one
 ENTER, ERASE, END = b"\r\n", b"\x7f\x08", b"xX\x04"
 
 
@@ -73,16 +75,17 @@ class Keys:
             return self._target()
         if key in ERASE:
             self.typed = self.typed[:-1]
-        elif key in b"0123456789.-" or (key == b"," and len(self._axes) > 1):
-            self.typed += key.decode("ascii")
+        elif len(key) == 1 and key > b" ":
+            self.typed += key.decode("ascii", "replace")  # all of it: 3,5 without its comma would be 35 m
         return None
 
     def _target(self) -> Command | None:
         text, self.typed = self.typed, ""
+        parts = text.split(",") if len(self._axes) > 1 else [text]
         try:
-            values = tuple(float(part) for part in text.split(","))
+            values = tuple(float(part) for part in parts)
         except ValueError:
-            self.shown = f"{text} is no number"
+            self.shown = f"{text} is no number{number_meant(text)}"
             return None
         if len(values) != len(self._axes):
             self.shown = f"{text}: a position for each of {len(self._axes)} axes, please"
@@ -104,10 +107,10 @@ def _in_foreground(terminal: int) -> bool:
 
 
 def _length(left: bytes) -> int:
-    """Count the bytes of the first key: an escape sequence is three of them."""
+    """Count the bytes of the first key: an escape sequence ends with a letter or a tilde."""
     if left[:1] != b"\x1b" or left[1:2] not in (b"", b"[", b"O"):
         return 1
-    return CURSOR_KEY
+    return next((end for end in range(CURSOR_KEY, len(left) + 1) if left[end - 1] >= LETTERS), len(left) + 1)
 
 
 class Keyboard:

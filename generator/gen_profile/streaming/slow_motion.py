@@ -51,13 +51,20 @@ def jog(
     Raises
     ------
     SpecError
-        There is no such axis, or that is no distance.
+        There is no such axis, or that is no distance, or one that leaves the travel.
     StreamAborted, CheckFailed, InfeasibleProblem, SolverDiverged
         As `to_start`.
     """
     by_axis = _distances(distances, list(source.spec.axis))
     at = source.spec.move.start if simulate_drive else actual_positions(source, port, tell)
     target = [here + by_axis.get(name, 0.0) for name, here in zip(source.spec.axis, at, strict=True)]
+    for column, name in enumerate(source.spec.axis):
+        low, high = source.spec.limits.of(column).travel or (-math.inf, math.inf)
+        if name in by_axis and not low <= target[column] <= high:
+            raise SpecError(
+                f"jog {name}={by_axis[name]:g}: leads to {target[column]:g}, beyond limits.travel ({low:g} "
+                f"to {high:g}); distances are in m (or rad)."
+            )
     return designed(slow(source, at, target), tell)
 
 

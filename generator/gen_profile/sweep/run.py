@@ -277,6 +277,8 @@ def run_sweep(
     {'passed': 2}
     """
     spec = as_spec(spec)
+    if not isinstance(vary, Mapping):
+        raise SpecError(f"vary: give values by key, such as {{'plant.L1': [0.45, 0.5]}}, found {vary!r}.")
     grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
     store = prepare(text, (), grid, as_names(formats), Path(folder))

@@ -233,6 +233,21 @@ def test_keys_are_a_stick_and_buttons():
     assert keys.over
 
 
+def test_no_digit_of_a_typed_place_is_taken_without_what_stands_between():
+    keys = Keys(AXES, [2.0])
+    assert list(keys.take(b"3,5\r")) == []  # 35 m, if the comma were passed over
+    assert keys.shown == "3,5 is no number; write a decimal point: 3.5"
+    assert list(keys.take("−5\r".encode())) == [] and keys.shown.endswith("is no number")  # a printer's minus
+    assert [one.values for one in keys.take(b"1e-1\r")] == [(0.1,)]
+
+
+def test_keys_of_longer_sequences_are_none_of_a_place():
+    """Delete, and the cursor's keys with Ctrl."""
+    keys = Keys(AXES, [2.0])
+    assert [one.values for one in keys.take(b"0.5\x1b[3~\x1b[1;5C\x1b[2\r"[:-2])] == []
+    assert [one.values for one in keys.take(b"~\r")] == [(0.5,)]
+
+
 def test_of_two_axes_each_has_arrows_and_places():
     keys = Keys((BlockAxis(name="x"), BlockAxis(name="y")), [2.0, 1.0])
     commands = [(one.command, one.values) for one in keys.take(b"\x1b[C\x1b[B3,1.5\r7\r")]

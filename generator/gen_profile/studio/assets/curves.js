@@ -183,36 +183,37 @@ const curves = (() => {
 
   /** Show panels in an element. */
   function draw(element, panels, options) {
-    const charts = hosts.get(element) ?? [];
-    panels.forEach((panel, place) => {
-      let holder = charts[place];
-      if (!holder) {
-        const figure = document.createElement("figure");
-        figure.append(document.createElement("figcaption"), document.createElement("div"));
-        element.append(figure);
-        holder = charts[place] = { figure, seen: true };
-        figures.set(figure, holder);
-        sight.observe(figure);
-      }
-      Object.assign(holder, { panel, options });
-      if (holder.seen || !holder.chart) paint(holder);
-      else holder.due = true;
-    });
+    const charts = hosts.get(element) ?? [], before = charts.length;
     for (const old of charts.splice(panels.length)) {
       sight.unobserve(old.figure);
       old.chart.destroy();
       old.figure.remove();
     }
+    while (charts.length < panels.length) { // all of them before any is drawn: they share the width
+      const figure = document.createElement("figure"), holder = { figure, seen: true };
+      figure.append(document.createElement("figcaption"), document.createElement("div"));
+      element.append(figure);
+      charts.push(holder);
+      figures.set(figure, holder);
+      sight.observe(figure);
+    }
+    panels.forEach((panel, place) => {
+      const holder = Object.assign(charts[place], { panel, options });
+      if (holder.seen || !holder.chart) paint(holder);
+      else holder.due = true;
+    });
+    if (charts.length !== before) charts.forEach(size);
     hosts.set(element, charts);
   }
 
   function everyChart(act) {
     for (const charts of hosts.values()) for (const holder of charts) act(holder);
   }
-  const fit = () => everyChart(({ chart, figure }) => {
+  function size({ chart, figure }) {
     const width = figure.clientWidth;
     if (width && width !== chart.width) chart.setSize({ width, height: HEIGHT });
-  });
+  }
+  const fit = () => everyChart(size);
   new ResizeObserver(fit).observe(document.getElementById("view"));
   return { draw, fit, redraw: () => everyChart(({ chart }) => chart.redraw(false, true)) };
 })();

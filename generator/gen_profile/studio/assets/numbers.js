@@ -28,5 +28,28 @@ const numbers = (() => {
     return Array.from({ length: last - first + 1 }, (_, k) => digits((first + k) * times * step, 12));
   }
 
+  // Number fields of a browser whose own language has decimal points leave a comma out: 6,2 would be 62.
+  let changes = 0;
+  const put = (text) => document.execCommand("insertText", false, text);
+  function putComma(field) {
+    const before = changes;
+    put(",");
+    if (changes === before || (field.value === "" && !field.validity.badInput)) put(".");
+  }
+  addEventListener("input", () => { changes += 1; }, true);
+  addEventListener("keydown", (event) => {
+    if (event.key !== "," || event.target.type !== "number") return;
+    event.preventDefault();
+    putComma(event.target);
+  });
+  addEventListener("paste", (event) => {
+    const [pasted, whole, decimals] = event.clipboardData.getData("text").trim().match(/^([-+]?\d*),(\d+)$/) ?? [];
+    if (!pasted || event.target.type !== "number") return;
+    event.preventDefault();
+    put(whole);
+    putComma(event.target);
+    put(decimals);
+  });
+
   return { local, sentence, digits, short, millimetres, ticks };
 })();
