@@ -11,6 +11,7 @@ from gen_profile.planner.sensor_log import read_rows
 from gen_profile.suggestion import number_meant
 
 KEPT = 16
+NO_ERROR = 50  # the code of nErrorId 0; those of the others follow
 COLUMNS = ("time_s", "code", "value")
 _LINES = (Path(__file__).parents[1] / "lists" / "events.txt").read_text("utf-8").splitlines()
 # by code; {:g} is the event's value
@@ -29,6 +30,11 @@ class Event(NamedTuple):
         """Put it into words."""
         known = WORDS.get(self.code, "an event {code} that is not known here")
         return f"{self.time:.3f} s: {known.format(self.value, code=self.code)}"
+
+
+def error_words(number: int) -> str:
+    """Say what a planner block's nErrorId means."""
+    return WORDS.get(NO_ERROR + number, f"error {number}").partition(", at {")[0]
 
 
 def events_of(outputs: Sequence[str], issued: Array) -> Iterator[Event]:

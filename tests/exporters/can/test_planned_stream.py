@@ -182,7 +182,8 @@ def test_errors_and_lost_promises_are_told():
     with bench_of(source) as bench:
         bench.run()
     assert source.remarks == (
-        "The block showed error 3, which its header explains.",
+        "The block showed error 3: the target or the stick's velocity was no number, or the target out of "
+        "its range.",
         "The load may sway, because a live parameter changed on the way.",
     )
 
@@ -204,7 +205,7 @@ def test_what_the_block_refuses_is_not_done(commands, at, error, calls):
         assert bench.drive.state is State.SWITCH_ON_DISABLED
     assert record.phase is Phase.ABORTED
     words = (
-        r"At ([\d.]+) s the block refused its commands: error (\d), .* The axes were stopped without sway\."
+        r"At ([\d.]+) s the block refused its commands: error (\d): .* The axes were stopped without sway\."
     )
     found = re.fullmatch(words, record.reason)
     assert float(found[1]) == pytest.approx(at, abs=2 * CYCLE)
