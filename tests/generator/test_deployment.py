@@ -373,6 +373,22 @@ def test_what_does_not_fit_is_refused_with_the_cure(change, words, tables, block
 
 
 @pytest.mark.parametrize(
+    ("at", "change", "words"),
+    [
+        (3, "axis.unit=mm", "The controller's program was replaced meanwhile"),
+        (15, "move.distance=0.3", "730 of 971 values are not those .* look whether it was started anew"),
+    ],
+)
+def test_a_controller_that_is_another_one_after_a_break_is_not_switched(
+    at, change, words, tables, block, unchecked, tmp_path
+):
+    link, there = FaultyLink(block, at, 1, lose=True), read_table(exported(tmp_path, change))
+    link.happen = lambda: setattr(link, "block", SimulatedBlock(there))
+    with pytest.raises(DeploymentError, match=f"{words}.*\\n.* uses the table that it had"):
+        deploy(tables["new"], box_of(link))
+
+
+@pytest.mark.parametrize(
     ("there", "words"),
     [
         ({"interface": 1}, "another version, 1 and not 2"),

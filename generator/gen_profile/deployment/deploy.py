@@ -131,11 +131,11 @@ def _proved(
         )
     progress("reading the table back")
     values = box.read(buffer, len(table.values))
-    mailbox.require_same(values, table.values)
+    mailbox.require_same(values, table.values, cure=mailbox.KEPT)
     judgement = table.check(values, progress)
     if not judgement.check.passed:
         raise CheckFailed(*judgement.check.reasons())
-    mailbox.require_same(box.read(buffer, len(table.values)), table.values)
+    mailbox.require_same(box.read(buffer, len(table.values)), table.values, cure=mailbox.KEPT)
     return judgement
 
 
