@@ -397,7 +397,7 @@ def _peaks(outcome: Design) -> list[tuple[str, str]]:
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
     peaks: dict[str, list[str]] = {}
     for one in demands(outcome.spec, outcome.plan.evaluation.command):
-        peaks.setdefault(one.axis.name, []).append(f"{one.asked:.4g} {one.unit}")
+        peaks.setdefault(one.axis.name, []).append(f"{number(one.asked)} {one.unit}")
     title = kind if len(peaks) == 1 else f"{kind}, {{}}"
     return [(title.format(axis), ", ".join(of_axis)) for axis, of_axis in peaks.items()]
 
