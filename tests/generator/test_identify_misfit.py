@@ -94,6 +94,7 @@ def test_what_no_parameter_explains_widens_the_range():
     (left,) = torn.misfits
     assert left.rms == pytest.approx(0.005 / np.sqrt(2.0), rel=0.1)
     assert left.frequency == pytest.approx(3.1, abs=0.2)
+    assert torn.noise[0] == pytest.approx(np.hypot(left.rms, 1e-3), rel=0.1)
     assert torn.half_range["L0"] > 20.0 * clean.half_range["L0"]
 
 

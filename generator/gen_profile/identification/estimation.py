@@ -39,7 +39,7 @@ class Estimate:
     model : tuple of float
         What the identified machine would have shown instead of the readings.
     noise : tuple of float
-        Standard deviation of every log's samples, in rad or m.
+        Standard deviation of what is left of every log, in rad or m.
     initial_residual_ratio : tuple of float
         How many times farther off the model than the rest every log's first period is: about 1, unless the
         axes still moved then.
@@ -140,7 +140,7 @@ def _estimate(
         standard_uncertainty=by_name(half_ranges / factor),
         half_range=by_name(half_ranges),
         model=tuple(map(float, fit.predicted(unknowns))),
-        noise=tuple(map(float, noise)),
+        noise=tuple(float(np.std(left)) for left in lefts),
         initial_residual_ratio=around.initial_residual_ratio(),
         contradiction=around.contradiction,
         misfits=misfit_of_logs,
