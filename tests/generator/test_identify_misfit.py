@@ -110,6 +110,13 @@ def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monk
     assert found.misfits[0] is not None
 
 
+def test_logs_of_two_machines_are_refused():
+    own, other = (swing(HOIST.nominal() | {"L0": rope}, TIMES, [0.15, 0.0]) + NOISE for rope in (2.0, 2.1))
+    assert estimate(hoist(), ["L0"], [], [log_of(own), log_of(0.7 * own)]).half_range["L0"] < 0.02
+    with pytest.raises(InfeasibleProblem, match=r"not of one machine: number 1, of payload, is .* times"):
+        estimate(hoist(), ["L0"], [], [log_of(own), log_of(other)])
+
+
 def test_noise_is_no_misfit():
     """White, or alike from sample to sample: 100 spectra of each without a line."""
     random = np.random.default_rng(8)

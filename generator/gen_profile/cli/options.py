@@ -184,9 +184,11 @@ def option(
     return click.option(*names, metavar=metavar or None, type=value, is_flag=is_flag, help=words, **more)
 
 
-def repeatable(name: str, words: str, *, into: str | None = None) -> Callable[[Command], Command]:
+def repeatable(
+    name: str, words: str, value: Any = None, *, into: str | None = None
+) -> Callable[[Command], Command]:
     """Take an option that may be given more than once; its values go into one parameter."""
-    return option(name, f"{words} Repeatable.", into=into, multiple=True)
+    return option(name, f"{words} Repeatable.", value, into=into, multiple=True)
 
 
 def preset(text: str) -> Callable[[Command], Command]:
