@@ -81,13 +81,15 @@ def read_events(text: str) -> list[Event]:
     """
     events = []
     for line, row in read_rows(text, "events", COLUMNS)[1]:
-        cells = [text for text in row.values() if isinstance(text, str)]  # those beyond the names in a list
+        cells = [
+            text for name in row for text in (row[name] if name is None else [row[name]]) if text is not None
+        ]
         try:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
         except ValueError:
             time, code, value = math.nan, math.nan, math.nan
         if None in row or not (math.isfinite(time) and code.is_integer()):
-            hint = next(filter(None, map(number_meant, cells)), "")
+            hint = next((hint for text in cells if "point" in (hint := number_meant(text))), "")
             raise SpecError(
                 f"events, line {line}: a time, a whole number and a value are wanted, "
                 f"found {','.join(cells)!r}{hint}."

@@ -20,9 +20,10 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.can import CanSpec
 from gen_profile.streaming.keyboard import Keyboard, Keys
+from gen_profile.streaming.outcome import Source, StreamOutcome
 from gen_profile.streaming.planned_motion import CommandList, PlannedMotion
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.streaming.record import Phase
+from gen_profile_exporters.can.streaming.record import Book, Phase
 
 COUNTS = 1_000_000
 CYCLE = PLANNED.export.cycle_time
@@ -164,6 +165,13 @@ def test_the_screen_shows_beforehand_how_far_a_stop_leads():
     assert (record.final[0] - at) / COUNTS <= within + later
     assert any("stopping without sway" in words for words, _, _ in shown)
     assert len(lines) <= record.sent * CYCLE / 0.25 + 1
+
+
+def test_what_never_began_has_a_table():
+    source = Source(spec=spec_of(), plan=source_of(spec_of()))
+    record = Book.blank(0, 1).record("no answer", (0,), aftermath="", launched=False)
+    outcome = StreamOutcome(source=source, record=record, notes=())
+    assert outcome.table() == b"time_s,cart_planned_m,cart_actual_m,promise,error_id\n"
 
 
 def test_a_setpoint_that_comes_too_late_is_left_out():
