@@ -372,6 +372,18 @@ def test_what_does_not_fit_is_refused_with_the_cure(change, words, tables, block
         deploy(table, box_of(DirectLink(block)))
 
 
+def test_an_interruption_leaves_the_block_to_others_and_tells_what_is_used(tables, block, unchecked):
+    def interrupt():
+        link.happened = True
+        raise KeyboardInterrupt
+
+    link, said = FaultyLink(block, 9, 1, happen=interrupt), []
+    with pytest.raises(KeyboardInterrupt):
+        deploy(tables["new"], box_of(link), progress=said.append)
+    assert said[-1] == "The controller uses the table that it had"
+    assert deploy(tables["other"], box_of(DirectLink(block))).action == "deployed"
+
+
 @pytest.mark.parametrize(
     ("at", "change", "words"),
     [

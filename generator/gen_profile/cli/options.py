@@ -36,6 +36,12 @@ class Number(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Take the number."""
+        from gen_profile.suggestion import number_meant
+
+        try:
+            float(value)
+        except ValueError:
+            self.fail(f"{value!r} is no number{number_meant(value)}.", param, ctx)
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
             self.fail(f"{value!r} is no finite number.", param, ctx)

@@ -102,6 +102,10 @@ def deploy(
     except LinkLostError as error:
         words = f"The connection broke ({error}), and could not be taken up again."
         raise DeploymentError(words, in_force) from error
+    except KeyboardInterrupt:
+        _release(box)
+        progress(in_force.removesuffix("."))
+        raise
     except (DeploymentError, CheckFailed) as error:
         _release(box)
         kind = CheckFailed if isinstance(error, CheckFailed) else DeploymentError
