@@ -209,14 +209,15 @@ def near_limits(spec: Spec, column: int, order: int, shown: tuple[float, float])
 def spectrum_panel(
     spec: Spec, evaluation: MotionEvaluation, motions: Mapping[str, Profile], styles: Mapping[str, Style]
 ) -> Panel:
-    """Draw spectra of the first axis's acceleration over the natural frequencies of all machines."""
-    first, natural = spec.machine().actuated[0], natural_frequencies(spec, evaluation.machines)
+    """Draw spectra of the leading axis's acceleration over the natural frequencies of all machines."""
+    axis = spec.machine().actuated[evaluation.motion.leading]
+    natural = natural_frequencies(spec, evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     bands = [Band(low, high) for low, high in ranges if high > low]
     return Panel(
-        Phrase("Spectrum of the acceleration of {name}", name=first.name),
-        Phrase("magnitude ({unit}/s)", unit=first.unit),
+        Phrase("Spectrum of the acceleration of {name}", name=axis.name),
+        Phrase("magnitude ({unit}/s)", unit=axis.unit),
         [
             Line(name, frequencies, spectrum(motion, frequencies), styles[name])
             for name, motion in motions.items()

@@ -218,9 +218,8 @@ def comparison(compared: Comparison) -> str:
     """Lay the methods out side by side, below the recommendation."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("method\n")
-    first = compared.spec.machine().actuated[0].unit
     for head, (unit, _, _) in COLUMNS.items():
-        table.add_column(f"{head}\n{unit.replace('m/', f'{first}/')}", justify="right")
+        table.add_column(f"{head}\n{unit.replace('m/', f'{compared.unit}/')}", justify="right")
     table.add_column("limit\nkept", justify="center")
     table.add_column("Pareto\nfront", justify="center")
     for row in compared.rows:
