@@ -23,6 +23,7 @@ from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.summary import Summarised
 from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
 from gen_profile.sweep.grid import Grid, grid_of_values
 from gen_profile.sweep.store import Keeper, Store, opened, swept_table
@@ -88,8 +89,8 @@ def _require_some(recipe: Recipe, key: str, values: Sequence[Any]) -> None:
     raise faults[0]
 
 
-@attrs.frozen(kw_only=True)
-class Sweep:
+@attrs.frozen(kw_only=True, repr=False)
+class Sweep(Summarised):
     """A finished sweep.
 
     Attributes
@@ -109,6 +110,10 @@ class Sweep:
     reasons: dict[str, str]
     kept: int
     table: Path
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {"name": self.store.name, "folder": self.store.folder, **self.statuses}
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
