@@ -17,9 +17,10 @@ MISSING = "The re-checker needs python-flint: pip install 'gen-profile[recheck]'
 
 def main(arguments: list[str]) -> int:
     """Say whether a certificate is proved, and why not; give the exit code."""
-    if len(arguments) != 3:
-        print(__doc__, file=sys.stderr)
-        return 2
+    asked = arguments in (["--help"], ["-h"])
+    if asked or len(arguments) != 3:
+        print(__doc__, file=sys.stdout if asked else sys.stderr)
+        return 0 if asked else 2
     try:
         from gen_profile_recheck.check import TRUST, check  # noqa: PLC0415
         from gen_profile_recheck.reading import NotProvedError  # noqa: PLC0415

@@ -25,7 +25,7 @@ from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
 from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 from gen_profile.deployment.table import read_table
 from gen_profile.deployment.watching.judge import Judge
-from gen_profile.errors import DeploymentError
+from gen_profile.errors import DeploymentError, OutputError
 
 FORMS = ("--export", "plc", "--export", "twincat")
 
@@ -106,6 +106,16 @@ def test_the_record_is_signed(files, access, tmp_path):
     lines = (files / "old" / "deployments.json.minisig").read_text("utf-8").splitlines()
     assert "deployments of paper, the latest at " in lines[2]
     key.public_key().verify(base64.b64decode(lines[1])[10:], hashlib.blake2b(record).digest())
+
+
+def test_a_record_that_cannot_be_written_does_not_hide_what_was_done(files, access, monkeypatch):
+    def full(*_):
+        raise OutputError("Cannot write: no space left.")
+
+    monkeypatch.setattr("gen_profile.deployment.record.deliver", full)
+    done = run_here("deploy", files / "old" / "paper.st", *access)
+    assert (done.code, done.errors[-2]) == (2, "Error: Cannot write: no space left.")
+    assert done.errors[-1].startswith("Error: The controller uses ")
 
 
 @pytest.mark.slow

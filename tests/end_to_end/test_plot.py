@@ -14,6 +14,7 @@ from pictures import colours
 
 import gen_profile as gp
 from gen_profile.charts.comparison import comparison_figure
+from gen_profile.charts.curves import motion_figure, spectrum_figure
 from gen_profile.charts.figure import LIMIT, Figure, Line, Panel
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.charts.picture import drawn as draw_side_by_side
@@ -204,6 +205,24 @@ def test_limits_are_drawn_where_curves_come_near():
     velocity = picture.axes[1]
     assert [line.get_ydata()[0] for line in velocity.get_lines() if line.get_color() == LIMIT] == [0.5]
     assert velocity.get_ylim()[1] > 0.5
+
+
+def test_what_hardly_moves_is_not_drawn_large():
+    held = preset_spec("gantry-crane", ["move.distance=[8.0, 0.0]", "solver.method=zv"], robustness={})
+    plan = gp.plan(held)
+    spans = {panel.title: panel.span for panel in motion_figure(plan.spec, plan.evaluation).panels}
+    assert (spans["Position of x"], spans["Jerk of x"]) == (None, None)
+    assert (spans["Position of y"], spans["Jerk of y"]) == ((-1.0, 1.0), (-1e-3, 1e-3))
+
+
+def test_figures_and_spectra_are_of_an_axis_that_moves():
+    changes = ["move.distance=[0.0, 4.0]", "solver.method=zv"]
+    lag = {"type": "first-order", "tau": 0.05}
+    plan = gp.plan(preset_spec("gantry-crane", changes, robustness={}, actuator=lag))
+    (spectrum,) = spectrum_figure(plan.spec, plan.evaluation).panels
+    assert (spectrum.title, spectrum.lines[0].y.max() > 0.1) == ("Spectrum of the acceleration of y", True)
+    names = ("acceleration_max_m_per_s2", "acceleration_rms_m_per_s2", "command_acceleration_max_m_per_s2")
+    assert min(plan.figures[name] for name in names) > 0.1
 
 
 def test_few_curves_are_drawn_each_in_a_colour_of_its_own_unless_all_are_asked_for(plain):

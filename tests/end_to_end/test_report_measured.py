@@ -12,6 +12,7 @@ from gen_profile.errors import OutputError
 from gen_profile.evaluation.motion_evaluation import evaluate
 from gen_profile.report.log import MeasuredLog, read_log
 from gen_profile.report.measured import compare_measured
+from gen_profile.report.measured_section import measured_verdict
 from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
 
@@ -130,6 +131,19 @@ def test_deviations_are_those_between_log_and_plan(tmp_path, spec, motion):
         np.sqrt(np.mean(off[times <= 7.0] ** 2)), rel=1e-2
     )
     assert measured["passed"] is None and "Measured, not judged." in page
+
+
+def test_noise_is_told_where_it_is_much_of_the_sway(spec, motion):
+    times = np.arange(0.0, 8.0, STEP)
+    evaluation, words = evaluate(spec, motion), []
+    swung = evaluation.swing.at(times)[0].sway[:, 1]
+    for noise in (0.0, 5e-4):
+        sways = {"payload": swung + np.random.default_rng(1).normal(0.0, noise, len(times))}
+        log = MeasuredLog(source="log.csv", times=times, positions={}, sways=sways, angles={})
+        measured = compare_measured(spec, evaluation, log, motion.duration, 0.0)
+        assert measured.sways["payload"].noise == pytest.approx(noise, rel=0.1, abs=1e-5)
+        words.append(" ".join(measured_verdict(measured).sentences))
+    assert ["counts as sway" in one for one in words] == [False, True]
 
 
 @pytest.mark.slow

@@ -349,7 +349,8 @@ def test_eds_of_the_simulated_drive(tmp_path):
     assert (outcome.code, "Cannot write" in outcome.err) == (2, True)
 
 
-def test_drives_of_their_own(deployed, monkeypatch):
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_drives_of_their_own(deployed, monkeypatch, interrupted):
     """drive-sim, and a streamer beside it, on a clock that waits for both, however busy this machine is."""
     source, records = workflow.verified(deployed / "paper.log"), []
     clock = FakeClock(MS)
@@ -359,6 +360,8 @@ def test_drives_of_their_own(deployed, monkeypatch):
         clock.actors.append(bank.poll)
         with can.Bus(channel="apart", interface="virtual") as bus:
             records.append(Streamer(bus, clock, source.plan).run())
+        if interrupted:
+            raise KeyboardInterrupt
         clock.sleep_until(clock.now() + 2 * FAREWELL)
         serve(bank, stop)
 
@@ -455,6 +458,7 @@ class TestSlowMotions:
         [
             (("--jog", "kart=0.1"), "--jog kart=0.1: unknown axis; did you mean 'cart'?"),
             (("--jog", "cart=1e3m"), "state the distance as a number of metres"),
+            (("--jog", "cart=0,1"), "as cart=0.05; write a decimal point: 0.1."),
             (("--jog", "cart=inf"), "state the distance as a number of metres"),
             (("--jog", "cart=0.1", "--to-start"), "choose one of them"),
             (("--to-start", "--dry-run"), "--dry-run touches no bus"),

@@ -491,6 +491,7 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
             2,
             True,
         )
+        assert "without quotes" not in refused.err
 
 
 def write_plain(folder):

@@ -14,7 +14,7 @@ from scipy import signal
 import gen_profile as gp
 from gen_profile.certificate import certify, theorem
 from gen_profile.certificate.boxes import covers
-from gen_profile.certificate.certify import attempt
+from gen_profile.certificate.certify import _tails, attempt
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.verification.batch import on_processors
 
@@ -345,3 +345,9 @@ export = {cycle_time = 0.02}
     assert not proof.proved and proof.fraction == 0.0 and not proof.bounds
     assert proof.reasons()[0].startswith("Bounds are proved for 0 % of the machines")
     assert not list(written.folder.glob("*.certificate.json"))
+
+
+def test_a_load_that_does_not_swing_has_no_tails():
+    """As across the axis that moves."""
+    with np.errstate(all="raise"):
+        assert (_tails(np.zeros((2, 4, 5, 3)), (3,)) == 0.0).all()

@@ -372,6 +372,34 @@ def test_what_does_not_fit_is_refused_with_the_cure(change, words, tables, block
         deploy(table, box_of(DirectLink(block)))
 
 
+def test_an_interruption_leaves_the_block_to_others_and_tells_what_is_used(tables, block, unchecked):
+    def interrupt():
+        link.happened = True
+        raise KeyboardInterrupt
+
+    link, said = FaultyLink(block, 9, 1, happen=interrupt), []
+    with pytest.raises(KeyboardInterrupt):
+        deploy(tables["new"], box_of(link), progress=said.append)
+    assert said[-1] == "The controller uses the table that it had"
+    assert deploy(tables["other"], box_of(DirectLink(block))).action == "deployed"
+
+
+@pytest.mark.parametrize(
+    ("at", "change", "words"),
+    [
+        (3, "axis.unit=mm", "The controller's program was replaced meanwhile"),
+        (15, "move.distance=0.3", "730 of 971 values are not those .* look whether it was started anew"),
+    ],
+)
+def test_a_controller_that_is_another_one_after_a_break_is_not_switched(
+    at, change, words, tables, block, unchecked, tmp_path
+):
+    link, there = FaultyLink(block, at, 1, lose=True), read_table(exported(tmp_path, change))
+    link.happen = lambda: setattr(link, "block", SimulatedBlock(there))
+    with pytest.raises(DeploymentError, match=f"{words}.*\\n.* uses the table that it had"):
+        deploy(tables["new"], box_of(link))
+
+
 @pytest.mark.parametrize(
     ("there", "words"),
     [

@@ -146,6 +146,13 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
         ),
         (lambda _: gp.plan(3), "A spec, or the path of one, is expected, found 3"),
         (lambda _: gp.Planner(3), "A spec, or the path of one, is expected, found 3"),
+        (lambda spec: gp.design(spec, "csv", 3), "A path is expected, found 3"),
+        (lambda spec: gp.design(spec, None, "unused"), "or a list of names, is expected, found None"),
+        (lambda spec: gp.cosimulate(spec, STANDING, 3), "parameters: give values by name, .* found 3"),
+        (lambda _: gp.cosimulate(gp.preset_spec("gantry-crane"), STANDING), "for 1 axes, .* machine has 2"),
+        (lambda spec: gp.robustness(spec, "L1", points="9"), "points: must be a whole number .*'9'"),
+        (lambda spec: gp.identify(spec, 3), "give is expected, found 3"),
+        (lambda _: gp.parse_spec(b""), "a text is expected, found a bytes"),
         (lambda spec: gp.compare(spec, own="mine.csv"), r"such as gp\.plan\(spec\)\.motion, found a str"),
         (lambda spec: gp.compare(spec, own=[STANDING]), "A Profile .* found a SampledProfile"),
         (lambda spec: gp.robustness(spec, "L1", own=3), "A Profile .* found a int"),
@@ -153,7 +160,7 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
         (lambda _: gp.sample(STANDING, 0.01), "A Profile .* found a SampledProfile"),
         (lambda spec: gp.cosimulate(spec, straight(1, "mine")), r"such as gp\.sample.* found a Profile"),
         (lambda spec: gp.residual_sways(spec, np.zeros((9, 1)), {}), r"gp\.sample.* found a ndarray"),
-        (lambda spec: gp.robustness(spec, "L1", points=1), "points: must be at least 3, found 1"),
+        (lambda spec: gp.robustness(spec, "L1", points=1), "points: must be .* at least 3, found 1"),
         (lambda spec: gp.robustness(spec, "L1", half_range=np.nan), "range: must be .* 0.9 .* found nan"),
         (
             lambda spec: gp.linearize(spec.machine(), spec.plant.parameters, [0.0, 1.0]),
@@ -208,6 +215,12 @@ def test_slips_are_told_in_a_sentence(call, sentence):
 def test_a_cycle_that_cannot_be_is_told_in_a_sentence(cycle_time):
     with pytest.raises(gp.GenProfileError, match="cycle"):
         gp.sample(straight(1, "mine"), cycle_time)
+
+
+@pytest.mark.parametrize("order", [-1, 1.5])
+def test_derivatives_have_orders(order):
+    with pytest.raises(gp.GenProfileError, match="order of a derivative is 0, 1, 2"):
+        straight(1, "mine").derivative(0.5, order)
 
 
 def test_samples_without_axes_are_told_in_a_sentence():

@@ -94,6 +94,7 @@ def test_what_no_parameter_explains_widens_the_range():
     (left,) = torn.misfits
     assert left.rms == pytest.approx(0.005 / np.sqrt(2.0), rel=0.1)
     assert left.frequency == pytest.approx(3.1, abs=0.2)
+    assert torn.noise[0] == pytest.approx(np.hypot(left.rms, 1e-3), rel=0.1)
     assert torn.half_range["L0"] > 20.0 * clean.half_range["L0"]
 
 
@@ -107,6 +108,13 @@ def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monk
     known = parse_reading(f"{rope}={plant.nominal()[rope]}±0.01")
     found = estimate(machine, [rope], [known], [log_of(values, load=plant.loads[0])])
     assert found.misfits[0] is not None
+
+
+def test_logs_of_two_machines_are_refused():
+    own, other = (swing(HOIST.nominal() | {"L0": rope}, TIMES, [0.15, 0.0]) + NOISE for rope in (2.0, 2.1))
+    assert estimate(hoist(), ["L0"], [], [log_of(own), log_of(0.7 * own)]).half_range["L0"] < 0.02
+    with pytest.raises(InfeasibleProblem, match=r"not of one machine: number 1, of payload, is .* times"):
+        estimate(hoist(), ["L0"], [], [log_of(own), log_of(other)])
 
 
 def test_noise_is_no_misfit():

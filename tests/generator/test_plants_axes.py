@@ -29,7 +29,7 @@ def fault_of(preset, *overrides):
         (
             "gantry-crane",
             "move.distance=3",
-            "move.distance: must hold one number per axis (x, y), such as [3, 0], found 1.",
+            "move.distance: must hold one number per axis (x, y), such as [3, 0], found 3.",
         ),
         ("gantry-crane", "move.distance=[0, 0]", "move.distance: must not be zero on every axis."),
         (

@@ -4,7 +4,7 @@ from itertools import product
 
 import pytest
 
-from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.evaluation.scenarios import named, scenarios
 from gen_profile.spec.reading import preset_spec
 
 
@@ -54,3 +54,7 @@ def test_every_corner_of_three_parameters_is_there_once():
     }
     assert len(corners) == len(found)
     assert set(product((1.2, 0.8), (1.1, 0.9), (1.05, 0.95))) <= corners
+
+
+def test_names_hold_no_more_digits_than_can_be_read():
+    assert named(preset_spec("paper"), "L1", 0.303225) == "L1 -35.48 %"

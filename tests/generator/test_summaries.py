@@ -14,6 +14,7 @@ from gen_profile.identification.identify import Identification
 from gen_profile.identification.measurements import SwingLog
 from gen_profile.proof.verdict import Proof
 from gen_profile.summary import Drawable, Summarised
+from gen_profile.sweep.run import Sweep
 
 PICTURED = {"Spec", "Design", "Plan", "Profile", "Judgement", "Check", "Robustness"}
 LONGEST = 400  # characters, of a line that is still read
@@ -104,7 +105,7 @@ def test_a_comparison_names_its_methods():
     assert frame.loc["zvd", "sway_residual_worst_m"] == pytest.approx(0.00188, rel=0.01)
 
 
-@pytest.mark.parametrize("kind", [Certificate, Deployment, Identification, Proof])
+@pytest.mark.parametrize("kind", [Certificate, Deployment, Identification, Proof, Sweep])
 def test_results_of_long_work_do_so_too(kind):
     assert issubclass(kind, Summarised)
     assert kind.__repr__ is Summarised.__repr__

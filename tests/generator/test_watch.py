@@ -189,12 +189,12 @@ def test_a_controller_that_stops_is_told(table):
     assert isinstance(found.fault, DeploymentError) and "is no longer called" in str(found.fault)
 
 
-def test_a_controller_that_was_started_anew_is_told(table):
-    def restart(machine):
-        machine.block = SimulatedBlock(table)
-
-    found, _ = seen(table, Machine(table, [(1.5, restart)]))
-    assert isinstance(found.fault, DeploymentError) and "was started anew" in str(found.fault)
+def test_a_controller_that_was_started_anew_is_told(table, other):
+    for after in (table, other):
+        script = [(1.5, lambda machine, after=after: setattr(machine, "block", SimulatedBlock(after)))]
+        found, _ = seen(table, Machine(table, script))
+        assert isinstance(found.fault, DeploymentError) and "was started anew" in str(found.fault)
+        assert found.cycles > 0
 
 
 @pytest.mark.parametrize("pace", [0.5, 2.0])

@@ -310,6 +310,7 @@ def test_on_the_command_line_it_says_what_it_trusts(genuine, capsys, copied):
     assert main([str(copied[0]), str(certificate), str(manifest)]) == 4
     assert capsys.readouterr().out == "Not proved: the certificate is about another artefact.\n"
     assert main([str(artefact)]) == 2 and main(["none", "none", "none"]) == 2
+    assert main(["--help"]) == 0
     assert "Cannot read none" in capsys.readouterr().err
 
 

@@ -269,7 +269,8 @@ def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array
 def _tails(motion: Array, terms: Sequence[int]) -> Array:
     """Sum up coefficients of the highest two degrees in each parameter, as shares of their coordinate's."""
     sizes = np.abs(motion).sum(axis=(0, 2))
-    sizes = (sizes / sizes.sum(axis=1, keepdims=True)).reshape(-1, *terms)
+    totals = sizes.sum(axis=1, keepdims=True)
+    sizes = (sizes / np.where(totals > 0.0, totals, 1.0)).reshape(-1, *terms)  # a load may not swing at all
     return np.array([sizes.take([-2, -1], axis=k).sum() for k in range(1, sizes.ndim)])
 
 

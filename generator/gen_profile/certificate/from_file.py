@@ -23,6 +23,7 @@ from gen_profile.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_path
 from gen_profile.verification.check import spec_and_manifest
 from gen_profile.verification.plausibility import another_move
 from gen_profile_exporters.exporter import target_of
@@ -79,7 +80,7 @@ def certify_artefact(
     >>> gp.certify_artefact("deploy/paper.csv").proved  # what gp.design wrote
     True
     """
-    artefact = _read(Path(path), spec)
+    artefact = _read(as_path(path), spec)
     if write:
         require_place(certificate_path(artefact.path))  # before there is a proof to lose
     asked = asked_of_axes(artefact.spec, artefact.setpoints)
@@ -121,8 +122,8 @@ def check_certificate(
     >>> gp.check_certificate("deploy/paper.csv", "deploy/paper.csv.certificate.json").proved
     True
     """
-    artefact = _read(Path(path), spec)
-    claimed = parse(read_artefact(Path(certificate)))
+    artefact = _read(as_path(path), spec)
+    claimed = parse(read_artefact(as_path(certificate)))
     theorem = _require_about(claimed, artefact)
     stated = np.array([sway.bound for sway in claimed.sways])
     bounds, largest_met, done = np.zeros(len(stated)), np.zeros(len(stated)), 0

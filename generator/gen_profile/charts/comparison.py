@@ -23,7 +23,7 @@ ROOM = 1.05  # of what is drawn
 
 
 def comparison_figure(comparison: Comparison, every: bool = False) -> Figure:
-    """Draw the motion of the first axis under every method, its spectrum, the end load, and worst residuals.
+    """Draw the motion of an axis under every method, its spectrum, the end load, and worst residuals.
 
     Curves of the most telling methods are shown at first, of all methods where `every` says so.
 
@@ -57,11 +57,14 @@ def compared_styles(comparison: Comparison, every: bool = False) -> dict[str, St
 
 
 def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
-    """Draw position, velocity, acceleration and jerk of the first axis (the paper's figure 2)."""
-    first = comparison.spec.machine().actuated[0]
+    """Draw position, velocity, acceleration and jerk of that axis (the paper's figure 2)."""
+    column = comparison.leading
+    first = comparison.spec.machine().actuated[column]
     for order, (quantity, unit) in enumerate(curves.ORDERS):
         lines = [
-            curves.derivative_line(row.method, row.evaluation.motion, order, 0, styles[row.method], SAMPLES)
+            curves.derivative_line(
+                row.method, row.evaluation.motion, order, column, styles[row.method], SAMPLES
+            )
             for row in comparison.rows
         ]
         visible = [line for line in lines if line.style.shown]
@@ -70,7 +73,7 @@ def _motion(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pan
             f"{quantity} of {first.name}",
             f"{quantity.lower()} ({unit.format(first.unit)})",
             lines,
-            levels=tuple(curves.near_limits(comparison.spec, 0, order, shown or curves.extent(visible))),
+            levels=tuple(curves.near_limits(comparison.spec, column, order, shown or curves.extent(visible))),
             span=shown,
         )
 

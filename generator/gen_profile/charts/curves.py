@@ -21,6 +21,7 @@ from gen_profile.spec.model import Spec
 SAMPLES = 800
 FREQUENCIES = 500
 TWINS = 7  # machines beside the nominal one whose sway is drawn
+STILL = 1e-3  # m (or rad) and its derivatives, either way: what changes less is not drawn larger
 NEAR = 2.5  # times what is shown, up to which a limit is drawn; beyond, it would flatten the curves
 ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
@@ -61,20 +62,18 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
     lagging = evaluation.command is not evaluation.motion
     panels = []
     for column, axis in enumerate(spec.machine().actuated):
-        place, factor = place_unit(spec, column)
         for order, (quantity, unit) in enumerate(ORDERS):
             lines = [derivative_line("command", evaluation.command, order, column, samples=samples)]
             if lagging:
                 followed = ("motion of the axis", evaluation.motion, order, column, FOLLOWED)
                 lines.append(derivative_line(*followed, samples=samples))
-            levels = tuple(near_limits(spec, column, order, extent(lines)))
-            if order == 0:
-                lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
-                levels = tuple(attrs.evolve(level, value=factor * level.value) for level in levels)
+            own, factor = (axis.unit, 1.0) if order else place_unit(spec, column)
+            levels = [Level(factor * one.value) for one in near_limits(spec, column, order, extent(lines))]
+            lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
+            span = None if levels else _span(lines, factor * STILL)
             title = Phrase("{quantity} of {name}", quantity=quantity, name=axis.name)
-            own = unit.format(axis.unit if order else place)
-            label = Phrase("{quantity} ({unit})", quantity=quantity.lower(), unit=own)
-            panels.append(Panel(title, label, lines, levels=levels))
+            label = Phrase("{quantity} ({unit})", quantity=quantity.lower(), unit=unit.format(own))
+            panels.append(Panel(title, label, lines, levels=levels, span=span))
     drawn = "The command of each drive leads its lag" if lagging else "The drives follow it as it is"
     caption = f"The reference and its derivatives. {drawn}. Dashed in red: limits of the spec."
     return Figure(caption, panels)
@@ -189,6 +188,13 @@ def extent(lines: Sequence[Line]) -> tuple[float, float]:
     return min(float(np.nanmin(line.y)) for line in lines), max(float(np.nanmax(line.y)) for line in lines)
 
 
+def _span(lines: Sequence[Line], least: float) -> tuple[float, float] | None:
+    """Choose ends around what changes less than that, as an axis that is held; none around anything else."""
+    low, high = extent(lines)
+    middle = 0.5 * (low + high)
+    return None if high - low > 2.0 * least else (middle - least, middle + least)
+
+
 def near_limits(spec: Spec, column: int, order: int, shown: tuple[float, float]) -> Iterator[Level]:
     """List the limits of one quantity of one axis that are near enough to what is shown to be drawn."""
     allowed = getattr(spec.limits.of(column), LIMITED[order])
@@ -203,14 +209,15 @@ def near_limits(spec: Spec, column: int, order: int, shown: tuple[float, float])
 def spectrum_panel(
     spec: Spec, evaluation: MotionEvaluation, motions: Mapping[str, Profile], styles: Mapping[str, Style]
 ) -> Panel:
-    """Draw spectra of the first axis's acceleration over the natural frequencies of all machines."""
-    first, natural = spec.machine().actuated[0], natural_frequencies(spec, evaluation.machines)
+    """Draw spectra of the leading axis's acceleration over the natural frequencies of all machines."""
+    axis = spec.machine().actuated[evaluation.motion.leading]
+    natural = natural_frequencies(spec, evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     bands = [Band(low, high) for low, high in ranges if high > low]
     return Panel(
-        Phrase("Spectrum of the acceleration of {name}", name=first.name),
-        Phrase("magnitude ({unit}/s)", unit=first.unit),
+        Phrase("Spectrum of the acceleration of {name}", name=axis.name),
+        Phrase("magnitude ({unit}/s)", unit=axis.unit),
         [
             Line(name, frequencies, spectrum(motion, frequencies), styles[name])
             for name, motion in motions.items()

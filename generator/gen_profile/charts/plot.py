@@ -24,6 +24,7 @@ from gen_profile.identification.identify import Identification
 from gen_profile.motion.profile import Profile
 from gen_profile.solvers.plan import Plan
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_path
 from gen_profile.verification.check import Judgement
 from gen_profile.verification.verdict import Check
 
@@ -70,7 +71,7 @@ def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) 
             drawn = Path(folder) / "picture.svg"
             plot(result, drawn, every=every)
             return Picture(drawn.read_text("utf-8"))
-    path = Path(path)
+    path = as_path(path)
     require_drawable(path)
     match result:
         case Spec(plant=plant):

@@ -362,12 +362,14 @@ def presets(name: str | None, path: Path | None) -> None:
         return
     text = words = preset_text(name)
     if path is not None:
+        from shlex import quote
+
         from gen_profile.artefacts.writing import deliver
 
         if path.exists():
             raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
         deliver(path, text.encode("utf-8"))
-        words = f"{path} is a copy of the preset {name}. Change it, then: gen-profile {path}"
+        words = f"{path} is a copy of the preset {name}. Change it, then: gen-profile {quote(str(path))}"
     print_outcome({"preset": name, "toml": text}, words.rstrip("\n"))
 
 

@@ -36,6 +36,12 @@ class Number(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Take the number."""
+        from gen_profile.suggestion import number_meant
+
+        try:
+            float(value)
+        except ValueError:
+            self.fail(f"{value!r} is no number{number_meant(value)}.", param, ctx)
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
             self.fail(f"{value!r} is no finite number.", param, ctx)
@@ -184,9 +190,11 @@ def option(
     return click.option(*names, metavar=metavar or None, type=value, is_flag=is_flag, help=words, **more)
 
 
-def repeatable(name: str, words: str, *, into: str | None = None) -> Callable[[Command], Command]:
+def repeatable(
+    name: str, words: str, value: Any = None, *, into: str | None = None
+) -> Callable[[Command], Command]:
     """Take an option that may be given more than once; its values go into one parameter."""
-    return option(name, f"{words} Repeatable.", into=into, multiple=True)
+    return option(name, f"{words} Repeatable.", value, into=into, multiple=True)
 
 
 def preset(text: str) -> Callable[[Command], Command]:

@@ -137,6 +137,7 @@ def play(
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
     from gen_profile.planner.commands import play as run
+    from gen_profile.planner.events import error_words
     from gen_profile.planner.forms import read_block
     from gen_profile.planner.interface import LOST
 
@@ -150,8 +151,7 @@ def play(
         deliver(events_path, setpoints.events.encode("ascii"))
     text = f"{path}: {setpoints.cycles} cycles"
     if setpoints.errors:
-        ids = ", ".join(map(str, setpoints.errors))
-        text += f"; the block showed error {ids}, which its header explains"
+        text += f"; the block showed {'; '.join(map(error_words, setpoints.errors))}"
     if why := LOST.get(setpoints.unpromised):
         text += f"; the load may sway, because {why}"
     document = {
@@ -267,5 +267,8 @@ def _numbers(live_parameters: tuple[str, ...]) -> dict[str, float]:
         try:
             numbers[name] = float(number)
         except ValueError:
-            raise SpecError(f"--live-parameter {text}: state a number, as {name}=5.5.") from None
+            from gen_profile.suggestion import number_meant
+
+            hint = number_meant(number)
+            raise SpecError(f"--live-parameter {text}: state a number, as {name}=5.5{hint}.") from None
     return numbers

@@ -218,9 +218,8 @@ def comparison(compared: Comparison) -> str:
     """Lay the methods out side by side, below the recommendation."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("method\n")
-    first = compared.spec.machine().actuated[0].unit
     for head, (unit, _, _) in COLUMNS.items():
-        table.add_column(f"{head}\n{unit.replace('m/', f'{first}/')}", justify="right")
+        table.add_column(f"{head}\n{unit.replace('m/', f'{compared.unit}/')}", justify="right")
     table.add_column("limit\nkept", justify="center")
     table.add_column("Pareto\nfront", justify="center")
     for row in compared.rows:
@@ -397,7 +396,7 @@ def _peaks(outcome: Design) -> list[tuple[str, str]]:
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
     peaks: dict[str, list[str]] = {}
     for one in demands(outcome.spec, outcome.plan.evaluation.command):
-        peaks.setdefault(one.axis.name, []).append(f"{one.asked:.4g} {one.unit}")
+        peaks.setdefault(one.axis.name, []).append(f"{number(one.asked)} {one.unit}")
     title = kind if len(peaks) == 1 else f"{kind}, {{}}"
     return [(title.format(axis), ", ".join(of_axis)) for axis, of_axis in peaks.items()]
 

@@ -75,7 +75,7 @@ def recommend(
     limit : str
         How much sway that is, in words.
     unit : str
-        Of the first axis.
+        Of the axis.
     optimal : sequence of str
         Which of the methods are optimal motions; the others are shapers.
     """
@@ -164,6 +164,16 @@ class Comparison(Drawable, Tabled):
     too_slow: dict[str, float]
     efficient: frozenset[str]
     recommended: dict[str, Recommendation]
+
+    @property
+    def leading(self) -> int:
+        """Number of the axis that figures and curves are of."""
+        return self.rows[0].evaluation.motion.leading if self.rows else 0
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return self.spec.machine().actuated[self.leading].unit
 
     def records(self) -> list[dict[str, object]]:
         """List the methods with their figures, and whether every load keeps its limit."""
@@ -266,15 +276,17 @@ def compare(
                 impossible[candidate.requirements] = left_out[candidate.method]
     figures = {row.method: row.figures for row in rows}
     safe = {row.method: row.figures for row in rows if row.safe}
-    optimal, unit = [name for name in figures if name.startswith("optimal")], spec.machine().actuated[0].unit
-    return Comparison(
+    optimal = [name for name in figures if name.startswith("optimal")]
+    compared = Comparison(
         spec=spec,
         rows=tuple(rows),
         left_out=left_out,
         too_slow=too_slow,
         efficient=efficient(figures),
-        recommended=recommend(safe, limit=_limit_in_words(spec), unit=unit, optimal=optimal),
+        recommended={},
     )
+    advice = recommend(safe, limit=_limit_in_words(spec), unit=compared.unit, optimal=optimal)
+    return attrs.evolve(compared, recommended=advice)
 
 
 def _row(spec: Spec, candidate: Candidate) -> ComparedMethod:

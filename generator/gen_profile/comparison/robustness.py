@@ -20,6 +20,7 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.values import require_whole
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable, Tabled
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
@@ -239,9 +240,9 @@ def error_grid(
         raise SpecError("parameter: name one, such as L1; the spec states no uncertain ones.")
     if len(names) > 2:
         raise SpecError("parameter: at most two, of which a map is drawn.")
-    if points is not None and points < FEWEST:
-        raise SpecError(f"points: must be at least {FEWEST}, found {points}.")
-    if half_range is not None and not 0.0 < half_range <= WIDEST:
+    if points is not None:
+        require_whole(points, FEWEST, "points")
+    if half_range is not None and not (isinstance(half_range, float | int) and 0.0 < half_range <= WIDEST):
         raise SpecError(
             f"range: must be greater than 0 and at most {WIDEST} (0.1 is 10 %), found {half_range}."
         )

@@ -102,6 +102,10 @@ def deploy(
     except LinkLostError as error:
         words = f"The connection broke ({error}), and could not be taken up again."
         raise DeploymentError(words, in_force) from error
+    except KeyboardInterrupt:
+        _release(box)
+        progress(in_force.removesuffix("."))
+        raise
     except (DeploymentError, CheckFailed) as error:
         _release(box)
         kind = CheckFailed if isinstance(error, CheckFailed) else DeploymentError
@@ -131,11 +135,11 @@ def _proved(
         )
     progress("reading the table back")
     values = box.read(buffer, len(table.values))
-    mailbox.require_same(values, table.values)
+    mailbox.require_same(values, table.values, cure=mailbox.KEPT)
     judgement = table.check(values, progress)
     if not judgement.check.passed:
         raise CheckFailed(*judgement.check.reasons())
-    mailbox.require_same(box.read(buffer, len(table.values)), table.values)
+    mailbox.require_same(box.read(buffer, len(table.values)), table.values, cure=mailbox.KEPT)
     return judgement
 
 

@@ -26,6 +26,8 @@ REFUSALS = {
     UNFIT: "The block finds another table in its idle buffer than was written there, as if something else "
     "wrote to it; find out what does, and run this again.",
 }
+SHOWN = "let the controller show aRequest and aReply as arrays of LREAL"
+KEPT = "look whether it was started anew, or another client writes to it"
 UNSECURED = {"security": "none", "policy": "None", "certificate_sha256": "", "user": ""}
 REOPENED, SENT, LOOKS = 3, 4, 200  # times that a connection, a request, and a reply to it are tried
 PAUSE = 0.005  # s between two looks for a reply
@@ -119,6 +121,7 @@ class Mailbox:
         self._link, self._pause = link, pause
         self._owner = 1 + secrets.randbelow(2**31 - 2)
         self._number = 1 + secrets.randbelow(2**30)
+        self._kind: tuple[Any, ...] | None = None  # of the block
 
     def status(self) -> BlockStatus:
         """Ask how the block stands."""
@@ -202,7 +205,7 @@ class Mailbox:
             while True:
                 try:
                     if (reply := self._answered(request)) is not None:
-                        return _understood(reply, count)
+                        return self._understood(reply, count)
                     break
                 except LinkLostError:
                     lost += 1
@@ -229,15 +232,18 @@ class Mailbox:
             self._pause(PAUSE)
         return None
 
-
-def _understood(reply: Array, count: int) -> tuple[BlockStatus, Array]:
-    """Read a reply; raises DeploymentError where it refuses."""
-    result, *rest = reply[1:13].tolist()
-    if result in REFUSALS:
-        raise BlockRefusedError(REFUSALS[int(result)])
-    names = [field.name for field in attrs.fields(BlockStatus)][1:]
-    status = BlockStatus(result=int(result), **dict[str, Any](zip(names, rest, strict=True)))
-    return status, reply[FIRST : FIRST + count].copy()
+    def _understood(self, reply: Array, count: int) -> tuple[BlockStatus, Array]:
+        """Read a reply; raises DeploymentError where it refuses, or another block replies than before."""
+        result, *rest = reply[1:13].tolist()
+        if result in REFUSALS:
+            raise BlockRefusedError(REFUSALS[int(result)])
+        names = [field.name for field in attrs.fields(BlockStatus)][1:]
+        status = BlockStatus(result=int(result), **dict[str, Any](zip(names, rest, strict=True)))
+        kind = (status.interface, status.kind, status.layout, status.axes, status.cycle_time, status.capacity)
+        if self._kind not in {None, kind}:
+            raise DeploymentError("The controller's program was replaced meanwhile; run this again.")
+        self._kind = kind
+        return status, reply[FIRST : FIRST + count].copy()
 
 
 def differing(held: Array, due: Array) -> list[int]:
@@ -245,8 +251,8 @@ def differing(held: Array, due: Array) -> list[int]:
     return np.flatnonzero(held.view(np.uint64) != due.view(np.uint64)).tolist()
 
 
-def require_same(held: Array, due: Array, place: int = 0) -> None:
-    """Hold values that were read back to those that were written, bit for bit.
+def require_same(held: Array, due: Array, place: int = 0, cure: str = SHOWN) -> None:
+    """Hold values that were read back to those that were written, bit for bit; else say what to do.
 
     Raises
     ------
@@ -260,6 +266,6 @@ def require_same(held: Array, due: Array, place: int = 0) -> None:
     if (held == due.astype(np.float32)).all():
         words += ": something on the way rounds to REAL"
     raise DeploymentError(
-        f"{len(places)} of {len(due)} values were altered on the way ({words}); let the controller show "
-        "aRequest and aReply as arrays of LREAL, and run this again."
+        f"{len(places)} of {len(due)} values are not those that were written ({words}); {cure}, and run this "
+        "again."
     )

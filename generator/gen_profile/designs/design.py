@@ -20,7 +20,7 @@ from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.plan import Plan, plan
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import judged_from
 from gen_profile.verification.judging import verdict
@@ -162,7 +162,7 @@ def design(
     >>> gp.design(gp.preset_spec("paper"), "csv", "deploy").passed
     True
     """
-    spec, folder = as_spec(spec), Path(folder)
+    spec, folder = as_spec(spec), as_path(folder)
     verify = partial(_check, by_fmpy=by_fmpy, progress=progress) if check else None
     return _designed(
         spec,

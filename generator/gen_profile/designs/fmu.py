@@ -18,7 +18,7 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.plan import plan
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.building.build import build_fmu
@@ -117,7 +117,7 @@ def export_fmu(
     systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}
     identifier = c_name(systems.get(kind, f"{spec.name} {kind}"))
     suffix = ".ssp" if kind in LEADERS else ".fmu"
-    path = Path(path or f"{identifier}{suffix}")
+    path = as_path(path or f"{identifier}{suffix}")
     if path.suffix.lower() != suffix:
         raise OutputError(f"out {path}: name a file that ends in {suffix}, as other tools ask for.")
     version, input_kind = _one_of(Version, version, "version"), _one_of(InputKind, input_kind, "input_kind")

@@ -11,7 +11,7 @@ from gen_profile.artefacts.manifest import PLANNER, Artefact, artefact_of
 from gen_profile.artefacts.writing import staged
 from gen_profile.designs.design import deliver_judged, file_entry
 from gen_profile.designs.planner_suggestions import planner_suggestions
-from gen_profile.errors import SpecError, Suggestion
+from gen_profile.errors import Suggestion
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_program
 from gen_profile.planner.full_speed import slow_axes
@@ -20,7 +20,8 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.spec.values import require_whole
 from gen_profile.summary import Drawable
 
 
@@ -124,11 +125,8 @@ def deploy_planner(
     True
     """
     spec = as_spec(spec)
-    if histories < 1:
-        raise SpecError(
-            f"histories: must be at least 1, found {histories}; check=False leaves the proof out."
-        )
-    folder = Path(folder)
+    require_whole(histories, 1, "histories")
+    folder = as_path(folder)
     progress("finding the modes over the live ranges")
     block = planner_block(spec)
     files = block_files(block, spec, as_names(formats))

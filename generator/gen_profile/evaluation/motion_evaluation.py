@@ -64,7 +64,7 @@ class MotionEvaluation(Summarised):
 
     @cached_property
     def figures(self) -> dict[str, float]:
-        """Of the first axis and the end load: sway on the way of the nominal machine, afterwards of all."""
+        """Of the leading axis and the end load: sway on the way of the nominal machine, afterwards of all."""
         motion, command, duration = self.motion, self.command, self.motion.duration
         end_load = self.swing.plant.end_load
         during = self.swing.sway(np.linspace(0.0, duration, TRANSIENT_SAMPLES))
@@ -77,7 +77,7 @@ class MotionEvaluation(Summarised):
         units = ("m_per_s", "m_per_s2", "m_per_s3")
         table = {"duration_s": duration}
         for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1):
-            table[f"{name}_max_{unit}"] = greatest(motion, order)
+            table[f"{name}_max_{unit}"] = greatest(motion, order, motion.leading)
             if order > 1:
                 table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
         table |= {
@@ -90,7 +90,7 @@ class MotionEvaluation(Summarised):
         }
         if command is not motion:
             table |= {
-                f"command_{name}_max_{unit}": greatest(command, order)
+                f"command_{name}_max_{unit}": greatest(command, order, motion.leading)
                 for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
             }
             table["command_overshoot_m"] = overshoot(command)

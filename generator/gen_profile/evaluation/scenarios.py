@@ -112,11 +112,11 @@ def _off_nominal(spec: Spec, shifts: Sequence[Mapping[str, float]]) -> Iterator[
         yield Scenario(name=", ".join(words), parameters={**spec.plant.parameters, **shifted})
 
 
-def named(spec: Spec, name: str, value: float, digits: int = 6) -> str:
+def named(spec: Spec, name: str, value: float) -> str:
     """Name a parameter's value relative to the nominal one, but where it is stated as it is."""
     if name in spec.check.spans:
-        return f"{name} {value:.{digits}g}"
-    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.{digits}g} %"
+        return f"{name} {value:.5g}"
+    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.4g} %"
 
 
 def _draws(spec: Spec) -> list[Scenario]:

@@ -53,7 +53,7 @@ def natural_frequencies(spec: Spec, machines: Sequence[Scenario]) -> Natural:
 
 
 def spectrum(motion: Profile, frequencies: Array) -> Array:
-    """Find |∫ ÿ exp(−jωt) dt| of the first axis, by a quadrature that is exact to rounding within segments.
+    """Find |∫ ÿ exp(−jωt) dt| of the leading axis, by a quadrature that is exact to rounding within segments.
 
     Parameters
     ----------
@@ -71,5 +71,7 @@ def spectrum(motion: Profile, frequencies: Array) -> Array:
     points = motion.coefficients.shape[1] + 4 + int(3.0 * lengths.max() * frequencies.max() / np.pi)
     nodes, weights = np.polynomial.legendre.leggauss(points)
     times = (motion.knots[:-1, None] + lengths[:, None] * (nodes + 1.0) / 2.0).ravel()
-    weighted = motion.derivative(times, 2)[:, 0] * np.multiply.outer(lengths / 2.0, weights).ravel()
+    weighted = (
+        motion.derivative(times, 2)[:, motion.leading] * np.multiply.outer(lengths / 2.0, weights).ravel()
+    )
     return np.asarray(np.abs(np.exp(-1j * np.multiply.outer(frequencies, times)) @ weighted))

@@ -22,6 +22,7 @@ from gen_profile.progress import Progress, no_progress
 
 CONFIDENCE = 0.99
 INITIAL_RESIDUAL_RATIO = 2.0  # times farther off at first, from which on the axes may still have moved then
+APART = 2.0  # times as far off a machine as off its own a log may be beside others
 GRAVITY = "g"  # is known wherever a crane stands
 
 
@@ -39,7 +40,7 @@ class Estimate:
     model : tuple of float
         What the identified machine would have shown instead of the readings.
     noise : tuple of float
-        Standard deviation of every log's samples, in rad or m.
+        Standard deviation of what is left of every log, in rad or m.
     initial_residual_ratio : tuple of float
         How many times farther off the model than the rest every log's first period is: about 1, unless the
         axes still moved then.
@@ -131,6 +132,8 @@ def _estimate(
     factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     progress("finding the ranges")
     half_ranges, lefts = around.half_ranges(factor), fit.left(unknowns)
+    if len(lefts) > 1:
+        _require_one_machine(fit, lefts)
 
     def by_name(relative: Array) -> dict[str, float]:
         return dict(zip(fit.names, map(float, relative * fit.scale), strict=True))
@@ -140,7 +143,7 @@ def _estimate(
         standard_uncertainty=by_name(half_ranges / factor),
         half_range=by_name(half_ranges),
         model=tuple(map(float, fit.predicted(unknowns))),
-        noise=tuple(map(float, noise)),
+        noise=tuple(float(np.std(left)) for left in lefts),
         initial_residual_ratio=around.initial_residual_ratio(),
         contradiction=around.contradiction,
         misfits=misfit_of_logs,
@@ -148,6 +151,22 @@ def _estimate(
         rests_on=_rests_on(around),
         swings=tuple(one.log.values + left for one, left in zip(fit.models, lefts, strict=True)),
     )
+
+
+def _require_one_machine(fit: Fit, lefts: Sequence[Array]) -> None:
+    """Refuse logs that fit a machine each, and not one together: their range would hold neither."""
+    for number, (model, left) in enumerate(zip(fit.models, lefts, strict=True), 1):
+        alone = fit_of(fit.machine, fit.names, (), [model])
+        try:
+            least = alone.left(alone.solve()[0])[0]
+        except InfeasibleProblem:  # one log may tell too little
+            continue
+        if np.std(left) > APART * np.std(least):
+            raise InfeasibleProblem(
+                f"The logs are not of one machine: number {number}, of {model.log.load}, is "
+                f"{np.std(left) / np.std(least):.2g} times as far off it as off one of its own. Identify "
+                "from each by itself, and look what was changed in between."
+            )
 
 
 def taken_as_exact(fit: Fit) -> list[str]:

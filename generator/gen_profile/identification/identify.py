@@ -1,7 +1,7 @@
 """From measurements on site to a spec whose machine they determine, and whose uncertainty they state."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from gen_profile.phrase import AND, Phrase, joined
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable
 from gen_profile.units import units_of
@@ -174,7 +174,7 @@ def read_swing(
     """
     spec = as_spec(spec)
     loads = spec.machine().loads
-    if isinstance(columns, str) or len(columns) != len(("time", "value")):
+    if not isinstance(columns, tuple | list) or len(columns) != len(("time", "value")):
         raise SpecError(f"columns: name two, of times and values, such as (1, 2), found {columns!r}.")
     if time_unit is not None and time_unit not in TIME_UNITS:
         raise SpecError(f"time_unit: unknown unit {time_unit!r}{suggestion(time_unit, TIME_UNITS)}")
@@ -186,7 +186,7 @@ def read_swing(
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
     per_unit = None if unit is None else _per_unit(unit, quantity, SI_UNITS[quantity])
     return parse_swing(
-        read_text(Path(path), "swing"),
+        read_text(as_path(path), "swing"),
         str(path),
         columns=(str(columns[0]), str(columns[1])),
         per_second=None if time_unit is None else TIME_UNITS[time_unit],
@@ -249,7 +249,7 @@ def identify(
     """
     spec = as_spec(spec)
     plant = spec.machine()
-    measurements = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
+    measurements = tuple(measurements) if isinstance(measurements, Iterable) else (measurements,)
     for one in measurements:
         if not isinstance(one, Measurement):
             known = "parse_reading, parse_period and read_swing"

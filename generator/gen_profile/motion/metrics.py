@@ -29,17 +29,18 @@ def greatest(profile: Profile, order: int, axis: int = 0) -> float:
 
 
 def overshoot(profile: Profile) -> float:
-    """Find how far the first axis leaves the way between its start and its target."""
-    (lowest, highest), ends = extremes(profile, 0), (profile.start[0], profile.target[0])
+    """Find how far the leading axis leaves the way between its start and its target."""
+    axis = profile.leading
+    (lowest, highest), ends = extremes(profile, 0, axis), (profile.start[axis], profile.target[axis])
     return float(max(highest - max(ends), min(ends) - lowest, 0.0))
 
 
 def root_mean_square(profile: Profile, order: int) -> float:
-    """Root mean square of the first axis' derivative over the move, by a quadrature that is exact for it."""
+    """Root mean square of the leading axis' derivative over the move, by an exact quadrature."""
     size = profile.coefficients.shape[1]
     nodes, weights = _quadrature(size)
     lengths = np.diff(profile.knots)
-    coefficients = polynomial.polyder(profile.coefficients[:, :, 0].T, order)
+    coefficients = polynomial.polyder(profile.coefficients[:, :, profile.leading].T, order)
     local = lengths[:, None] * (nodes + 1.0) / 2.0
     values = np.asarray(polynomial.polyval(local, coefficients[:, :, None], tensor=False))
     mean = (values**2 @ weights / 2.0) @ lengths / profile.duration

@@ -19,6 +19,7 @@ from gen_profile.summary import Drawable, Sampled, Summarised, Tabled
 Array = NDArray[np.float64]
 
 MOST_SAMPLES = 1e8  # of a profile
+NOTHING = 1e-3  # of the motion that another axis makes, in which one hardly moves
 
 
 def read_only(values: object) -> Array:
@@ -96,9 +97,9 @@ class Profile(Drawable):
         return np.zeros_like(self.target)
 
     def __attrs_post_init__(self) -> None:
-        segments, _, axes = self.coefficients.shape
+        segments, *_, axes = self.coefficients.shape or (0,)
         ends = (self.target.shape, self.final_velocity.shape)
-        if self.knots.shape != (segments + 1,) or ends != ((axes,), (axes,)):
+        if self.coefficients.ndim != 3 or self.knots.shape != (segments + 1,) or ends != ((axes,), (axes,)):
             raise GenProfileError("A profile's knots, coefficients and target do not fit together.")
         if self.knots[0] != 0.0 or not (np.diff(self.knots) > 0.0).all():
             raise GenProfileError("A profile's knots must rise from 0.")
@@ -154,17 +155,33 @@ class Profile(Drawable):
         return int(self.coefficients.shape[2])
 
     @property
+    def leading(self) -> int:
+        """Number of the first axis that moves, but for ways that are nothing beside another's."""
+        moves = np.abs(self.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0)
+        return int(np.argmax(moves >= NOTHING * moves.max()))
+
+    @property
     def start(self) -> Array:
         """Position at time 0, shape (axes,)."""
         start: Array = self.coefficients[0, 0]
         return start
 
     def derivative(self, times: Array, order: int) -> Array:
-        """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes)."""
+        """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes).
+
+        Raises
+        ------
+        GenProfileError
+            The order is no whole number, or negative.
+        """
+        if not isinstance(order, int | np.integer) or order < 0:
+            raise GenProfileError(f"The order of a derivative is 0, 1, 2 and so on, found {order!r}.")
         return self._evaluated(times, (order,))[0]
 
     def _evaluated(self, times: Array | float, orders: Sequence[int]) -> list[Array]:
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        if times.ndim > 1:
+            raise GenProfileError(f"One time or a row of times is expected, found an array {times.shape}.")
         beyond = (times - self.duration)[:, None]
         ahead = (self.target + beyond * self.final_velocity, self.final_velocity)
         moving = (times >= 0.0) & (beyond[:, 0] < 0.0)
@@ -359,13 +376,15 @@ def require_motion(value: object) -> None:
         )
 
 
-def require_samples(value: object) -> None:
-    """Refuse, by a `SpecError`, what is no sampled profile: most often one that was not sampled yet."""
+def require_samples(value: object, axes: int) -> None:
+    """Refuse, by a `SpecError`, what is no sampled profile, most often not sampled yet, or of other axes."""
     if not isinstance(value, SampledProfile):
         known = "gp.sample(motion, cycle_time=0.01)"
         raise SpecError(
             f"A SampledProfile is expected, such as {known} gives, found a {type(value).__name__}."
         )
+    if value.position.shape[1] != axes:
+        raise SpecError(f"The setpoints are for {value.position.shape[1]} axes, and the machine has {axes}.")
 
 
 def _require_cycle(cycle_time: float) -> None:

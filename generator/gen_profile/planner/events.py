@@ -11,6 +11,7 @@ from gen_profile.planner.sensor_log import read_rows
 from gen_profile.suggestion import number_meant
 
 KEPT = 16
+NO_ERROR = 50  # the code of nErrorId 0; those of the others follow
 COLUMNS = ("time_s", "code", "value")
 _LINES = (Path(__file__).parents[1] / "lists" / "events.txt").read_text("utf-8").splitlines()
 # by code; {:g} is the event's value
@@ -29,6 +30,11 @@ class Event(NamedTuple):
         """Put it into words."""
         known = WORDS.get(self.code, "an event {code} that is not known here")
         return f"{self.time:.3f} s: {known.format(self.value, code=self.code)}"
+
+
+def error_words(number: int) -> str:
+    """Say what a planner block's nErrorId means."""
+    return WORDS.get(NO_ERROR + number, f"error {number}").partition(", at {")[0]
 
 
 def events_of(outputs: Sequence[str], issued: Array) -> Iterator[Event]:
@@ -75,13 +81,15 @@ def read_events(text: str) -> list[Event]:
     """
     events = []
     for line, row in read_rows(text, "events", COLUMNS)[1]:
-        cells = [text for text in row.values() if isinstance(text, str)]  # those beyond the names in a list
+        cells = [
+            text for name in row for text in (row[name] if name is None else [row[name]]) if text is not None
+        ]
         try:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
         except ValueError:
             time, code, value = math.nan, math.nan, math.nan
         if None in row or not (math.isfinite(time) and code.is_integer()):
-            hint = next(filter(None, map(number_meant, cells)), "")
+            hint = next((hint for text in cells if "point" in (hint := number_meant(text))), "")
             raise SpecError(
                 f"events, line {line}: a time, a whole number and a value are wanted, "
                 f"found {','.join(cells)!r}{hint}."

@@ -16,7 +16,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
 from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs, sensed_axes
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec
+from gen_profile.spec.reading import as_spec, as_values
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Sampled, Summarised
 
@@ -339,10 +339,7 @@ class Planner(Summarised):
         if (override := orders.get("override")) is not None:
             columns["rOverride"] = _column("override", override, cycles)
         columns |= self._sensed(orders.get("sensor"), cycles)
-        live = orders.get("live") or {}
-        if not isinstance(live, Mapping):
-            raise SpecError(f"live: give values by name, such as {{'L1': 6.0}}, found {live!r}.")
-        for name, value in live.items():
+        for name, value in as_values(orders.get("live") or {}, "live").items():
             if name not in self._live:
                 raise SpecError(
                     f"live: the planner has no live parameter {name!r}{suggestion(name, self._live)}"
@@ -392,8 +389,8 @@ def _commands(orders: Orders) -> dict[str, bool]:
     return {
         "bExecute": orders.get("target") is not None,
         "bVelocity": orders.get("velocity") is not None,
-        "bStop": orders.get("stop", False),
-        "bQuickStop": orders.get("quick_stop", False),
+        "bStop": bool(orders.get("stop", False)),
+        "bQuickStop": bool(orders.get("quick_stop", False)),
     }
 
 

@@ -18,6 +18,7 @@ from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import HISTORIES, prove, replay
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_path
 from gen_profile.verification.check import alterations, provenance, spec_and_manifest
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.registry import container_of
@@ -117,7 +118,7 @@ def check_block(
         It is no planner block that can be executed.
     CosimulationError
     """
-    path = Path(path)
+    path = as_path(path)
     content = read_artefact(path)
     spec, manifest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)

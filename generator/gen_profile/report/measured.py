@@ -76,6 +76,8 @@ class MeasuredSway:
     residual : float or None
         Greatest distance from its place at rest after the arrival, in m: a sensor's zero does not sway. None
         where the log ends too soon.
+    noise : float
+        The sensor's, from sample to sample, in m (RMS): it is part of the residual.
     limit : float
         m.
     from_angles : bool
@@ -84,6 +86,7 @@ class MeasuredSway:
 
     signal: Signal
     residual: float | None
+    noise: float
     limit: float
     from_angles: bool
 
@@ -94,8 +97,8 @@ class MeasuredSway:
 
     def to_dict(self) -> dict[str, float | bool | None]:
         """Nest plain values for JSON."""
-        judged = {"residual_m": self.residual, "limit_m": self.limit, "passed": self.passed}
-        return {**self.signal.to_dict(), **judged}
+        judged = {"residual_m": self.residual, "noise_m": self.noise, "limit_m": self.limit}
+        return {**self.signal.to_dict(), **judged, "passed": self.passed}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -292,8 +295,10 @@ def _sway(spec: Spec, load: str, signal: Signal, *, arrival: float, from_angles:
     if after.any() and signal.times[-1] - arrival >= PERIODS * 2.0 * np.pi / frequencies[0]:
         left = signal.measured[after]
         residual = float(np.abs(left - _zero(signal.times[after], left, frequencies)).max())
+    # no swing has such differences; 70 is the sum of their weights' squares
+    noise = float(np.sqrt(np.sum(np.diff(signal.measured, 4) ** 2) / (70.0 * len(signal.times))))
     limit = spec.check.residual_sway[load]
-    return MeasuredSway(signal=signal, residual=residual, limit=limit, from_angles=from_angles)
+    return MeasuredSway(signal=signal, residual=residual, noise=noise, limit=limit, from_angles=from_angles)
 
 
 def _zero(times: Array, values: Array, frequencies: Array) -> float:

@@ -14,6 +14,7 @@ from gen_profile.report.content import Section, Share, Table, TableRow, Verdict
 from gen_profile.report.measured import Measured, MeasuredSway, Signal
 from gen_profile.spec.model import Spec
 
+NOISY = 0.05  # of the limit, RMS, that noise of a sensor is worth a sentence
 DRAWN = 1500  # samples of a log that are drawn; all of them are judged
 PLANNED = Style(colour=PALETTE[0], width=2.0)
 MEASURED = Style(colour=PALETTE[1], width=1.4)
@@ -41,6 +42,9 @@ def measured_verdict(measured: Measured) -> Verdict:
         "({source})."
     )
     sentences = [Phrase(template, load=load, residual=residual, limit=limit, source=measured.log.source)]
+    if worst.noise > NOISY * worst.limit:
+        template = "Noise of the sensor, {noise} RMS, counts as sway."
+        sentences.append(Phrase(template, noise=mm(worst.noise)))
     if others:
         template = "Not measured: the sway of the {others}."
         sentences.append(Phrase(template, others=joined(AND_THE, others)))

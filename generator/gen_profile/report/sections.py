@@ -224,9 +224,8 @@ def _reach(name: str, curve: Robustness, own: str) -> str:
 
 def _methods(comparison: Comparison) -> Section:
     spec = comparison.spec
-    unit = spec.machine().actuated[0].unit
     own = own_method(spec)
-    head = ("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front")
+    head = ("method", *(head.format(comparison.unit) for head in COMPARED), "keeps the limit", "Pareto front")
     rows = []
     for row in comparison.rows:
         figures = (number(factor * row.figures[key]) for key, factor in COMPARED.values())

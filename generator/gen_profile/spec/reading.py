@@ -3,7 +3,7 @@
 import copy
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -14,9 +14,11 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.spec.tables import Table, structure
+from gen_profile.spec.values import found
 from gen_profile.suggestion import listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
+Given = TypeVar("Given")
 HERE = Path()
 MOST_PARTS = 32  # of a key: its parser takes time and memory by their square
 LONG_KEY = re.compile(
@@ -55,9 +57,7 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
     >>> gp.read_spec("tank.toml", move={"duration": 2.2}).move.duration
     2.2
     """
-    if not isinstance(path, Path | str):
-        raise SpecError(f"A spec, or the path of one, is expected, found {path!r}.")
-    path = Path(path)
+    path = as_path(path, "A spec, or the path of one,")
     return parse_spec(read_text(path), overrides, str(path), path.parent, **tables)
 
 
@@ -66,9 +66,25 @@ def as_spec(spec: Spec | Path | str) -> Spec:
     return spec if isinstance(spec, Spec) else read_spec(spec)
 
 
+def as_path(path: Path | str, what: str = "A path") -> Path:
+    """Take a path; raises SpecError where it is none."""
+    if not isinstance(path, Path | str):
+        raise SpecError(f"{what} is expected, found {path!r}.")
+    return Path(path)
+
+
 def as_names(names: Sequence[str] | str) -> Sequence[str]:
-    """Take names as they are, or a single one, whose letters are no names."""
+    """Take names as they are, or a single one, whose letters are no names; raises SpecError likewise."""
+    if not isinstance(names, Iterable):
+        raise SpecError(f"A name, or a list of names, is expected, found {names!r}.")
     return (names,) if isinstance(names, str) else names
+
+
+def as_values(values: Mapping[str, Given], what: str) -> Mapping[str, Given]:
+    """Take values by name; raises SpecError likewise."""
+    if not isinstance(values, Mapping):
+        raise SpecError(f"{what}: give values by name, such as {{'L1': 6.0}}, found {values!r}.")
+    return values
 
 
 def read_text(path: Path) -> str:
@@ -119,6 +135,8 @@ def parse_spec(
     >>> gp.parse_spec("plant.type = 'slosh-tank'\nmove = { distance = 0.5, duration = 2.0 }").plant.type
     'slosh-tank'
     """
+    if not isinstance(text, str):
+        raise SpecError(f"{source}: a text is expected, found {found(text)}.")
     document = _document(text, source)
     if not document and not overrides and not tables:
         raise SpecError(f"{source}: the spec is empty; it must state at least [plant] type and [move].")
@@ -288,7 +306,7 @@ def _slip(text: str, problem: str) -> str:
 
 def _override(document: Table, override: str) -> None:
     """Set a dotted key; the value is TOML where it parses as TOML, else text."""
-    key, equals, text = override.partition("=")
+    key, equals, text = str(override).partition("=")
     path = [part.strip() for part in key.split(".")]
     if not equals or not all(path):
         raise SpecError(f"set {override!r}: write KEY=VALUE, such as plant.L1=0.5.")

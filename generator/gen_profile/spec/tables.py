@@ -247,10 +247,11 @@ def _per_axis(
     values = value if isinstance(value, list | tuple) else [value]
     harmless = (otherwise,) * len(axes or values)
     if axes is not None and len(values) != len(axes):
-        template = "must hold one number per axis ({axes}), such as {example}, found {count}"
+        template = "must hold one number per axis ({axes}), such as {example}, found {found}"
         numbers = [one for one in values if isinstance(one, int | float)]
         example = [*numbers, *[0] * len(axes)][: len(axes)]
-        structurer.faults.add(where, template, axes=", ".join(axes), example=example, count=len(values))
+        stated = len(values) if values is value else found(value)
+        structurer.faults.add(where, template, axes=", ".join(axes), example=example, found=stated)
         return harmless
     numbers = [structurer.fit(one, float, where) for one in values]
     if MISFIT in numbers:

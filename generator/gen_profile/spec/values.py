@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 import attrs
 
+from gen_profile.errors import SpecError
 from gen_profile.phrase import Phrase
 from gen_profile.suggestion import number_meant
 
@@ -121,6 +122,12 @@ def found(value: object, number: bool = True) -> str:
             return "a date or time"
         case _:  # from Python
             return f"a {type(value).__name__}"
+
+
+def require_whole(value: object, least: int, place: str) -> None:
+    """Refuse, by a `SpecError`, what is no whole number, or less."""
+    if not isinstance(value, int) or value < least:
+        raise SpecError(f"{place}: must be a whole number of at least {least}, found {found(value)}.")
 
 
 Name = Annotated[

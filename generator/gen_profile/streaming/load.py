@@ -36,7 +36,7 @@ class CraneLoad(AbstractContextManager["CraneLoad"]):
         if spec.move.initial:
             raise CosimulationError(
                 "move.initial: the simulated crane would swing on while its drives start up, and it is not "
-                "knows how it swings when the motion begins; leave move.initial out."
+                "known how it swings when the motion begins; leave move.initial out."
             )
         machines = scenarios(spec)
         tau = spec.actuator.tau or 0.0

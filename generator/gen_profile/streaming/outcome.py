@@ -104,7 +104,7 @@ class StreamOutcome:
         axes, further = self.source.axes, self.source.plan.columns
         heads = [f"{axis.name}_{what}_{axis.unit}" for axis in axes for what in ("planned", "actual")]
         times = grid_times(len(self.planned) - 1, self.source.plan.target.can.sync_period)
-        places = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
+        places = np.stack([self.planned, self.actual], axis=2).reshape(len(times), 2 * len(axes))
         columns = np.column_stack([places, *further.values()])
         heads += further
         rows = [

@@ -13,6 +13,7 @@ from gen_profile.errors import GenProfileError, SpecError, StreamAborted
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.planner.commands import STILL, Command, inputs_of, start_cycles_of
 from gen_profile.planner.design import quick_limits
+from gen_profile.planner.events import error_words
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import ISSUED, LOST, SENSOR, BlockAxis, live_inputs
 from gen_profile.planner.machine import planned_axes, sensed_directions
@@ -169,8 +170,8 @@ class PlannedMotion:
     def remarks(self) -> tuple[str, ...]:
         """What the block showed beside setpoints."""
         remarks = []
-        if shown := [str(number) for number in dict.fromkeys(self.columns["error_id"].tolist()) if number]:
-            remarks.append(f"The block showed error {', '.join(shown)}, which its header explains.")
+        if shown := [error_words(one) for one in dict.fromkeys(self.columns["error_id"].tolist()) if one]:
+            remarks.append(f"The block showed {'; '.join(shown)}.")
         if lost := [LOST[number] for number in sorted(self._lost)]:
             remarks.append(f"The load may sway, because {' and '.join(lost)}.")
         return tuple(remarks)
@@ -265,9 +266,7 @@ class PlannedMotion:
     @property
     def _refusal(self) -> str:
         at = self._shown_at * self._values["fCycleTime"]
-        return (
-            f"At {at:.6g} s the block refused its commands: error {self._error}, which its header explains."
-        )
+        return f"At {at:.6g} s the block refused its commands: {error_words(self._error)}."
 
     def _of(self, output: str) -> float:
         return float(self._rows[-1][self._outputs[output]])

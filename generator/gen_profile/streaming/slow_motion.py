@@ -15,7 +15,7 @@ from gen_profile.progress import Progress
 from gen_profile.spec.model import Spec
 from gen_profile.streaming.outcome import Source
 from gen_profile.streaming.stream import actual_positions, designed
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import number_meant, suggestion
 from gen_profile_exporters.can.following_window import LEAST_USEFUL
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.streaming.approach import CREEP, FRACTION
@@ -132,5 +132,7 @@ def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float
         except ValueError:
             distances[name] = math.nan
         if not math.isfinite(distances[name]):
-            raise SpecError(f"jog {text}: state the distance as a number of metres (or rad), as {name}=0.05.")
+            hint = number_meant(number)
+            wanted = "state the distance as a number of metres (or rad)"
+            raise SpecError(f"jog {text}: {wanted}, as {name}=0.05{hint}.")
     return distances

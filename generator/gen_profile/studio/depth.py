@@ -48,7 +48,7 @@ def _comparison(compared: Comparison, own: str) -> Part:
         "part": "comparison",
         "own": own,
         "limit": min(spec.check.residual_sway.values()),
-        "unit": spec.machine().actuated[0].unit,
+        "unit": compared.unit,
         "rows": [
             {
                 **point(row.method, row.figures),

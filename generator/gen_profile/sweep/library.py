@@ -12,6 +12,7 @@ from gen_profile.artefacts.writing import staged
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, no_progress
+from gen_profile.spec.reading import as_path
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.store import case_files, case_folder, case_spec, grid_of, swept_table
 from gen_profile_exporters.block_source import BlockSource
@@ -82,7 +83,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
     >>> gp.write_library("ropes", "crane.st").block  # of what gp.run_sweep wrote
     'FB_crane'
     """
-    folder, path = Path(folder), Path(path)
+    folder, path = as_path(folder), as_path(path)
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
     profiles, specs, entries, target = _gathered(folder, stem.removeprefix("FB_"), progress)

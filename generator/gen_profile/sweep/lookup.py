@@ -13,6 +13,7 @@ from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_path, as_values
 from gen_profile.suggestion import number_meant, suggestion
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.grid import Grid, GridAxis, overrides
@@ -95,7 +96,7 @@ def lookup(
     asked: Mapping[str, Any],
     progress: Progress = no_progress,
     *,
-    out: Path | None = None,
+    out: Path | str | None = None,
 ) -> LookupResult:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
@@ -111,7 +112,7 @@ def lookup(
         A value, or a text of one, for every varied key.
     progress : callable, optional
         Told every step.
-    out : Path, optional
+    out : Path or str, optional
         Folder to which the profile is written, with its manifest.
 
     Raises
@@ -128,9 +129,9 @@ def lookup(
     >>> gp.lookup("ropes", {"plant.L1": 0.49}).used  # of what gp.run_sweep wrote
     {'plant.L1': 0.5}
     """
-    folder = Path(folder)
+    folder, out = as_path(folder), None if out is None else as_path(out)
     grid = grid_of(folder)
-    wanted = _wanted(grid, {key: str(value) for key, value in asked.items()})
+    wanted = _wanted(grid, {key: str(value) for key, value in as_values(asked, "asked").items()})
     near, first = _near(grid, swept_table(folder, grid, ["case", "status", *wanted]), wanted)
     rows = swept_table(folder, grid, cases=near).to_pylist()
     nearest = next(iter(swept_table(folder, grid, cases=first).to_pylist()), None)

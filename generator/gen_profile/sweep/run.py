@@ -22,7 +22,8 @@ from gen_profile.cluster import client_of, processes, unable
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.summary import Summarised
 from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
 from gen_profile.sweep.grid import Grid, grid_of_values
 from gen_profile.sweep.store import Keeper, Store, opened, swept_table
@@ -88,8 +89,8 @@ def _require_some(recipe: Recipe, key: str, values: Sequence[Any]) -> None:
     raise faults[0]
 
 
-@attrs.frozen(kw_only=True)
-class Sweep:
+@attrs.frozen(kw_only=True, repr=False)
+class Sweep(Summarised):
     """A finished sweep.
 
     Attributes
@@ -109,6 +110,10 @@ class Sweep:
     reasons: dict[str, str]
     kept: int
     table: Path
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {"name": self.store.name, "folder": self.store.folder, **self.statuses}
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -281,5 +286,5 @@ def run_sweep(
         raise SpecError(f"vary: give values by key, such as {{'plant.L1': [0.45, 0.5]}}, found {vary!r}.")
     grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
-    store = prepare(text, (), grid, as_names(formats), Path(folder))
+    store = prepare(text, (), grid, as_names(formats), as_path(folder))
     return sweep(store, scheduler=scheduler, workers=workers)

@@ -20,7 +20,8 @@ from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec, spec_from_dict
+from gen_profile.spec.reading import as_names, as_path, as_spec, spec_from_dict
+from gen_profile.spec.values import require_whole
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, sample_spacing
@@ -186,7 +187,7 @@ def check_artefact(
     >>> gp.check_artefact("deploy/paper.csv").passed  # what gp.design wrote
     True
     """
-    path = Path(path)
+    path = as_path(path)
     content, format_ = read_artefact(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
@@ -257,6 +258,8 @@ def _rows(
     spec: Spec, setpoints: SampledProfile, row: int | None, progress: Progress
 ) -> tuple[tuple[Scenario, ...], int]:
     """List all scenarios, or the one of a number, and say how many machines were looked at for the worst."""
+    if row is not None:
+        require_whole(row, 0, "scenario")
     machines = scenarios(spec)
     rows = (*machines, *further_scenarios(spec, machines))
     if row is not None and 0 <= row < len(rows):

@@ -12,7 +12,7 @@ from gen_profile.evaluation.simulation import AT_REST, Response
 from gen_profile.motion.profile import Array, SampledProfile, require_samples
 from gen_profile.problem.linearization import eigenvalues
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec
+from gen_profile.spec.reading import as_spec, as_values
 from gen_profile.suggestion import suggestion
 from gen_profile.verification import cosimulation
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
@@ -49,7 +49,7 @@ def cosimulate(
     True
     """
     spec = as_spec(spec)
-    require_samples(setpoints)
+    require_samples(setpoints, len(spec.axis))
     values, *others = _machines(spec, parameters).tolist()
     if others:
         raise SpecError("parameters: one value of each; residual_sways takes many machines.")
@@ -92,7 +92,7 @@ def residual_sways(
     (5, 2)
     """
     spec = as_spec(spec)
-    require_samples(setpoints)
+    require_samples(setpoints, len(spec.axis))
     plant, tau = spec.machine(), spec.actuator.tau or 0.0
     machines = _machines(spec, parameters)
     ends = (spec.move.start, spec.move.target)
@@ -113,7 +113,7 @@ def residual_sways(
 def _machines(spec: Spec, parameters: Mapping[str, npt.ArrayLike]) -> Array:
     """Put parameters of machines side by side, those that are not given as the spec has them."""
     known, plant = spec.plant.parameters, spec.machine()
-    for name in parameters:
+    for name in as_values(parameters, "parameters"):
         if name not in known:
             raise SpecError(f"parameters: the machine has no {name!r}{suggestion(name, known)}")
     values = [parameters.get(q.name, known[q.name]) for q in plant.parameters]

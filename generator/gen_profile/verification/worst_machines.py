@@ -46,7 +46,7 @@ class _Way:
     def scenario(self, place: Array) -> Scenario:
         """Name the machine at a place."""
         (values,) = self.box.parameters(place[None])
-        words = [named(self.spec, name, values[name], 4) for name in self.box.ranges if name != LAG]
+        words = [named(self.spec, name, values[name]) for name in self.box.ranges if name != LAG]
         lag = float(self.lags(place[None])[0]) if LAG in self.box.ranges else self.lag
         if lag is not None:
             words.append(f"lag {lag:.4g} s")

@@ -20,9 +20,10 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.can import CanSpec
 from gen_profile.streaming.keyboard import Keyboard, Keys
+from gen_profile.streaming.outcome import Source, StreamOutcome
 from gen_profile.streaming.planned_motion import CommandList, PlannedMotion
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.streaming.record import Phase
+from gen_profile_exporters.can.streaming.record import Book, Phase
 
 COUNTS = 1_000_000
 CYCLE = PLANNED.export.cycle_time
@@ -166,6 +167,13 @@ def test_the_screen_shows_beforehand_how_far_a_stop_leads():
     assert len(lines) <= record.sent * CYCLE / 0.25 + 1
 
 
+def test_what_never_began_has_a_table():
+    source = Source(spec=spec_of(), plan=source_of(spec_of()))
+    record = Book.blank(0, 1).record("no answer", (0,), aftermath="", launched=False)
+    outcome = StreamOutcome(source=source, record=record, notes=())
+    assert outcome.table() == b"time_s,cart_planned_m,cart_actual_m,promise,error_id\n"
+
+
 def test_a_setpoint_that_comes_too_late_is_left_out():
     """The block goes on meanwhile, so that the axis is where it would be."""
     source = source_of(spec_of(), LONG.replace("0.4", "0.2") + "0.8,stop,\n")
@@ -182,7 +190,8 @@ def test_errors_and_lost_promises_are_told():
     with bench_of(source) as bench:
         bench.run()
     assert source.remarks == (
-        "The block showed error 3, which its header explains.",
+        "The block showed error 3: the target or the stick's velocity was no number, or the target out of "
+        "its range.",
         "The load may sway, because a live parameter changed on the way.",
     )
 
@@ -204,7 +213,7 @@ def test_what_the_block_refuses_is_not_done(commands, at, error, calls):
         assert bench.drive.state is State.SWITCH_ON_DISABLED
     assert record.phase is Phase.ABORTED
     words = (
-        r"At ([\d.]+) s the block refused its commands: error (\d), .* The axes were stopped without sway\."
+        r"At ([\d.]+) s the block refused its commands: error (\d): .* The axes were stopped without sway\."
     )
     found = re.fullmatch(words, record.reason)
     assert float(found[1]) == pytest.approx(at, abs=2 * CYCLE)

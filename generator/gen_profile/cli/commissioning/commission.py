@@ -74,7 +74,14 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
         run.write(path, ('export.plc_tables="variables"',) * bool(url))
         if log is not None or readings or given["periods"]:
             _announce("3. What that tells of the machine")
-            run.call(identify, spec_path=path, out=path, log=log, readings=readings, **signal)
+            run.call(
+                identify,
+                spec_path=path,
+                out=path,
+                logs=() if log is None else (log,),
+                readings=readings,
+                **signal,
+            )
         _announce("4. The motion, proved on every machine of the ranges")
         formats = given["formats"] or run.answer("", "Formats (gen-profile formats)", "plc").split()
         run.call(design, spec_path=path, formats=formats)

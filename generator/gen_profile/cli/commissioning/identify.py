@@ -67,7 +67,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "N small swings by stopwatch, of the slowest mode (1) by default.",
     into="periods",
 )
-@option("--swing CSV", "A swing logged while the axes stood still.", PathType(), into="log")
+@options.repeatable("--swing CSV", "A swing logged while the axes stood still.", PathType(), into="logs")
 @log_options
 @option(
     "--after SECONDS",
@@ -85,7 +85,7 @@ def identify(
     *,
     readings: tuple[str, ...],
     periods: tuple[str, ...],
-    log: Path | None,
+    logs: tuple[Path, ...],
     read: Callable[..., SwingLog],
     after: float,
     free: tuple[str, ...],
@@ -100,13 +100,13 @@ def identify(
     from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
 
     spec, rewritten = _to_change(chosen)
-    if picture is not None and log is None:
+    if picture is not None and not logs:
         raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
     measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
     with progress() as tell:
-        if log is not None:
+        if logs:
             tell("reading the log")
-            measurements.append(read(log, spec, after=after))
+            measurements += (read(log, spec, after=after) for log in logs)
         identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
         draw(identified, picture, tell)
         write_spec(identified.spec, out, rewritten(identified.spec))

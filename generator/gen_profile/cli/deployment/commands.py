@@ -24,7 +24,7 @@ from gen_profile.cli.options import Count, Number, OutputFile, PathType, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
-from gen_profile.errors import SpecError
+from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -105,7 +105,11 @@ def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[
         tell("connecting")
         with closing(access.opened(table)) as link:
             done = run(table, Mailbox(link), rollback=rollback, progress=tell)
-            return append_record(artefact.parent, done.to_dict(), link.server, by)
+            try:
+                return append_record(artefact.parent, done.to_dict(), link.server, by)
+            except OutputError as error:
+                words = f"The controller uses {artefact} all the same; that is not recorded."
+                raise OutputError(str(error), words) from error
 
 
 def _verify(artefact: Path, access: Access) -> None:

@@ -115,7 +115,8 @@ def drive_sim(
 ) -> None:
     """Simulate CiA 402 drives that move the machine's FMU.
 
-    Ends after one stream, when all drives have been switched off again, and tells how far the load sways.
+    Ends after one stream, when all drives have been switched off again, or by Ctrl-C, and tells how far the
+    load sways.
     """
     from gen_profile.streaming import stream as run
 
@@ -141,17 +142,20 @@ def drive_sim(
     ):
         bank = run.drive_bank(spec, bus, load, make)
         tell("waiting for a stream, or serving it")
-        run.serve(bank, lambda: bank.finished)
+        try:
+            run.serve(bank, lambda: bank.finished)
+        except KeyboardInterrupt:
+            if not any(drive.was_enabled for drive in bank.drives):
+                raise
         sway = load.residual_sway()
     scales = [axis.counts_per_si for axis in spec.axis_scales()]
     places = [drive.actual / scale for drive, scale in zip(bank.drives, scales, strict=True)]
-    document = {
-        "position_m": places,
-        "states": [drive.state.words for drive in bank.drives],
-        "sway_residual_peak_m": sway,
-    }
-    axes = spec.machine().actuated
-    at = [f"{axis.name} at {number(place)} {axis.unit}" for axis, place in zip(axes, places, strict=True)]
+    states = [drive.state.words for drive in bank.drives]
+    document = {"position_m": places, "states": states, "sway_residual_peak_m": sway}
+    at = [
+        f"{axis.name} at {number(place)} {axis.unit} ({state})"
+        for axis, place, state in zip(spec.machine().actuated, places, states, strict=True)
+    ]
     print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}")
 
 

@@ -92,6 +92,11 @@ class Judge(ABC, Generic[State]):
             The controller was started anew.
         """
         before = self._last
+        if before is not None and state.calls < before.calls:
+            raise DeploymentError(
+                "The controller was started anew, or its program loaded; verify what it uses, and watch "
+                "again."
+            )
         if self._first is None:
             self._first = (state, at)
         first, begin = self._first
@@ -100,11 +105,6 @@ class Judge(ABC, Generic[State]):
         seen.states += 1
         seen.seconds, seen.cycles = at - begin, state.calls - first.calls
         self._require_table(first, state)
-        if before is not None and state.calls < before.calls:
-            raise DeploymentError(
-                "The controller was started anew, or its program loaded; verify what it uses, and watch "
-                "again."
-            )
         self._require_setpoints(state)
         if before is not None:
             self._require_course(before, state)
