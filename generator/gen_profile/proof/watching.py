@@ -16,7 +16,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
+from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of, standing
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import LATER, faults, measured
 from gen_profile.proof.orders import (
@@ -223,7 +223,7 @@ class BlockWatch:
         )
         return Facts(
             done=issued["bDone"] != 0.0,
-            stands=~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0),
+            stands=standing(velocity, acceleration),
             errors=issued["nErrorId"],
             position=position,
             low=low,
