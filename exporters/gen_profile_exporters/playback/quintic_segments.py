@@ -96,10 +96,7 @@ def fit(samples: Array, cycle_time: float) -> QuinticSegments:
     duration = (np.diff(first) * cycle_time)[:, None]
     pieces = hermite(samples[:, first[:-1]], samples[:, first[1:]], duration)
     return QuinticSegments(
-        cycle_time=cycle_time,
-        first=first,
-        coefficients=np.moveaxis(pieces, 0, 1),
-        target=samples[0, -1],
+        cycle_time=cycle_time, first=first, coefficients=np.moveaxis(pieces, 0, 1), target=samples[0, -1]
     )
 
 

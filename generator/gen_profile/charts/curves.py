@@ -108,11 +108,7 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
 
 
 def sway_figure(
-    spec: Spec,
-    evaluation: MotionEvaluation,
-    shown: Sequence[Shown],
-    arrival: float,
-    samples: int = SAMPLES,
+    spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], arrival: float, samples: int = SAMPLES
 ) -> Figure:
     """Draw the sway of every load on the nominal machine and on perturbed ones."""
     times = np.linspace(0.0, evaluation.motion.duration + evaluation.watch, samples)

@@ -206,11 +206,7 @@ planner_options = options.together(
 
 
 def planned(
-    block_path: Path,
-    commands_path: Path | None,
-    live_parameters: tuple[str, ...],
-    *,
-    accept_unverified: bool,
+    block_path: Path, commands_path: Path | None, live_parameters: tuple[str, ...], *, accept_unverified: bool
 ) -> Source:
     """Take a written block, and the commands of a file or of the keyboard.
 

@@ -218,10 +218,7 @@ def robustness(
 
 
 def error_grid(
-    spec: Spec,
-    parameters: Sequence[str] = (),
-    points: int | None = None,
-    half_range: float | None = None,
+    spec: Spec, parameters: Sequence[str] = (), points: int | None = None, half_range: float | None = None
 ) -> dict[str, Array]:
     """Choose the relative errors of one or two parameters; an odd number of them, 0 in their middle.
 

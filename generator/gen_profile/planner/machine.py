@@ -69,10 +69,7 @@ def live_modes(spec: Spec) -> LiveModes:
         linear = linearized(spec, point)
         squares = linear.distinct_frequencies**2
         return np.array(
-            [
-                *([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares),
-                *decays(linear),
-            ]
+            [*([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares), *decays(linear)]
         )
 
     def others(point: Sequence[float]) -> Array:

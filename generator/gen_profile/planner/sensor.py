@@ -255,10 +255,7 @@ def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
     push = (one.swing * slowest) ** 2 * slowest / (2.0 * np.pi)
     for mode, (frequency, decay) in enumerate(zip(one.frequencies, one.decays, strict=True)):
         state[2 * mode, 2 * mode + 1] = 1.0
-        state[2 * mode + 1, 2 * mode : 2 * mode + 2] = (
-            -(frequency**2),
-            -2.0 * max(decay, LIGHT * frequency),
-        )
+        state[2 * mode + 1, 2 * mode : 2 * mode + 2] = (-(frequency**2), -2.0 * max(decay, LIGHT * frequency))
         measured[0, 2 * mode + rate] = one.shown[mode]
         like = abs(one.shown[0]) / max(abs(one.shown[mode]), 0.05 * abs(one.shown[0]))
         spread[2 * mode + 1] = push * (FAST * like**2 if mode else 1.0)

@@ -91,11 +91,7 @@ class LookupResult:
 
 
 def lookup(
-    folder: Path | str,
-    asked: Mapping[str, Any],
-    progress: Progress = no_progress,
-    *,
-    out: Path | None = None,
+    folder: Path | str, asked: Mapping[str, Any], progress: Progress = no_progress, *, out: Path | None = None
 ) -> LookupResult:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 

@@ -52,11 +52,7 @@ def usual_effort(problem: Problem) -> float:
 
 
 def cost(
-    transcription: Transcription,
-    effort: Matrix,
-    sway_cost: SwayCost,
-    iterate: Iterate,
-    maps: IntervalMaps,
+    transcription: Transcription, effort: Matrix, sway_cost: SwayCost, iterate: Iterate, maps: IntervalMaps
 ) -> tuple[Matrix, Array]:
     """Expand eq. (26) about an iterate to second order: P and q of ``½ xᵀ P x + qᵀ x``.
 
