@@ -203,18 +203,11 @@ class Histories:
 
     def slowest(self, history: History) -> float:
         """Find the longest period in s of the machine that a block is given in a history."""
-        live = dict(history.live)
+        live, plant = dict(history.live), self.spec.machine()
         ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
-        ends = [live] + [
-            live | {name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes
-        ]
-        plant = self.spec.machine()
-        return float(
-            max(
-                2.0 * np.pi / linearize(plant, *_machine(self.spec, live_values, {})).frequencies.min()
-                for live_values in ends
-            )
-        )
+        hoisted_to = [{name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes]
+        machines = [_machine(self.spec, live | ends, {}) for ends in ({}, *hoisted_to)]
+        return 2.0 * np.pi / float(min(linearize(plant, *one).frequencies.min() for one in machines))
 
     @property
     def hoisted_names(self) -> tuple[str, ...]:

@@ -108,23 +108,8 @@ def measured(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[All
         Of some orders' beginnings, how many cycles later the first setpoint came that would not have come
         without the order; None for none at all.
     """
-    for judge in (
-        _arrivals,
-        _directions,
-        _velocity_limits,
-        _sticks,
-        _quick_stops,
-        statements.truths,
-        statements.velocities,
-        statements.stops,
-        statements.numbers,
-        statements.promises,
-        statements.remains,
-        statements.events,
-        statements.blocked,
-        statements.slowed,
-        statements.taken_over,
-    ):
+    own = (_arrivals, _directions, _velocity_limits, _sticks, _quick_stops)
+    for judge in (*own, *statements.JUDGES):
         yield from judge(run)
     yield from _reactions(run, reactions)
 

@@ -450,3 +450,6 @@ def _remains_at_last(run: Followed) -> Iterator[Allowance]:
         left, *_ = run.last_modes.left(run.acceleration[:, rests[0] :], ends, run.cycle)
         worst = int(np.argmax(left))
         yield Allowance("swings", rests[1 + worst], float(left[worst]), UNDISTURBED * run.sway_limit)
+
+
+JUDGES = (truths, velocities, stops, numbers, promises, remains, events, blocked, slowed, taken_over)

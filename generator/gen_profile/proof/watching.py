@@ -120,15 +120,9 @@ class BlockWatch:
 
     def marks(self, orders: Sequence[TimedOrder]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
-        least = self.reaction / self.cycle
-        starts = [
-            one.begin
-            for one in orders
-            if 0 < one.begin == one.edge
-            and one.end - one.begin > least
-            and one.kind not in (QUICK_STOP, DISABLED)
-        ]
-        return starts[:MOST_COPIES]
+        guided = [one for one in orders if one.kind not in (QUICK_STOP, DISABLED)]
+        held = [one for one in guided if one.end - one.begin > self.reaction / self.cycle]
+        return [one.begin for one in held if 0 < one.begin == one.edge][:MOST_COPIES]
 
     def faults(
         self,
