@@ -204,13 +204,12 @@ def spectrum_panel(
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     bands = [Band(low, high) for low, high in ranges if high > low]
+    spectra = {name: spectrum(motion, frequencies) for name, motion in motions.items()}
+    lines = [Line(name, frequencies, magnitude, styles[name]) for name, magnitude in spectra.items()]
     return Panel(
         Phrase("Spectrum of the acceleration of {name}", name=first.name),
         Phrase("magnitude ({unit}/s)", unit=first.unit),
-        [
-            Line(name, frequencies, spectrum(motion, frequencies), styles[name])
-            for name, motion in motions.items()
-        ],
+        lines,
         x_label="frequency (rad/s)",
         bands=bands + [Band(frequency, frequency) for frequency in natural.nominal.tolist()],
         decades=DECADES,

@@ -275,14 +275,11 @@ def _quick_stops(run: Followed) -> Iterator[Allowance]:
         begin, end = max(order.begin, 1), order.end
         stands = run.stands[begin:end]
         rests = begin + int(np.argmax(stands)) if stands.any() else end
+        before = (run.velocity[:, begin - 1].tolist(), run.acceleration[:, begin - 1].tolist())
+        braked = zip(*before, (own.quick for own in run.limits), strict=True)
         allowed = 3.0 * run.cycle + max(
             (abs(v) + 0.5 * a * a / jerk) / deceleration + (abs(a) + deceleration) / jerk
-            for v, a, (deceleration, jerk) in zip(
-                run.velocity[:, begin - 1].tolist(),
-                run.acceleration[:, begin - 1].tolist(),
-                (own.quick for own in run.limits),
-                strict=True,
-            )
+            for v, a, (deceleration, jerk) in braked
         )
         yield Allowance(QUICK_STOP, order.begin, min(rests - begin, (end - begin)) * run.cycle, allowed)
         if rests == begin:
