@@ -53,6 +53,11 @@ class Streamer:
         Whether drives that are in fault are reset first.
     book : Book, optional
         Where to take down how it goes.
+
+    Attributes
+    ----------
+    cycles_sent : int
+        Of the motion, so far.
     """
 
     def __init__(
@@ -75,6 +80,7 @@ class Streamer:
         self._link.subscribe(source.take)
         self._following = Following(self._watch.axes, target, windows(source.demand, target))
         self._book = book or Book.blank(source.most, len(target.axes))
+        self.cycles_sent = 0
         self._found = Restoration()
         self._left: tuple[str, ...] = ()  # of the settings found, what could not be put back
         self._stops_asked = deque[str]()
@@ -194,6 +200,7 @@ class Streamer:
             pacer.send(last.messages)
             self._sent_at = self._clock.now()
             self._book.take_sent(cycle, self._sent_at - pacer.due)
+            self.cycles_sent += 1
             self._following.lead(last.at_sync)
             self._answers_for = cycle
             sent, cycle = last, cycle + 1
