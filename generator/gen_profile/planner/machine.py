@@ -79,8 +79,8 @@ def live_modes(spec: Spec) -> LiveModes:
     modes = len(linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
     exact = [linearized(spec, point).distinct_frequencies for point in between]
-    bends = (_curvatures(invariants, len(live)), [0.0] * len(live))
-    for degree, curvatures in product(DEGREES if live else (0,), bends):
+    tried = (_curvatures(invariants, len(live)), [0.0] * len(live))
+    for degree, curvatures in product(DEGREES if live else (0,), tried):
         interpolant = interpolate(invariants, curvatures, degree).without(NEGLIGIBLE)
         interpolated = [frequencies(interpolant(point)[:modes]) for point in between]
         error = float(np.abs(np.array(interpolated) / exact - 1.0).max())
