@@ -173,13 +173,13 @@ def test_a_worker_gets_the_machine_s_file(tmp_path):
     )
     (tmp_path / "own.py").write_text(machine, "utf-8")
     own = parse_spec(BAY.replace('type = "double-pendulum-crane"', 'file = "own.py"'), (), "bay", tmp_path)
-    recipe = ProofRecipe.of(own, "", Histories.of(own))
+    recipe = ProofRecipe.of(own, "")
     (tmp_path / "own.py").unlink()
     assert pickle.loads(pickle.dumps(recipe)).read_spec().sha256() == own.sha256()
 
 
 def test_a_worker_with_other_libraries_judges_nothing(spec):
-    recipe = attrs.evolve(ProofRecipe.of(spec, "", Histories.of(spec)), versions=(("numpy", "0.9"),))
+    recipe = attrs.evolve(ProofRecipe.of(spec, ""), versions=(("numpy", "0.9"),))
     with pytest.raises(SpecError, match=r"a worker has gen-profile .*, and this proof needs numpy 0\.9"):
         judge_part(recipe, (1, 0, (), [0]))
 

@@ -67,7 +67,7 @@ def thrown_over(spec):
     histories = Histories.of(spec)
     choices = np.full(histories.choices, 0.5)
     choices[1:3] = 1.0  # rope and load
-    choices[histories._first_command :][:6] = REVERSALS
+    choices[sum(histories.sizes[:4]) :][:6] = REVERSALS
     return histories, histories.history(choices, 32.0 * histories.period)
 
 

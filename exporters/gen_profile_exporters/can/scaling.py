@@ -133,15 +133,13 @@ def setpoints(motion: SampledProfile, target: Target) -> Setpoints:
     ExportError
         A number leaves 32 bits (or 16, of a torque), or a position the axis's travel.
     """
-    position = np.column_stack(
-        [
-            _positions(motion.position[:, column], axis, target.can, motion.cycle_time)
-            for column, axis in enumerate(target.axes)
-        ]
-    )
+    columns = [
+        _positions(places, axis, target.can, motion.cycle_time)
+        for places, axis in zip(motion.position.T, target.axes, strict=True)
+    ]
     return Setpoints(
         period=motion.cycle_time,
-        position=position,
+        position=np.column_stack(columns),
         offsets=_offsets(motion, target),
         velocity=_velocities(motion, target) if target.can.mode == "csv" else None,
     )

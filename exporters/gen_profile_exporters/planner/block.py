@@ -69,9 +69,8 @@ RESERVE = 0.1  # share of the limits that only calming takes up, where live para
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
 AXIS_LOOP = re.compile(r"(?ms)^( *)FOR (\w+) := 0 TO cAxes - 1 DO[^\n]*\n(.*?)^\1END_FOR;[^\n]*\n")
-FIRST = re.compile(
-    r"(?<![\w.])0(?: \* c\w+)+( \+ )?"
-)  # of the first axis: how many of something there are before
+# of the first axis: how many of something there are before
+FIRST = re.compile(r"(?<![\w.])0(?: \* c\w+)+( \+ )?")
 WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")

@@ -53,10 +53,7 @@ def c_files(text: str, file: str) -> tuple[File, File]:
         outputs=_members(by_section["VAR_OUTPUT"], source),
         memory=indented(f"{c_member(v)};" for v in by_section["VAR"]),
     )
-    return (
-        File(f"{file}.c", code.encode("ascii")),
-        File(f"{file}.h", header.encode("ascii")),
-    )
+    return (File(f"{file}.c", code.encode("ascii")), File(f"{file}.h", header.encode("ascii")))
 
 
 def _members(variables: Iterable[StVariable], source: BlockSource) -> str:

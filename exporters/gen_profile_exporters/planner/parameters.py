@@ -47,9 +47,7 @@ def buffered_planner(source: BlockSource) -> BlockSource:
     variables = [attrs.evolve(one, section="VAR") if one.name in taken else one for one in source.variables]
     before, behind = _around(source, numbers, distinct)
     return attrs.evolve(
-        source,
-        variables=(*variables, *own),
-        body=before + _ENABLE.sub("bMayEnable", source.body) + behind,
+        source, variables=(*variables, *own), body=before + _ENABLE.sub("bMayEnable", source.body) + behind
     )
 
 

@@ -30,8 +30,7 @@ _LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
 _PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")
 # An array's initialiser or an index, a name or hole, a number with its sign, an operator.
 _TOKEN = re.compile(
-    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S",
-    re.ASCII,
+    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S", re.ASCII
 )
 
 

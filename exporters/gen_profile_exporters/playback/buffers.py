@@ -27,12 +27,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.block_source import (
-    BlockSource,
-    BlockVariable,
-    initialiser,
-    parse_function_block,
-)
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser, parse_function_block
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.block import fill, layout_of
 from gen_profile_exporters.playback.layouts import LAYOUTS

@@ -144,10 +144,7 @@ def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockS
     """Put blocks together that differ in their motions only."""
     merged = [_merged(same) for same in zip(*(source.variables for source in sources), strict=True)]
     return BlockSource(
-        header=header,
-        name=name,
-        variables=(*merged, *_selector(sources)),
-        body=_selecting(sources[0].body),
+        header=header, name=name, variables=(*merged, *_selector(sources)), body=_selecting(sources[0].body)
     )
 
 

@@ -96,10 +96,7 @@ def fit(samples: Array, cycle_time: float) -> QuinticSegments:
     duration = (np.diff(first) * cycle_time)[:, None]
     pieces = hermite(samples[:, first[:-1]], samples[:, first[1:]], duration)
     return QuinticSegments(
-        cycle_time=cycle_time,
-        first=first,
-        coefficients=np.moveaxis(pieces, 0, 1),
-        target=samples[0, -1],
+        cycle_time=cycle_time, first=first, coefficients=np.moveaxis(pieces, 0, 1), target=samples[0, -1]
     )
 
 
@@ -122,16 +119,10 @@ def hermite(begin: Array, end: Array, duration: Array | float) -> Array:
     missing = p1 - p0 - t * (v0 + 0.5 * t * a0)
     speed = t * (v1 - v0 - t * a0)
     push = 0.5 * t * t * (a1 - a0)
-    return np.array(
-        [
-            p0,
-            v0,
-            0.5 * a0,
-            (10.0 * missing - 4.0 * speed + push) / t**3,
-            (-15.0 * missing + 7.0 * speed - 2.0 * push) / t**4,
-            (6.0 * missing - 3.0 * speed + push) / t**5,
-        ]
-    )
+    third = (10.0 * missing - 4.0 * speed + push) / t**3
+    fourth = (-15.0 * missing + 7.0 * speed - 2.0 * push) / t**4
+    fifth = (6.0 * missing - 3.0 * speed + push) / t**5
+    return np.array([p0, v0, 0.5 * a0, third, fourth, fifth])
 
 
 def horner(coefficients: Array, time: Array) -> tuple[Array, Array, Array]:

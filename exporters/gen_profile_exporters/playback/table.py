@@ -128,19 +128,14 @@ class PlaybackTable:
             return np.array(horner(self.columns[:, segment], np.array(time)))
         (position, velocity, acceleration), following = self.columns[:, cycle], self.columns[:, cycle + 1]
         advance, rest = following[0] - position, 1.0 - fraction
-        return np.array(
-            (
-                position
-                + fraction
-                * (
-                    advance
-                    + rest * rest * (velocity * self.cycle_time - advance)
-                    - rest * fraction * (following[1] * self.cycle_time - advance)
-                ),
-                velocity + fraction * (following[1] - velocity),
-                acceleration + fraction * (following[2] - acceleration),
-            )
+        way = (
+            advance
+            + rest * rest * (velocity * self.cycle_time - advance)
+            - rest * fraction * (following[1] * self.cycle_time - advance)
         )
+        speed = velocity + fraction * (following[1] - velocity)
+        push = acceleration + fraction * (following[2] - acceleration)
+        return np.array((position + fraction * way, speed, push))
 
     def motion(self) -> SampledProfile:
         """Convert what the block issues to SI units."""

@@ -96,9 +96,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     played = play_spline(knots, np.column_stack([column[:, 1] for column in columns]), times, single=True)
     factor = np.array([axis.factor for axis in target.axes])
     return SampledProfile(
-        cycle_time=target.cycle_time,
-        position=in_si(played, factor),
-        resolution=_spacing(played, target.axes),
+        cycle_time=target.cycle_time, position=in_si(played, factor), resolution=_spacing(played, target.axes)
     )
 
 

@@ -70,10 +70,7 @@ class Sources:
 
 def sources(model: Model, version: Version) -> Sources:
     """Write a model's C files and description for a version of FMI."""
-    code = {
-        **model.code,
-        **hand_written("interface", *_COMMON, *version.own_files),
-    }
+    code = {**model.code, **hand_written("interface", *_COMMON, *version.own_files)}
     identity = digest(model_description(model, version.value, "", SOURCE_FILE), *flat(code))[:32]
     return Sources(
         model=model,

@@ -153,14 +153,11 @@ def _add_structure(root: Element, model: Model, fmi: str) -> None:
     """List unknowns with what they depend on: by index in FMI 2, by value reference in FMI 3."""
     table, structure, first = model.variables, model.structure, FIRST[fmi]
     element = SubElement(root, "ModelStructure")
+    begun = table.references_of(Kind.OUTPUT, Kind.DISCRETE_OUTPUT, Kind.DERIVATIVE)
     for title, unknowns, known in (
         ("Output", table.references_of(Kind.STATE, Kind.OUTPUT, Kind.DISCRETE_OUTPUT), structure.running),
         (DERIVATIVE[fmi], table.derivatives, structure.running),
-        (
-            "InitialUnknown",
-            table.references_of(Kind.OUTPUT, Kind.DISCRETE_OUTPUT, Kind.DERIVATIVE),
-            structure.starting,
-        ),
+        ("InitialUnknown", begun, structure.starting),
     ):
         listed, name, number = element, title, "valueReference"
         if fmi == "2":

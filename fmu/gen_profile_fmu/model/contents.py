@@ -9,12 +9,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate
 from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.planner.c_source import c_name
-from gen_profile_fmu.model.c_sources import (
-    equations_source,
-    model_sources,
-    motion_table,
-    variables_header,
-)
+from gen_profile_fmu.model.c_sources import equations_source, model_sources, motion_table, variables_header
 from gen_profile_fmu.model.dependencies import Structure, plant_structure, profile_structure
 from gen_profile_fmu.model.documentation import motion_page, plant_page, system_page
 from gen_profile_fmu.model.plant_variables import (

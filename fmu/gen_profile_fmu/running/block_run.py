@@ -417,8 +417,6 @@ def _called(block: CalledBlock, script: Script) -> _Block:
 
 def _loop() -> Any:
     function = compiled_loops().block_run
-    function.argtypes = [
-        *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Outcome)),
-    ]
+    function.argtypes = [*(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Outcome))]
     function.restype = None
     return function

@@ -6,7 +6,6 @@ Reads job.json and motion.npz from the folder, writes result.npy, or refusal.txt
 import json
 import sys
 from collections.abc import Mapping, Sequence, Set
-from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -47,14 +46,13 @@ def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Pat
     _require_binary(archive.name, unpacked, platform if second else platform_tuple)
     references = _references(archive.name, description, job)
     said: list[str] = []
-    open_instance = partial(_instance, description, unpacked, said)
+
+    def follow(machine: Any) -> Array:
+        instance = _instance(description, unpacked, said)
+        return _run(instance, second, references, job, machine, times, inputs)
+
     try:
-        return np.array(
-            [
-                _run(open_instance(), second, references, job, machine, times, inputs)
-                for machine in job["machines"]
-            ]
-        )
+        return np.array([follow(machine) for machine in job["machines"]])
     except FMICallException as error:
         reason = f", saying: {said[-1][:LONGEST_MESSAGE]}" if said else "."
         raise CosimulationError(

@@ -96,9 +96,7 @@ class Manifest:
         """Keep what a previous manifest says of artefacts that this export does not replace."""
         replaced = {artefact.path for artefact in self.artefacts}
         remaining = (
-            attrs.evolve(
-                one, artefacts=tuple(kept for kept in one.artefacts if kept.path not in replaced), earlier=()
-            )
+            attrs.evolve(one, artefacts=tuple(a for a in one.artefacts if a.path not in replaced), earlier=())
             for one in (previous, *previous.earlier)
         )
         return attrs.evolve(self, earlier=tuple(one for one in remaining if one.artefacts))

@@ -7,8 +7,8 @@ from gen_profile.bounded_file import DOCUMENT, MOST, read_bounded
 from gen_profile.errors import OutputError
 
 
-def read_artefact(path: Path, most: int = MOST) -> bytes:
-    """Read a file of so many bytes at most.
+def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
+    """Read a file of so many bytes at most; errors say what it is.
 
     Raises
     ------
@@ -17,7 +17,21 @@ def read_artefact(path: Path, most: int = MOST) -> bytes:
     try:
         return read_bounded(path, most)
     except OSError as error:
-        raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
+        raise OutputError(f"Cannot read {what}{path}: {error.strerror or error}.") from error
+
+
+def decoded(content: bytes, path: Path, what: str) -> str:
+    """Decode what a file holds; errors say what it is.
+
+    Raises
+    ------
+    OutputError
+        It is no UTF-8 text.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OutputError(f"Cannot read {what}{path}: it is no UTF-8 text.") from error
 
 
 def manifest_beside(path: Path, content: bytes, *, planner: bool = False) -> Manifest:

@@ -9,9 +9,8 @@ import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import Array, Ball, ball
 
-DyadicBox = tuple[
-    tuple[int, int], ...
-]  # of every range how often it was halved, and which of the parts it is
+# of every range how often it was halved, and which of the parts it is
+DyadicBox = tuple[tuple[int, int], ...]
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -471,10 +471,7 @@ class Enclosure:
             loads, since = watch.loads, slice(watch.first - begun, None)
             away = norm(off[:, watch.first :, loads]).max(axis=1)
             bounds[:, column], largest_met[:, column] = self._greatest(
-                [one[:, since] for one in at_nodes[loads]],
-                far[loads],
-                watch.first,
-                targets[column] - away,
+                [one[:, since] for one in at_nodes[loads]], far[loads], watch.first, targets[column] - away
             )
             bounds[:, column] = (bounds[:, column] + away) * ROUND_UP
         return SwayBounds(sway=bounds, largest_met=largest_met)

@@ -132,13 +132,9 @@ class Enclosed:
         results: dict[int, Any] = {}
 
         def taken(value: AffineOperand) -> Ball | Affine:
-            return (
-                value
-                if isinstance(value, Affine)
-                else ball(value)
-                if reach is None
-                else constant(value, reach)
-            )
+            if isinstance(value, Affine):
+                return value
+            return ball(value) if reach is None else constant(value, reach)
 
         for step in self._instructions:
             if step.operation == "OUTPUT":

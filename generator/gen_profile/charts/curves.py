@@ -107,11 +107,7 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
 
 
 def sway_figure(
-    spec: Spec,
-    evaluation: MotionEvaluation,
-    shown: Sequence[Shown],
-    arrival: float,
-    samples: int = SAMPLES,
+    spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], arrival: float, samples: int = SAMPLES
 ) -> Figure:
     """Draw the sway of every load on the nominal machine and on perturbed ones."""
     times = np.linspace(0.0, evaluation.motion.duration + evaluation.watch, samples)
@@ -215,13 +211,12 @@ def spectrum_panel(
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     bands = [Band(low, high) for low, high in ranges if high > low]
+    spectra = {name: spectrum(motion, frequencies) for name, motion in motions.items()}
+    lines = [Line(name, frequencies, magnitude, styles[name]) for name, magnitude in spectra.items()]
     return Panel(
         Phrase("Spectrum of the acceleration of {name}", name=axis.name),
         Phrase("magnitude ({unit}/s)", unit=axis.unit),
-        [
-            Line(name, frequencies, spectrum(motion, frequencies), styles[name])
-            for name, motion in motions.items()
-        ],
+        lines,
         x_label="frequency (rad/s)",
         bands=bands + [Band(frequency, frequency) for frequency in natural.nominal.tolist()],
         decades=DECADES,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from gen_profile.bounded_file import DOCUMENT, read_bounded
+from gen_profile.bounded_file import DOCUMENT
 from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
@@ -19,7 +19,7 @@ from gen_profile.cli.options import InputFile, OutputFile, PathType, SpecChoice,
 from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, signing_key, signing_option
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.errors import SpecError
 from gen_profile.progress import Progress
 
 if TYPE_CHECKING:
@@ -181,12 +181,9 @@ def explain(events: Path) -> None:
 
 
 def _read(path: Path, what: str = "commands") -> str:
-    try:
-        return read_bounded(path, DOCUMENT).decode("utf-8-sig")
-    except OSError as error:
-        raise OutputError(f"Cannot read the {what} {path}: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise OutputError(f"Cannot read the {what} {path}: it is no UTF-8 text.") from error
+    from gen_profile.artefacts.reading import decoded, read_artefact
+
+    return decoded(read_artefact(path, DOCUMENT, f"the {what} "), path, f"the {what} ")
 
 
 planner_options = options.together(
@@ -206,11 +203,7 @@ planner_options = options.together(
 
 
 def planned(
-    block_path: Path,
-    commands_path: Path | None,
-    live_parameters: tuple[str, ...],
-    *,
-    accept_unverified: bool,
+    block_path: Path, commands_path: Path | None, live_parameters: tuple[str, ...], *, accept_unverified: bool
 ) -> Source:
     """Take a written block, and the commands of a file or of the keyboard.
 

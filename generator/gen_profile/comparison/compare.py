@@ -19,12 +19,7 @@ from gen_profile.summary import Drawable, Tabled
 
 SAME = 1e-3  # relative difference of figures that says nothing
 # what one would like less of
-OBJECTIVES = (
-    "duration_s",
-    "acceleration_max_m_per_s2",
-    "sway_transient_peak_m",
-    "sway_residual_worst_m",
-)
+OBJECTIVES = ("duration_s", "acceleration_max_m_per_s2", "sway_transient_peak_m", "sway_residual_worst_m")
 
 # what a method may be best at: objective, how many of the unit make one of it, unit, what it does
 AIMS = {

@@ -70,14 +70,10 @@ class Robustness(Drawable, Tabled):
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
-        return {
-            "name": self.spec.name,
-            "errors": ", ".join(
-                f"{name} {100.0 * values[0]:+.3g} to {100.0 * values[-1]:+.3g} %"
-                for name, values in self.errors.items()
-            ),
-            **{method: f"{1e3 * self.end_load(method).max():.4g} mm at worst" for method in self.residual},
-        }
+        ends = {name: (100.0 * values[0], 100.0 * values[-1]) for name, values in self.errors.items()}
+        errors = ", ".join(f"{name} {low:+.3g} to {high:+.3g} %" for name, (low, high) in ends.items())
+        worst = {method: f"{1e3 * self.end_load(method).max():.4g} mm at worst" for method in self.residual}
+        return {"name": self.spec.name, "errors": errors, **worst}
 
     @property
     def limits(self) -> Array:
@@ -219,10 +215,7 @@ def robustness(
 
 
 def error_grid(
-    spec: Spec,
-    parameters: Sequence[str] = (),
-    points: int | None = None,
-    half_range: float | None = None,
+    spec: Spec, parameters: Sequence[str] = (), points: int | None = None, half_range: float | None = None
 ) -> dict[str, Array]:
     """Choose the relative errors of one or two parameters; an odd number of them, 0 in their middle.
 

@@ -42,9 +42,8 @@ TIMES: Array = 0.5 * (_POINTS + 1.0)  # of the nodes, in steps
 _TO_COEFFICIENTS = np.linalg.inv(legendre.legvander(_POINTS, NODES - 1))
 _ONCE = _integrals(NODES) @ _TO_COEFFICIENTS  # accelerations → coefficients of the velocity
 _TWICE = _integrals(NODES + 1) @ _ONCE  # accelerations → coefficients of the position
-_VELOCITY = np.asarray(
-    legendre.legvander(_POINTS, NODES) @ _ONCE, dtype=np.float64
-)  # accelerations → velocities at the nodes
+# accelerations → velocities at the nodes
+_VELOCITY = np.asarray(legendre.legvander(_POINTS, NODES) @ _ONCE, dtype=np.float64)
 _POSITION: Array = legendre.legvander(_POINTS, NODES + 1) @ _TWICE
 _ENDS: Array = np.stack([_TWICE.sum(axis=0), _ONCE.sum(axis=0)])  # accelerations → position, velocity at 1
 
@@ -145,9 +144,8 @@ def integrate(
         if accepted:
             pieces += accepted
             knots += [end for _, end in tried[: len(accepted)]]
-            state = np.array(
-                [coefficients.sum(axis=0) for coefficients in accepted[-1]]
-            )  # Legendre's end at 1
+            # Legendre's end at 1
+            state = np.array([coefficients.sum(axis=0) for coefficients in accepted[-1]])
         elif end - begin < shortest:
             raise CosimulationError(f"The {what} cannot be integrated beyond {begin:.4g} s.")
         width = min(2 * len(fine) + 1, widest)

@@ -62,20 +62,15 @@ def place_unit(spec: Spec, column: int) -> tuple[str, float]:
 
 def move(spec: Spec) -> str:
     """Say what moves, how far, and in what time."""
-    axes = spec.machine().actuated
-    distances = " and ".join(
-        f"{axis.name} {number(factor * distance)} {unit}"
-        for axis, distance, (unit, factor) in zip(
-            axes, spec.move.distance, (place_unit(spec, column) for column in range(len(axes))), strict=True
-        )
-    )
-    return f"{distances} in {number(spec.move.duration)} s"
+    axes, words = spec.machine().actuated, list[str]()
+    for column, (axis, distance) in enumerate(zip(axes, spec.move.distance, strict=True)):
+        unit, factor = place_unit(spec, column)
+        words.append(f"{axis.name} {number(factor * distance)} {unit}")
+    return f"{' and '.join(words)} in {number(spec.move.duration)} s"
 
 
 def uncertain(spec: Spec) -> str:
     """Say which parameters may be off, and by how much."""
     ranges = spec.robustness.uncertain
-    return (
-        ", ".join(f"{name} ±{number(100.0 * fraction)} %" for name, fraction in ranges.items())
-        or "none stated"
-    )
+    stated = ", ".join(f"{name} ±{number(100.0 * fraction)} %" for name, fraction in ranges.items())
+    return stated or "none stated"

@@ -237,12 +237,7 @@ def driven_swing(
 
 
 def swing_from(
-    plant: Plant,
-    machines: Array,
-    *,
-    motion: Callable[[Array], Array],
-    start: Array,
-    times: Array,
+    plant: Plant, machines: Array, *, motion: Callable[[Array], Array], start: Array, times: Array
 ) -> Array:
     """Let machines swing from given states while their axes move.
 

@@ -62,10 +62,8 @@ class Identification(Drawable):
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
-        return {
-            "name": self.spec.name,
-            **{name: f"{value:.6g}" for name, value in self.estimate.values.items()},
-        }
+        values = {name: f"{value:.6g}" for name, value in self.estimate.values.items()}
+        return {"name": self.spec.name, **values}
 
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong with the measurements, though parameters were found; a sentence each."""

@@ -178,11 +178,7 @@ def play(
     lines, promise = ["time_s," + ",".join(columns)], block.outputs.index("nPromise")
     shown: dict[int, None] = {}  # as an ordered set
     issued = list(_issued(block, commands, cycle, log))
-    events = (
-        [f"{e.time:.9g},{e.code},{e.value!r}" for e in events_of(block.outputs, np.concatenate(issued))]
-        if with_events
-        else []
-    )
+    events = events_of(block.outputs, np.concatenate(issued)) if with_events else ()
     for number, row in enumerate(chain.from_iterable(issued)):
         cells = (
             str(int(row[places[name]])) if output.startswith(WHOLE) else repr(float(row[places[name]]))
@@ -196,7 +192,7 @@ def play(
         cycles=len(lines) - 1,
         errors=errors,
         unpromised=int(row[promise]),
-        events="\n".join([",".join(COLUMNS), *events]) + "\n",
+        events="\n".join([",".join(COLUMNS), *(f"{e.time:.9g},{e.code},{e.value!r}" for e in events), ""]),
     )
 
 

@@ -27,11 +27,7 @@ from gen_profile.planner.sensor import between, damping_room, sensor_constants
 from gen_profile.spec.model import Spec
 from gen_profile.units import RATES
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
-from gen_profile_exporters.planner.block import (
-    SLOTS_PER_PERIOD,
-    PlannerConstants,
-    block_text,
-)
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, block_text
 
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.bounded_file import read_bounded
-from gen_profile.errors import ExportError, OutputError, SpecError
+from gen_profile.artefacts.reading import decoded, read_artefact
+from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.can import CanSpec
@@ -23,7 +23,7 @@ from gen_profile_exporters.planner.parameters import buffered_planner, constant_
 from gen_profile_exporters.playback.buffers import TABLE, is_buffered
 from gen_profile_exporters.registry import container_of, containers, find_container, format_named
 
-PORTABLE = "plc"
+PORTABLE, WHAT = "plc", "the block "
 PROGRAMS = {"c": c_files, "linux": linux_files, "openplc": openplc_files}
 _PLANNER, _WRAPPER = (
     re.compile(rf"^\s*FUNCTION_BLOCK\s+\w+_planner{end}\s*$", re.MULTILINE | re.IGNORECASE)
@@ -136,10 +136,7 @@ def read_block(path: Path) -> str:
     ExportError
         It holds no planner block, or is a program.
     """
-    try:
-        content = read_bounded(path)
-    except OSError as error:
-        raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
+    content = read_artefact(path, what=WHAT)
     refuse_program(path)
     text = block_in(path, content)
     if not is_planner(text):
@@ -165,13 +162,6 @@ def _text_in(path: Path, content: bytes) -> str:
     except SpecError:
         format_ = PORTABLE
     if format_ == PORTABLE:
-        return _decoded(path, content)
+        return decoded(content, path, WHAT)
     target = Target(name=path.stem, axes=(), start=(), export=ExportSpec(), can=CanSpec())
     return find_container(format_).unwrap(content, target).text()
-
-
-def _decoded(path: Path, content: bytes) -> str:
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise OutputError(f"Cannot read the block {path}: it is no UTF-8 text.") from error

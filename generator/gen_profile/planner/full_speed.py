@@ -51,9 +51,8 @@ def _sentences(spec: Spec, period: float) -> Iterator[str]:
     travel = {limits.place(number, "travel"): (-ROOM, ROOM) for number in axes}
     planner = Planner(spec.changed(travel))
     corners = [dict(zip(live, ends, strict=True)) for ends in product(*live.values())]
-    reached = [
-        _reached(planner, [limits.of(number) for number in axes], corner, period) for corner in corners
-    ]
+    own_limits = [limits.of(number) for number in axes]
+    reached = [_reached(planner, own_limits, corner, period) for corner in corners]
     for (number, axis), speeds in zip(axes.items(), np.transpose(reached), strict=True):
         own, at = limits.of(number), int(np.argmin(speeds))
         assert own.velocity and own.acceleration and own.jerk

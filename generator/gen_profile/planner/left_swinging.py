@@ -85,9 +85,8 @@ class GivenModes:
             left = left * wave[end - begin] + passed.view(np.complex128)
             over_time.append(left)
         kept = [left for left, end in zip(over_time, marks[1:], strict=True) if end in {*ends}]
-        half = (
-            0.5 * poles * cycle
-        )  # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
+        # ∫ velocity exp(p t) dt, of hats that are the acceleration's share of a cycle
+        half = 0.5 * poles * cycle
         by_mode = np.abs(np.array(kept) * cycle * (np.sinh(half) / half) ** 2 / poles)
         swings = self.gains[..., None] * by_mode.reshape(len(ends), *self.gains.shape, -1)
         return swings[..., 0].sum(axis=(1, 2)), swings.max(axis=-1).sum(axis=(1, 2))

@@ -68,27 +68,19 @@ def live_modes(spec: Spec) -> LiveModes:
     def invariants(point: Sequence[float]) -> Array:
         linear = linearized(spec, point)
         squares = linear.distinct_frequencies**2
-        return np.array(
-            [
-                *([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares),
-                *decays(linear),
-            ]
-        )
+        known = [squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares
+        return np.array([*known, *decays(linear)])
 
     def others(point: Sequence[float]) -> Array:
-        return (
-            _sway_matrix(linearized(spec, point)).ravel()
-            if spec.planner.live_rate
-            else left_by_errors(spec, point)
-        )
+        if spec.planner.live_rate:
+            return _sway_matrix(linearized(spec, point)).ravel()
+        return left_by_errors(spec, point)
 
     modes = len(linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
     exact = [linearized(spec, point).distinct_frequencies for point in between]
-    straight = [0.0] * len(live)
-    for degree, curvatures in product(
-        DEGREES if live else (0,), (_curvatures(invariants, len(live)), straight)
-    ):
+    tried = (_curvatures(invariants, len(live)), [0.0] * len(live))
+    for degree, curvatures in product(DEGREES if live else (0,), tried):
         interpolant = interpolate(invariants, curvatures, degree).without(NEGLIGIBLE)
         interpolated = [frequencies(interpolant(point)[:modes]) for point in between]
         error = float(np.abs(np.array(interpolated) / exact - 1.0).max())
@@ -253,9 +245,8 @@ def _row(spec: Spec, at: Linearization, of: str) -> Array:
 
 def frequency_errors(spec: Spec) -> Array:
     """By which share the stated errors change each mode's frequency at most, at the live ranges' corners."""
-    return np.asarray(
-        np.max([_frequency_errors(spec, point) for point in corners(spec.planner.live)], axis=0)
-    )
+    errors = [_frequency_errors(spec, point) for point in corners(spec.planner.live)]
+    return np.asarray(np.max(errors, axis=0))
 
 
 def least_decay(spec: Spec) -> float:
@@ -372,9 +363,8 @@ def _sway_matrix(linear: Linearization) -> Array:
     if gain.shape[0] != gain.shape[1]:
         raise ValueError("fewer loads than coordinates")
     whole, pushed = gain @ linear.stiffness @ np.linalg.inv(gain), gain @ linear.input
-    along = [
-        np.flatnonzero(np.abs(column - 1.0) <= SAME) for column in pushed.T if np.abs(column).max() > STILL
-    ]
+    driven = pushed.T[np.abs(pushed).max(axis=0) > STILL]
+    along = [np.flatnonzero(np.abs(column - 1.0) <= SAME) for column in driven]
     if len({len(loads) for loads in along}) > 1:
         raise ValueError("axes that push other numbers of loads")
     first = whole[np.ix_(along[0], along[0])]

@@ -83,10 +83,7 @@ def sensor_margins(spec: Spec, text: str) -> Margins | None:
         for point in product(np.linspace(-1.0, 1.0, POINTS).tolist(), repeat=len(spec.planner.live))
         for one in sensed_directions(spec).values()
     ]
-    return Margins(
-        delay=min(one.delay for one in found),
-        gain=min(one.gain for one in found),
-    )
+    return Margins(delay=min(one.delay for one in found), gain=min(one.gain for one in found))
 
 
 def _margins(open_loop: Complex, slowest: float) -> Margins:
@@ -97,8 +94,7 @@ def _margins(open_loop: Complex, slowest: float) -> Margins:
     real = np.flatnonzero((open_loop.imag[1:] * open_loop.imag[:-1] <= 0.0) & (open_loop.real[1:] < 0.0))
     gains = 1.0 / size[real]
     return Margins(
-        delay=float(late[crosses].min(initial=np.inf)),
-        gain=float(gains[gains >= 1.0].min(initial=np.inf)),
+        delay=float(late[crosses].min(initial=np.inf)), gain=float(gains[gains >= 1.0].min(initial=np.inf))
     )
 
 

@@ -144,16 +144,14 @@ def _constants(
     acceleration = max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
     allowed = min(spec.check.residual_sway.values())
     disturbed = max(_disturbed(sensor, disturbance, one) for one in sensed)
-    own, own_slope = (
-        max(
-            2.0
-            * acceleration
-            * float(np.abs(one.shown * one.push) @ one.frequencies ** (int(rate) + order - 2.0))
-            for one in sensed
-        )
-        for order in (0, 1)
-    )
-    slope = own_slope + disturbed * max(float(one.frequencies[0]) for one in sensed)
+
+    def own(order: int) -> float:
+        """Tell what the axes' own accelerations make the sensor show, or its slope, at most."""
+        powers = (one.frequencies ** (int(rate) + order - 2.0) for one in sensed)
+        shown = (np.abs(one.shown * one.push) @ power for one, power in zip(sensed, powers, strict=True))
+        return max(2.0 * acceleration * float(each) for each in shown)
+
+    slope = own(1) + disturbed * max(float(one.frequencies[0]) for one in sensed)
     noise, swing = sensor.noise, max(one.swing for one in sensed)
     floor = max(float(_floor(sensor, one)[0]) for one in sensed)
     unit = next((one.unit for one in spec.machine().unactuated if one.name in sensor.names), "m")
@@ -170,7 +168,7 @@ def _constants(
         age=_age(sensor),
         oldest=sensor.delay[1] + sensor.drop_out,
         drop_out=sensor.drop_out,
-        most=2.0 * (disturbed + own) + 2.0 * sensor.offset + NOISES * noise,
+        most=2.0 * (disturbed + own(0)) + 2.0 * sensor.offset + NOISES * noise,
         step=UPDATE * slope + NOISES * noise,
         gate=_gate(sensor, disturbed),
         frozen=STUCK * noise,
@@ -255,10 +253,7 @@ def _filter(sensor: SensorSpec, one: SensedModes) -> tuple[Array, Array, Array]:
     push = (one.swing * slowest) ** 2 * slowest / (2.0 * np.pi)
     for mode, (frequency, decay) in enumerate(zip(one.frequencies, one.decays, strict=True)):
         state[2 * mode, 2 * mode + 1] = 1.0
-        state[2 * mode + 1, 2 * mode : 2 * mode + 2] = (
-            -(frequency**2),
-            -2.0 * max(decay, LIGHT * frequency),
-        )
+        state[2 * mode + 1, 2 * mode : 2 * mode + 2] = (-(frequency**2), -2.0 * max(decay, LIGHT * frequency))
         measured[0, 2 * mode + rate] = one.shown[mode]
         like = abs(one.shown[0]) / max(abs(one.shown[mode]), 0.05 * abs(one.shown[0]))
         spread[2 * mode + 1] = push * (FAST * like**2 if mode else 1.0)

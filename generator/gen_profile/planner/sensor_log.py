@@ -4,7 +4,6 @@ import csv
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -122,8 +121,6 @@ def read_sensor_log(text: str, axes: Sequence[BlockAxis]) -> SensorLog:
     if not readings:
         raise SpecError(f"sensor: there is no row; write one such as 0.0{',0.01' * len(axes)}.")
     times, *values = np.array(readings).T
-    if not (math.isfinite(times.sum()) and times[0] >= 0.0) or any(
-        b < a for a, b in pairwise(times.tolist())
-    ):
+    if not (math.isfinite(times.sum()) and times[0] >= 0.0 and (np.diff(times) >= 0.0).all()):
         raise SpecError("sensor: time_s must rise from 0 or later on; sort the rows.")
     return SensorLog(axes=axes, times=times, values=np.stack(values, axis=1))

@@ -27,10 +27,7 @@ def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNam
     mass = p.m1 + p.m2
     coupling = p.m2 * p.L2 * np.cos(theta2)
     return Equations(
-        M_uu=[
-            [mass * p.L1 + coupling, coupling],
-            [p.L1 * np.cos(theta2) + p.L2, p.L2],
-        ],
+        M_uu=[[mass * p.L1 + coupling, coupling], [p.L1 * np.cos(theta2) + p.L2, p.L2]],
         M_au=[[-mass * np.cos(theta1), -np.cos(theta1 + theta2)]],
         K_u=[-p.g * mass * np.sin(theta1), -p.g * np.sin(theta1 + theta2)],
         G_u=[

@@ -41,9 +41,8 @@ def independent_states(A: Array, B: Array, order: NDArray[np.intp], shares: Arra
     outside = responses.transpose(1, 0, 2).reshape(len(A), -1)[order]
     least = shares * np.linalg.norm(outside, axis=1)
     chosen = np.zeros(len(order), dtype=bool)
-    for i, row in enumerate(
-        outside
-    ):  # modified Gram-Schmidt: those behind lose what they share with the chosen
+    # modified Gram-Schmidt: those behind lose what they share with the chosen
+    for i, row in enumerate(outside):
         size = np.linalg.norm(row)
         chosen[i] = size > least[i]
         if chosen[i]:

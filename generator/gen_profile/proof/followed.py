@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from math import inf
+from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
@@ -140,6 +143,10 @@ class Followed:
         """Of the commands that it received."""
         return self.received.orders
 
+    def by_order(self, values: Sequence[Any]) -> NDArray[Any]:
+        """Repeat a value of every order for each of its cycles, (cycles, …)."""
+        return np.repeat(values, [order.end - order.begin for order in self.orders], axis=0)
+
     def room(self, axis: int, position: Array, way: Array) -> Array:
         """Tell how far an axis may go from positions, (cycles,), in the direction of ways, (cycles,)."""
         closed = [zone for zone in self.zones if zone.axis == axis and not zone.limit]
@@ -154,6 +161,48 @@ class Followed:
     def of(self, name: str) -> Array:
         """Give an output of all axes, (axes, cycles)."""
         return np.stack([self.issued[axis.of(name)] for axis in self.axes])
+
+    @cached_property
+    def position(self) -> Array:
+        """Setpoints, (axes, cycles)."""
+        return self.of("fPosition")
+
+    @cached_property
+    def velocity(self) -> Array:
+        """Of the setpoints, (axes, cycles)."""
+        return self.of("fVelocity")
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Of the setpoints, (axes, cycles)."""
+        return self.of("fAcceleration")
+
+    @cached_property
+    def stands(self) -> Flags:
+        """Whether all axes do, (cycles,)."""
+        return standing(self.velocity, self.acceleration)
+
+    @cached_property
+    def guided(self) -> Flags:
+        """Whether the block is enabled, (cycles,)."""
+        return self.by_order([order.kind != DISABLED for order in self.orders])
+
+    @cached_property
+    def goes(self) -> Flags:
+        """Whether a position is commanded, (cycles,)."""
+        return self.by_order([order.kind == POSITION for order in self.orders])
+
+    @cached_property
+    def way(self) -> Array:
+        """To that position, (axes, cycles); a stick's velocity where one is commanded, and 0 at a stop."""
+        still = (0.0,) * len(self.axes)
+        commanded: Array = self.by_order([order.values or still for order in self.orders]).T
+        return commanded - self.position * self.goes
+
+    @cached_property
+    def away(self) -> Array:
+        """Greatest distance of an axis from its position where one is commanded, (cycles,)."""
+        return np.asarray(np.abs(self.way).max(axis=0) * self.goes)
 
     def slow_parts(self, axis: int, begin: float, end: float, beyond: float) -> list[tuple[float, float]]:
         """Give lengths and velocity limits of slow intervals between two places, or a little beyond."""
@@ -182,60 +231,6 @@ class Followed:
     def after(self, seconds: float) -> int:
         """Cycles that so much time takes at most."""
         return int(np.ceil(seconds / self.cycle - 1e-6))
-
-
-@attrs.frozen(kw_only=True)
-class IssuedMotion:
-    """Setpoints, and what was commanded in each cycle.
-
-    Attributes
-    ----------
-    position, velocity, acceleration : (axes, cycles) array
-    stands : (cycles,) array of bool
-        Whether all axes do.
-    guided : (cycles,) array of bool
-        Whether the block is enabled.
-    goes : (cycles,) array of bool
-        Whether a position is commanded.
-    way : (axes, cycles) array
-        To that position; the stick's velocity where one is commanded, and 0 at a stop or hold.
-    away : (cycles,) array
-        Greatest distance of an axis from its position where one is commanded.
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    stands: Flags
-    guided: Flags
-    goes: Flags
-    way: Array
-    away: Array
-
-    @classmethod
-    def of(cls, followed: Followed) -> IssuedMotion:
-        """Take them from what was issued."""
-        position, velocity, acceleration = (
-            followed.of(f"f{name}") for name in ("Position", "Velocity", "Acceleration")
-        )
-        still = (0.0,) * len(followed.axes)
-        lengths = [order.end - order.begin for order in followed.orders]
-        guided, goes = (
-            np.repeat([(order.kind == kind) == is_it for order in followed.orders], lengths)
-            for kind, is_it in ((DISABLED, False), (POSITION, True))
-        )
-        commanded = np.repeat([order.values or still for order in followed.orders], lengths, axis=0).T
-        way = commanded - position * goes
-        return cls(
-            position=position,
-            velocity=velocity,
-            acceleration=acceleration,
-            stands=~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0),
-            guided=guided,
-            goes=goes,
-            way=way,
-            away=np.abs(way).max(axis=0) * goes,
-        )
 
 
 @attrs.frozen
@@ -267,6 +262,11 @@ def greatest(what: str, needed: Array, allowed: float, begin: int = 0) -> Iterat
     most = needed if needed.ndim == 1 else needed.max(axis=0)
     at = int(np.argmax(most))
     yield Allowance(what, begin + at, float(most[at]), allowed)
+
+
+def standing(velocity: Array, acceleration: Array) -> Flags:
+    """Tell when all axes stand, (cycles,), by their velocities and accelerations, each (axes, cycles)."""
+    return np.asarray(~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0))
 
 
 def runs_of(flags: Flags) -> list[tuple[int, int]]:

@@ -6,7 +6,7 @@ hypercube, corners are choices of 0 and 1, and a search moves through the same c
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import accumulate, islice, pairwise, product
+from itertools import accumulate, chain, islice, pairwise, product
 from math import ceil, inf, isfinite
 from typing import Any, Self
 
@@ -203,18 +203,11 @@ class Histories:
 
     def slowest(self, history: History) -> float:
         """Find the longest period in s of the machine that a block is given in a history."""
-        live = dict(history.live)
+        live, plant = dict(history.live), self.spec.machine()
         ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
-        ends = [live] + [
-            live | {name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes
-        ]
-        plant = self.spec.machine()
-        return float(
-            max(
-                2.0 * np.pi / linearize(plant, *_machine(self.spec, live_values, {})).frequencies.min()
-                for live_values in ends
-            )
-        )
+        hoisted_to = [{name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes]
+        machines = [_machine(self.spec, live | ends, {}) for ends in ({}, *hoisted_to)]
+        return 2.0 * np.pi / float(min(linearize(plant, *one).frequencies.min() for one in machines))
 
     @property
     def hoisted_names(self) -> tuple[str, ...]:
@@ -232,26 +225,21 @@ class Histories:
         return len(self.spec.planner.live) + len(self.uncertain)
 
     @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of choices of a history, in their order.
+
+        Where it starts; the box; when first, how and how often it is commanded; how it ends; then all
+        commands, all legs, and what a sensor meets.
+        """
+        axes, planner = len(self.axes), self.spec.planner
+        commands = MOST_COMMANDS * (_PER_COMMAND + axes + 1 + _PER_HABIT)
+        legs = LEGS * _PER_LEG * len(planner.live_rate)
+        return axes, self.box, 3, axes, commands, legs, CHOICES * (planner.sensor is not None)
+
+    @property
     def choices(self) -> int:
         """Number of choices of a history."""
-        return self._first_sensed + (CHOICES if self.spec.planner.sensor is not None else 0)
-
-    @property
-    def _first_sensed(self) -> int:
-        return self._first_leg + LEGS * _PER_LEG * len(self.spec.planner.live_rate)
-
-    @property
-    def _per_command(self) -> int:
-        return _PER_COMMAND + len(self.axes) + 1 + _PER_HABIT
-
-    @property
-    def _first_command(self) -> int:
-        """Number of choices before: where it starts, the box, when and how it is commanded, and its end."""
-        return len(self.axes) + self.box + 3 + len(self.axes)
-
-    @property
-    def _first_leg(self) -> int:
-        return self._first_command + self._per_command * MOST_COMMANDS
+        return sum(self.sizes)
 
     @property
     def _ends(self) -> int:
@@ -277,11 +265,9 @@ class Histories:
         every = 2 ** min(self._ends, 62)
         numbers = np.arange(every) if every == corners else random.integers(every, size=corners)
         ends = (numbers[:, None] >> np.arange(self._ends)) & 1
-        first = len(self.axes)
-        drawn[:corners, first : first + self.box] = ends[:, : self.box]
-        for number, end in enumerate(ends[:, self.box :].T):
-            first = self._first_leg + number * LEGS * _PER_LEG
-            drawn[:corners, first : first + LEGS * _PER_LEG : _PER_LEG] = end[:, None]
+        _, box, *_, legs, _ = np.split(drawn[:corners], np.cumsum(self.sizes)[:-1], axis=1)
+        box[:] = ends[:, : self.box]
+        legs[:, ::_PER_LEG] = np.repeat(ends[:, self.box :], LEGS, axis=1)
         return drawn
 
     def corners(self, count: int) -> int:
@@ -295,7 +281,7 @@ class Histories:
         One that `lasts` so many seconds goes on in a rhythm, or by other choices each time for a `SHIFT`.
         """
         axes, live, uncertain = len(self.axes), self.spec.planner.live, self.uncertain
-        parts = np.split(choices[: self._first_command], np.cumsum([axes, self.box, 3]))
+        *parts, rows, legs, sensor = np.split(choices, np.cumsum(self.sizes)[:-1])
         starts, box, (first, manner, amount), ending = (part.tolist() for part in parts)
         live_values = {
             name: _between(ends, fraction) for (name, ends), fraction in zip(live.items(), box, strict=False)
@@ -310,8 +296,7 @@ class Histories:
             assert travel is not None
             beyond = max(start - 1.0 + OUTSIDE, 0.0) - max(OUTSIDE - start, 0.0)
             places[number] = _between(travel, _widened(start)) + beyond * (travel[1] - travel[0])
-        rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
-        sensor = choices[self._first_sensed :].tolist()
+        rows = rows.reshape(MOST_COMMANDS, -1)
         is_sensed = not lasts and sensed(self.spec, sensor)
         swings = not lasts and manner * len(MANNERS) % 1.0 < ROUGH_SHARE
         rough = swings * (BRAKING if is_sensed else len(ROUGH))
@@ -320,23 +305,19 @@ class Histories:
         else:
             rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
             manners = [*self._manners(rows, first, manner, ending, rough=rough, lasts=lasts)]
-        commands = tuple(command for one in manners for command in one.commands)
+        commands = tuple(chain(*(one.commands for one in manners)))
+        found = None
+        if is_sensed:
+            found = SensedHistory.of(self.spec, sensor.tolist(), commands[-1].time, (parameters, places))
         return History(
             live=live_values,
             parameters=parameters,
             places=tuple(places),
             commands=commands,
             axes=self.axes,
-            hoisting=self._hoisting(
-                choices[self._first_leg : self._first_sensed], live_values, commands[-1].time
-            ),
-            changes=(
-                *self._zones(starts, first, amount),
-                *(change for one in manners for change in one.changes),
-            ),
-            sensed=SensedHistory.of(self.spec, sensor, commands[-1].time, (parameters, places))
-            if is_sensed
-            else None,
+            hoisting=self._hoisting(legs, live_values, commands[-1].time),
+            changes=(*self._zones(starts, first, amount), *chain(*(one.changes for one in manners))),
+            sensed=found,
         )
 
     def _hoisting(

@@ -24,7 +24,6 @@ from gen_profile.proof.followed import (
     WAY,
     Allowance,
     Followed,
-    IssuedMotion,
     arriving,
     calmed,
     greatest,
@@ -99,254 +98,224 @@ def faults(measurements: Iterable[Allowance], cycle: float) -> Iterator[str]:
         yield f"{words}, at {met.cycle * cycle:.2f} s"
 
 
-def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
+def measured(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
     """Measure all that is judged.
 
     Parameters
     ----------
-    followed : Followed
+    run : Followed
     reactions : mapping of int to int or None
         Of some orders' beginnings, how many cycles later the first setpoint came that would not have come
         without the order; None for none at all.
     """
-    motion = IssuedMotion.of(followed)
-    for judge in (
-        _arrivals,
-        _directions,
-        _velocity_limits,
-        _sticks,
-        _quick_stops,
-        statements.truths,
-        statements.velocities,
-        statements.stops,
-        statements.numbers,
-        statements.promises,
-        statements.remains,
-        statements.events,
-        statements.blocked,
-        statements.slowed,
-        statements.taken_over,
-    ):
-        yield from judge(followed, motion)
-    yield from _reactions(followed, motion, reactions)
+    own = (_arrivals, _directions, _velocity_limits, _sticks, _quick_stops)
+    for judge in (*own, *statements.JUDGES):
+        yield from judge(run)
+    yield from _reactions(run, reactions)
 
 
-def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def _arrivals(run: Followed) -> Iterator[Allowance]:
     """Judge targets, velocities and stops at their latest times, of the orders that hold so long."""
-    for order in followed.orders:
+    for order in run.orders:
         begin, end = order.begin, order.end
-        if (end - begin) * followed.cycle < FROM_REST * followed.period or followed.gives_up(end):
+        if (end - begin) * run.cycle < FROM_REST * run.period or run.gives_up(end):
             continue  # it was replaced before, or that is a fault of its own
-        place, before = motion.position[:, begin], motion.velocity[:, begin]
+        place, before = run.position[:, begin], run.velocity[:, begin]
         own, since = slice(begin, end), begin
         match order.kind:
             case "position":
                 if not min(order.tops) > 0.0:
                     continue
-                allowed = arriving(followed, place, before, order)
-                there = (motion.away[own] <= EXACT) & motion.stands[own]
+                allowed = arriving(run, place, before, order)
+                there = (run.away[own] <= EXACT) & run.stands[own]
             case "velocity":
-                tops = [(1.0 - followed.reserve) * top for top in order.tops]
+                tops = [(1.0 - run.reserve) * top for top in order.tops]
                 wanted = [min(max(w, -top), top) for w, top in zip(order.values, tops, strict=True)]
-                allowed = reaching(followed, before, wanted)
-                reached = [_reached(followed, motion, k, w, own) for k, w in enumerate(wanted)]
+                allowed = reaching(run, before, wanted)
+                reached = [_reached(run, k, w, own) for k, w in enumerate(wanted)]
                 first, since = max(reached, key=lambda one: one[0] - one[1])
                 there = np.arange(begin, end) >= first
             case "stop":
-                allowed = slowing(followed, before, TO_STOP)
-                there = motion.stands[own] | _damped_at_rest(followed, motion)[own]
+                allowed = slowing(run, before, TO_STOP)
+                there = run.stands[own] | _damped_at_rest(run)[own]
             case _:
                 continue
-        latest = since + followed.after(allowed)
+        latest = since + run.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
         if order.kind == POSITION:  # it counts from when the way was last damped
-            until = min(first, latest + followed.after(followed.settle))
-            since += int(np.flatnonzero(followed.sensed("bDamping")[begin:until]).max(initial=0))
-        lasts = (first - since) * followed.cycle
+            until = min(first, latest + run.after(run.settle))
+            since += int(np.flatnonzero(run.sensed("bDamping")[begin:until]).max(initial=0))
+        lasts = (first - since) * run.cycle
         if first < end or end > latest:
             yield Allowance(order.kind, begin, lasts, allowed)
         if first == end:
             continue
-        yield from _lateness(followed, order, lasts - allowed, before)
+        yield from _lateness(run, order, lasts - allowed, before)
         if order.kind == POSITION:
-            yield from _left(followed, motion, (first, end), allowed)
+            yield from _left(run, (first, end), allowed)
 
 
-def _damped_at_rest(followed: Followed, motion: IssuedMotion) -> Flags:
+def _damped_at_rest(run: Followed) -> Flags:
     """Tell when a load is damped since its axes stood."""
-    at_rest = np.zeros(followed.cycles, dtype=bool)
-    for begin, end in runs_of(followed.sensed("bDamping")):
-        at_rest[begin:end] = motion.stands[max(0, begin - 1)]
+    at_rest = np.zeros(run.cycles, dtype=bool)
+    for begin, end in runs_of(run.sensed("bDamping")):
+        at_rest[begin:end] = run.stands[max(0, begin - 1)]
     return at_rest
 
 
-def _lateness(followed: Followed, order: TimedOrder, late: float, before: Array) -> Iterator[Allowance]:
+def _lateness(run: Followed, order: TimedOrder, late: float, before: Array) -> Iterator[Allowance]:
     """Measure by how many periods more than its limits take a command is carried out."""
     kind = WAY if order.kind == POSITION and before.any() else order.kind
-    if followed.reserve or (kind == STOP and not before.any()):
+    if run.reserve or (kind == STOP and not before.any()):
         return
-    late += followed.reaction * (kind == POSITION)
+    late += run.reaction * (kind == POSITION)
     allowed = {POSITION: FROM_REST, WAY: ON_WAY, VELOCITY: TO_STICK, STOP: TO_STOP}[kind]
-    yield Allowance(LATER[kind], order.begin, late / followed.period + allowed, inf)
+    yield Allowance(LATER[kind], order.begin, late / run.period + allowed, inf)
 
 
-def _left(
-    followed: Followed, motion: IssuedMotion, cycles: tuple[int, int], arriving_again: float
-) -> Iterator[Allowance]:
+def _left(run: Followed, cycles: tuple[int, int], arriving_again: float) -> Iterator[Allowance]:
     """Judge that a target is left but to damp what was measured, and then reached again."""
     first, last = cycles
-    damps, away = followed.sensed("bDamping"), motion.away[first:last]
-    for begin, end in runs_of(away > max(EXACT, followed.wander)):
+    damps, away = run.sensed("bDamping"), run.away[first:last]
+    for begin, end in runs_of(away > max(EXACT, run.wander)):
         damped = np.flatnonzero(damps[first + begin : first + end])
         if damped.size and damped[0] <= 1:
-            returns = (end - begin - int(damped[-1])) * followed.cycle
+            returns = (end - begin - int(damped[-1])) * run.cycle
             yield Allowance(POSITION, first + begin, returns, arriving_again)
         else:
             yield Allowance("left", first + begin, float(away[begin:end].max()), EXACT)
 
 
-def _reached(
-    followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice
-) -> tuple[int, int]:
+def _reached(run: Followed, axis: int, wanted: float, own: slice) -> tuple[int, int]:
     """Tell from when an axis has a velocity, and until when its way's end or a slow interval hindered it."""
-    limits, speed = followed.limits[axis], abs(wanted)
-    position, velocity = motion.position[axis, own], motion.velocity[axis, own]
-    reached = np.abs(velocity - wanted) <= (IN_VELOCITY + followed.reserve) * limits.velocity
+    limits, speed = run.limits[axis], abs(wanted)
+    position, velocity = run.position[axis, own], run.velocity[axis, own]
+    reached = np.abs(velocity - wanted) <= (IN_VELOCITY + run.reserve) * limits.velocity
     first = int(np.argmax(reached)) if reached.any() else len(reached)
-    near = speed * (speed / limits.acceleration + limits.acceleration / limits.jerk + AHEAD * followed.period)
-    hindered = (speed > 0.0) & (followed.room(axis, position, np.array(wanted)) <= near)
-    for zone in followed.zones:
+    near = speed * (speed / limits.acceleration + limits.acceleration / limits.jerk + AHEAD * run.period)
+    hindered = (speed > 0.0) & (run.room(axis, position, np.array(wanted)) <= near)
+    for zone in run.zones:
         if zone.axis == axis and 0.0 < zone.limit < speed:
             hindered |= np.maximum(zone.low - position, position - zone.high) <= near
     return own.start + first, own.start + int(np.flatnonzero(hindered[:first]).max(initial=0))
 
 
-def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def _directions(run: Followed) -> Iterator[Allowance]:
     """Judge that axes go never the wrong way, nor at rest, for longer than it takes to turn round."""
-    wants, held = np.zeros((2, followed.cycles), dtype=bool)
-    for order in followed.orders:
-        held[order.begin : order.end] = order.kind == DISABLED or not min(order.tops) > 0.0
-    near = max(STILL, followed.wander)
+    wants = np.zeros(run.cycles, dtype=bool)
+    held = run.by_order([o.kind == DISABLED or not min(o.tops) > 0.0 for o in run.orders])
+    near = max(STILL, run.wander)
     for k, (velocity, position, way, limits) in enumerate(
-        zip(motion.velocity, motion.position, motion.way, followed.limits, strict=True)
+        zip(run.velocity, run.position, run.way, run.limits, strict=True)
     ):
-        slack = (EXACT + 1.5 * followed.reserve) * limits.velocity
-        room = followed.room(k, position, way)
-        there = np.where(
-            motion.goes, np.abs(way) > near, room * (way != 0.0) > 0.1 * followed.period * np.abs(way)
-        )
+        slack = (EXACT + 1.5 * run.reserve) * limits.velocity
+        room = run.room(k, position, way)
+        there = np.where(run.goes, np.abs(way) > near, room * (way != 0.0) > 0.1 * run.period * np.abs(way))
         wants |= there & ~held
         for side in (-1.0, 1.0):  # one command after the other may be of the other side, sooner than it turns
-            against = (side * way > 0.0) & (side * velocity < -slack) & (there | ~motion.goes) & ~held
+            against = (side * way > 0.0) & (side * velocity < -slack) & (there | ~run.goes) & ~held
             for begin, end in runs_of(against):
-                allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
-                yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
-    for begin, end in runs_of(wants & motion.stands):
-        allowed = followed.reaction + ENABLED + calmed(followed) * followed.period
-        if followed.gives_up(end):
+                allowed = run.reaction + slowing(run, run.velocity[:, begin], TO_TURN)
+                yield Allowance("against", begin, (end - begin) * run.cycle, allowed)
+    for begin, end in runs_of(wants & run.stands):
+        allowed = run.reaction + ENABLED + calmed(run) * run.period
+        if run.gives_up(end):
             yield Allowance("given up", begin, 1.0, 0.0)
         else:
-            yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
+            yield Allowance("idle", begin, (end - begin) * run.cycle, allowed)
 
 
-def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def _velocity_limits(run: Followed) -> Iterator[Allowance]:
     """Judge override and velocity limit from when they must be kept."""
-    latest, before = 0, tuple(own.velocity for own in followed.limits)
-    for order in followed.orders:
+    latest, before = 0, tuple(own.velocity for own in run.limits)
+    for order in run.orders:
         lowered = any(now < then for now, then in zip(order.tops, before, strict=True))
         if lowered or (order.kind == POSITION and order.begin < latest):  # a new target is planned first
-            takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_SLOW)
-            latest = order.begin + followed.after(takes)
+            takes = run.reaction + slowing(run, run.velocity[:, order.begin], TO_SLOW)
+            latest = order.begin + run.after(takes)
         before = order.tops
         begin = max(order.begin, latest)
         if begin >= order.end or order.kind not in (POSITION, VELOCITY):
             continue
-        for k, (top, own) in enumerate(zip(order.tops, followed.limits, strict=True)):
+        for k, (top, own) in enumerate(zip(order.tops, run.limits, strict=True)):
             if top < own.velocity:
-                fastest = np.abs(motion.velocity[k, begin : order.end])
+                fastest = np.abs(run.velocity[k, begin : order.end])
                 at = int(np.argmax(fastest))
-                slack = (EXACT + 1.5 * followed.reserve) * own.velocity
+                slack = (EXACT + 1.5 * run.reserve) * own.velocity
                 yield Allowance("fast", begin + at, float(fastest[at]), top + slack)
 
 
-def _sticks(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def _sticks(run: Followed) -> Iterator[Allowance]:
     """Judge that from rest no axis is faster than its stick or goes back, and that one left alone stays."""
-    for before, order in pairwise(followed.orders):
+    for before, order in pairwise(run.orders):
         begin, end = order.begin, order.end
-        if order.kind not in (POSITION, VELOCITY) or not motion.stands[begin - 1] or followed.reserve:
+        if order.kind not in (POSITION, VELOCITY) or not run.stands[begin - 1] or run.reserve:
             continue
-        if followed.issued["fTimeToGo"][begin - 1] > 0.0:
+        if run.issued["fTimeToGo"][begin - 1] > 0.0:
             continue  # a motion has just begun
-        if before.kind == VELOCITY or followed.sensed("bDamping")[begin - 1 : end].any():
+        if before.kind == VELOCITY or run.sensed("bDamping")[begin - 1 : end].any():
             continue  # its last tap still counts, or what was measured
-        for k, way in enumerate(motion.way[:, begin].tolist()):
-            velocity = motion.velocity[k, begin:end]
+        for k, way in enumerate(run.way[:, begin].tolist()):
+            velocity = run.velocity[k, begin:end]
             if not way:
                 yield from greatest("unasked", np.abs(velocity), 0.0, begin)
             elif order.kind == VELOCITY:
-                top = abs(way) + MORE * followed.limits[k].velocity
+                top = abs(way) + MORE * run.limits[k].velocity
                 yield from greatest("beyond", velocity * np.sign(way), top, begin)
-            elif not followed.issued["bBusy"][begin - 1]:
-                back = BACK * followed.limits[k].velocity
+            elif not run.issued["bBusy"][begin - 1]:
+                back = BACK * run.limits[k].velocity
                 yield from greatest("back", -velocity * np.sign(way), back, begin)
 
 
-def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def _quick_stops(run: Followed) -> Iterator[Allowance]:
     """Judge quick stops: at once, on the straightest way."""
-    for order in followed.orders:
+    for order in run.orders:
         if order.kind != QUICK_STOP:
             continue
         begin, end = max(order.begin, 1), order.end
-        stands = motion.stands[begin:end]
+        stands = run.stands[begin:end]
         rests = begin + int(np.argmax(stands)) if stands.any() else end
-        allowed = 3.0 * followed.cycle + max(
+        before = (run.velocity[:, begin - 1].tolist(), run.acceleration[:, begin - 1].tolist())
+        braked = zip(*before, (own.quick for own in run.limits), strict=True)
+        allowed = 3.0 * run.cycle + max(
             (abs(v) + 0.5 * a * a / jerk) / deceleration + (abs(a) + deceleration) / jerk
-            for v, a, (deceleration, jerk) in zip(
-                motion.velocity[:, begin - 1].tolist(),
-                motion.acceleration[:, begin - 1].tolist(),
-                (own.quick for own in followed.limits),
-                strict=True,
-            )
+            for v, a, (deceleration, jerk) in braked
         )
-        yield Allowance(QUICK_STOP, order.begin, min(rests - begin, (end - begin)) * followed.cycle, allowed)
+        yield Allowance(QUICK_STOP, order.begin, min(rests - begin, (end - begin)) * run.cycle, allowed)
         if rests == begin:
             continue
-        for x, v, own in zip(motion.position, motion.velocity, followed.limits, strict=True):
-            steps = np.diff(x[begin - 1 : rests]) - 0.5 * followed.cycle * (
+        for x, v, own in zip(run.position, run.velocity, run.limits, strict=True):
+            steps = np.diff(x[begin - 1 : rests]) - 0.5 * run.cycle * (
                 v[begin - 1 : rests - 1] + v[begin:rests]
             )
             jump = np.abs(steps)
             if len(jump):
-                allowed = own.quick[1] * followed.cycle**3
+                allowed = own.quick[1] * run.cycle**3
                 yield Allowance("jump", begin + int(np.argmax(jump)), float(jump.max()), EXACT + allowed)
 
 
-def _reactions(
-    followed: Followed, motion: IssuedMotion, reactions: Mapping[int, int | None]
-) -> Iterator[Allowance]:
+def _reactions(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
     """Judge setpoints that would not have come without the order, in time."""
-    for order in followed.orders:
+    for order in run.orders:
         if order.begin not in reactions:
             continue
-        reacted_after, until = reactions[order.begin], order.begin + followed.after(followed.reaction)
-        before = np.abs(motion.velocity[:, order.begin : until]).max(axis=1)  # what is committed goes on
-        before *= motion.velocity[:, order.begin] != 0.0
-        allowed = followed.reaction + calmed(followed) * followed.period
+        reacted_after, until = reactions[order.begin], order.begin + run.after(run.reaction)
+        before = np.abs(run.velocity[:, order.begin : until]).max(axis=1)  # what is committed goes on
+        before *= run.velocity[:, order.begin] != 0.0
+        allowed = run.reaction + calmed(run) * run.period
         if before.any():
-            allowed = followed.reaction + slowing(followed, before, RUN_OUT)
-        late = followed.after(allowed)
-        if reacted_after is None or (
-            reacted_after > late and _obeys_anyway(motion, order, order.begin + late)
-        ):
+            allowed = run.reaction + slowing(run, before, RUN_OUT)
+        late = run.after(allowed)
+        if reacted_after is None or (reacted_after > late and _obeys_anyway(run, order, order.begin + late)):
             continue  # what came before ends or goes on as the order asks
-        yield Allowance("reaction", order.begin, reacted_after * followed.cycle, allowed)
+        yield Allowance("reaction", order.begin, reacted_after * run.cycle, allowed)
 
 
-def _obeys_anyway(motion: IssuedMotion, order: TimedOrder, at: int) -> bool:
+def _obeys_anyway(run: Followed, order: TimedOrder, at: int) -> bool:
     """Whether axes go on as before, and slow down or go the right way."""
-    velocity = motion.velocity[:, at]
+    velocity = run.velocity[:, at]
     right = velocity == 0.0
     if order.kind != STOP:
-        wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
+        wanted = np.array(order.values) - (run.position[:, at] if order.kind == POSITION else 0.0)
         right = velocity * wanted >= 0.0
-    return bool((right | (velocity * motion.acceleration[:, at] < 0.0)).all())
+    return bool((right | (velocity * run.acceleration[:, at] < 0.0)).all())

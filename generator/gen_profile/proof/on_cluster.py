@@ -48,7 +48,7 @@ class ProofRecipe:
     versions: tuple[tuple[str, str], ...]
 
     @classmethod
-    def of(cls, spec: Spec, text: str, histories: Histories) -> ProofRecipe:
+    def of(cls, spec: Spec, text: str) -> ProofRecipe:
         """Pack a proof's block and machine."""
         return cls(
             spec=json.dumps(spec.to_dict()), files=tuple(spec.files().items()), text=text, versions=versions()
@@ -63,9 +63,7 @@ class ProofRecipe:
 
 
 @contextmanager
-def judged_on_cluster(
-    spec: Spec, text: str, histories: Histories, scheduler: str, progress: Progress
-) -> Iterator[Judge]:
+def judged_on_cluster(spec: Spec, text: str, scheduler: str, progress: Progress) -> Iterator[Judge]:
     """Let the workers of a Dask scheduler judge.
 
     Raises
@@ -74,7 +72,7 @@ def judged_on_cluster(
         No worker answers, or they cannot do it.
     """
     with client_of(scheduler, 0) as client:
-        recipe = client.scatter(ProofRecipe.of(spec, text, histories), broadcast=True)
+        recipe = client.scatter(ProofRecipe.of(spec, text), broadcast=True)
 
         def judge(numbering: Numbering, numbers: Sequence[int]) -> list[JudgedHistory]:
             drawn = (numbering.count, numbering.seed, numbering.parents)

@@ -152,11 +152,8 @@ def read_orders(
     facts : Facts, optional
         Of the run that these inputs led to.
     """
-    reader, timed, flags_by_cycle = (
-        _Reader(inputs, facts),
-        list[TimedOrder](),
-        list[tuple[int, bool, int, bool]](),
-    )
+    reader, timed = _Reader(inputs, facts), list[TimedOrder]()
+    flags_by_cycle = list[tuple[int, bool, int, bool]]()
     places, row, values, due = [*start_cycles, last], 0, rows.tolist(), None
     pending = sorted({*start_cycles, *(_events(start_cycles, facts) if facts else ())}, reverse=True)
     while pending and (cycle := pending.pop()) < last:

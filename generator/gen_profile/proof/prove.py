@@ -63,7 +63,7 @@ def prove(
     with ExitStack() as stack:
         judge: Judge | None = None
         if scheduler is not None:  # before anything takes its time
-            on_cluster = _on_cluster(spec, text, numbering.histories, scheduler, progress)
+            on_cluster = _on_cluster(spec, text, scheduler, progress)
             judge = stack.enter_context(on_cluster)
         loop = stack.enter_context(closed_loop(spec, text, numbering.histories, workers, progress))
         judge = judge or partial(loop.judged, progress=progress)
@@ -107,14 +107,12 @@ def closed_loop(
     return ClosedLoop(spec, text, histories, workers=workers or os.cpu_count() or 1)
 
 
-def _on_cluster(
-    spec: Spec, text: str, histories: Histories, scheduler: str, progress: Progress
-) -> AbstractContextManager[Judge]:
+def _on_cluster(spec: Spec, text: str, scheduler: str, progress: Progress) -> AbstractContextManager[Judge]:
     """Let the workers of a Dask scheduler judge."""
     require_installed("A scheduler needs Dask", "sweep", "dask", "distributed")
     from gen_profile.proof.on_cluster import judged_on_cluster  # noqa: PLC0415  # Dask is an extra
 
-    return judged_on_cluster(spec, text, histories, scheduler, progress)
+    return judged_on_cluster(spec, text, scheduler, progress)
 
 
 def _fraction(spec: Spec, judged: JudgedHistory) -> float:

@@ -245,9 +245,9 @@ class SensedHistory:
         return attrs.asdict(self)
 
 
-def sensed(spec: Spec, choices: Sequence[float]) -> bool:
+def sensed(spec: Spec, choices: Sequence[float] | Array) -> bool:
     """Whether some choices are of a history with a sensor."""
-    return spec.planner.sensor is not None and choices[0] >= NONE
+    return spec.planner.sensor is not None and bool(choices[0] >= NONE)
 
 
 def sensor_faults(

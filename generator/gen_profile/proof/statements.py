@@ -16,7 +16,6 @@ from gen_profile.proof.followed import (
     TO_STOP,
     Allowance,
     Followed,
-    IssuedMotion,
     Zone,
     greatest,
     never,
@@ -60,131 +59,125 @@ COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
 PLANNED = (32, 33, 34)  # those whose value is fTimeToGo
 
 
-def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def truths(run: Followed) -> Iterator[Allowance]:
     """Judge the outputs that are truth values, and the number of the error."""
     done, busy, aborted, error, enabled = (
-        followed.issued[name] != 0.0 for name in ("bDone", "bBusy", "bCommandAborted", "bError", "bEnabled")
+        run.issued[name] != 0.0 for name in ("bDone", "bBusy", "bCommandAborted", "bError", "bEnabled")
     )
-    received, number = followed.received, followed.issued["nErrorId"]
-    there = received.holds & motion.goes & motion.stands & (motion.away <= EXACT)
-    yield from never("disabled", enabled != motion.guided)
+    received, number = run.received, run.issued["nErrorId"]
+    there = received.holds & run.goes & run.stands & (run.away <= EXACT)
+    yield from never("disabled", enabled != run.guided)
     yield from never("error", error != (number != 0.0))
     yield from never("wrong error", number != received.error)
     yield from never("aborted", aborted != received.aborted)
-    yield from never("busy", motion.guided & ~(motion.stands | busy))
+    yield from never("busy", run.guided & ~(run.stands | busy))
     yield from never("done", done & (busy | ~there))
-    yield from never("vanished", received.holds & motion.goes & ~busy & ~done)
-    if not followed.reserve:  # calming goes on as long as it must
-        yield from _lasting(followed, "not done", there & ~done)
-        asked = received.holds & motion.goes | followed.sensed("bDamping")
-        yield from _lasting(followed, "not busy", busy & motion.stands & ~asked)
+    yield from never("vanished", received.holds & run.goes & ~busy & ~done)
+    if not run.reserve:  # calming goes on as long as it must
+        yield from _lasting(run, "not done", there & ~done)
+        asked = received.holds & run.goes | run.sensed("bDamping")
+        yield from _lasting(run, "not busy", busy & run.stands & ~asked)
 
 
-def _lasting(followed: Followed, what: str, flags: Flags) -> Iterator[Allowance]:
+def _lasting(run: Followed, what: str, flags: Flags) -> Iterator[Allowance]:
     """Measure what must not last after a motion has ended."""
     for begin, end in runs_of(flags):
-        yield Allowance(
-            what, begin, (end - begin) * followed.cycle, NOTICED * followed.period + 2.0 * followed.cycle
-        )
+        yield Allowance(what, begin, (end - begin) * run.cycle, NOTICED * run.period + 2.0 * run.cycle)
 
 
-def velocities(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def velocities(run: Followed) -> Iterator[Allowance]:
     """BInVelocity where the stick's velocity is issued, and nowhere else."""
-    shown = followed.issued["bInVelocity"] != 0.0
-    sticks = np.zeros(followed.cycles, dtype=bool)
-    for order in followed.orders:
-        sticks[order.begin : order.end] = order.kind == VELOCITY
-    apart = np.zeros(followed.cycles)
-    for velocity, wanted, limits in zip(motion.velocity, motion.way, followed.limits, strict=True):
+    shown = run.issued["bInVelocity"] != 0.0
+    sticks = run.by_order([order.kind == VELOCITY for order in run.orders])
+    apart = np.zeros(run.cycles)
+    for velocity, wanted, limits in zip(run.velocity, run.way, run.limits, strict=True):
         np.maximum(apart, np.abs(velocity - wanted) / limits.velocity, out=apart)
     yield from never("not in velocity", sticks & (apart <= BARELY) & ~shown)
     yield from never("in velocity", shown & ~(sticks & (apart <= IN_VELOCITY)))
 
 
-def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def numbers(run: Followed) -> Iterator[Allowance]:
     """Judge the outputs that are distances and times."""
-    wrong = followed.of("fDistanceToGo") - motion.way * (motion.goes & followed.received.holds)
-    yield from greatest("distance", np.abs(wrong), max(EXACT, followed.wander))
-    if followed.reserve:
+    wrong = run.of("fDistanceToGo") - run.way * (run.goes & run.received.holds)
+    yield from greatest("distance", np.abs(wrong), max(EXACT, run.wander))
+    if run.reserve:
         return  # calming goes on as long as it must
-    time, slot = followed.issued["fTimeToGo"], 2.0 * followed.cycle
-    for order in followed.orders:
-        moving = np.flatnonzero(~motion.stands[order.begin : order.end])
-        if not len(moving) or followed.sensed("bDamping")[order.begin : order.end].any():
+    time, slot = run.issued["fTimeToGo"], 2.0 * run.cycle
+    for order in run.orders:
+        moving = np.flatnonzero(~run.stands[order.begin : order.end])
+        if not len(moving) or run.sensed("bDamping")[order.begin : order.end].any():
             continue
         rests = order.begin + int(moving[-1]) + 1
-        if rests + 1 >= order.end or not _is_end(motion, order, rests):  # another may begin in that cycle
+        if rests + 1 >= order.end or not _is_end(run, order, rests):  # another may begin in that cycle
             continue
-        takes = followed.reaction + TAKES_OVER * followed.period
-        planned = order.begin + followed.after(takes)  # before, it tells of the former motion
-        first = min(rests, max(planned, rests - followed.after(0.5 * followed.period)))
-        error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * followed.cycle)
+        takes = run.reaction + TAKES_OVER * run.period
+        planned = order.begin + run.after(takes)  # before, it tells of the former motion
+        first = min(rests, max(planned, rests - run.after(0.5 * run.period)))
+        error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * run.cycle)
         yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
-        begun = order.begin + followed.after(followed.reaction + followed.period)
-        if begun < rests and followed.slowest == inf:
-            left = (rests - np.arange(begun, rests)) * followed.cycle
+        begun = order.begin + run.after(run.reaction + run.period)
+        if begun < rests and run.slowest == inf:
+            left = (rests - np.arange(begun, rests)) * run.cycle
             over = time[begun:rests] - left
-            if not _waits(followed, order):
+            if not _waits(run, order):
                 over = np.abs(over)
             over -= ROUGHLY * left
-            yield Allowance("time", begun + int(np.argmax(over)), float(over.max()), followed.period)
+            yield Allowance("time", begun + int(np.argmax(over)), float(over.max()), run.period)
         after = np.abs(time[rests + 1 : order.end])
         yield Allowance("time", rests + 1, float(after.max(initial=0.0)), EXACT)
 
 
-def _waits(followed: Followed, order: TimedOrder) -> bool:
+def _waits(run: Followed, order: TimedOrder) -> bool:
     """Whether so much may be left by errors that plans wait until it swings otherwise, or are slower."""
-    left = followed.issued.get("fSwayLeft", np.zeros(1))
-    return bool(left[order.begin : order.end].max(initial=0.0) > USED_UP * followed.sway_limit)
+    left = run.issued.get("fSwayLeft", np.zeros(1))
+    return bool(left[order.begin : order.end].max(initial=0.0) > USED_UP * run.sway_limit)
 
 
-def _is_end(motion: IssuedMotion, order: TimedOrder, at: int) -> bool:
+def _is_end(run: Followed, order: TimedOrder, at: int) -> bool:
     """Whether an axis that stands has nowhere else to go."""
     if order.kind == POSITION:
-        return bool(np.abs(motion.position[:, at] - order.values).max() <= EXACT)
+        return bool(np.abs(run.position[:, at] - order.values).max() <= EXACT)
     return not any(order.values)
 
 
-def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def promises(run: Followed) -> Iterator[Allowance]:
     """Judge the promise, and why it is dropped."""
-    promise, why = followed.issued["bPromise"] != 0.0, followed.issued["nPromise"]
+    promise, why = run.issued["bPromise"] != 0.0, run.issued["nPromise"]
     yield from never("promise", promise != (why == 0.0))
-    yield from never("lost", (why == 4.0) != ~motion.guided)
-    ready, after = np.ones(followed.cycles, dtype=bool), followed.after(ENABLED + followed.reaction)
-    for begin in followed.enabled:
+    yield from never("lost", (why == 4.0) != ~run.guided)
+    ready, after = np.ones(run.cycles, dtype=bool), run.after(ENABLED + run.reaction)
+    for begin in run.enabled:
         ready[begin : begin + after] = False
     yield from never("lost", (why == 3.0) & ready)
-    stated = followed.issued.get("fSwayLeft", np.zeros(followed.cycles))
-    yield from never("lost", (why == ADDED_UP) & (stated <= followed.sway_limit))
-    yield from never("kept", promise & ((stated > followed.sway_limit) | followed.sensed("bDamping")))
-    may_be, must_be = _unknown(followed, motion)
+    stated = run.issued.get("fSwayLeft", np.zeros(run.cycles))
+    yield from never("lost", (why == ADDED_UP) & (stated <= run.sway_limit))
+    yield from never("kept", promise & ((stated > run.sway_limit) | run.sensed("bDamping")))
+    may_be, must_be = _unknown(run)
     yield from never("lost", (why == 2.0) & ~may_be)
     yield from never("kept", promise & must_be)
-    drifted = np.cumsum(followed.drifts) > 0
+    drifted = np.cumsum(run.drifts) > 0
     yield from never("lost", (why == 1.0) & ~drifted)
-    for begin, known in followed.live_changes:
-        ends = [*followed.rest_reports, *followed.enabled[1:], followed.cycles]
+    for begin, known in run.live_changes:
+        ends = [*run.rest_reports, *run.enabled[1:], run.cycles]
         until = min(end for end in ends if end >= begin)
-        if begin and known < until and (motion.guided & ~motion.stands)[begin - 1 : known].all():
+        if begin and known < until and (run.guided & ~run.stands)[begin - 1 : known].all():
             yield from never("kept", promise[known:until])
 
 
-def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def events(run: Followed) -> Iterator[Allowance]:
     """Judge the events that are kept by the other outputs: each in its cycle, and no others."""
-    issued = followed.issued
+    issued = run.issued
     if "nEvents" not in issued:
         return
-    found, expected = Counter[tuple[int, int]](), Counter(_shown(followed))
-    given = {order.begin: order.values[0] for order in followed.orders if order.values}
+    found, expected = Counter[tuple[int, int]](), Counter(_shown(run))
+    given = {order.begin: order.values[0] for order in run.orders if order.values}
     for cycle in np.flatnonzero(np.diff(issued["nEvents"], prepend=0.0)).tolist():
         count = int(issued["nEvents"][cycle])
         for k in range(int(issued["nEvents"][cycle - 1]) if cycle else 0, count):
             time, code, value = (
                 float(issued[f"aEvent{of}[{k % KEPT}]"][cycle]) for of in ("Time", "Code", "Value")
             )
-            yield Allowance(
-                "event", cycle, abs(time - (cycle + 1) * followed.cycle), 1e-6 * followed.cycle * cycle
-            )
+            yield Allowance("event", cycle, abs(time - (cycle + 1) * run.cycle), 1e-6 * run.cycle * cycle)
             if code in PLANNED:
                 yield Allowance("event", cycle, abs(value - issued["fTimeToGo"][cycle]), EXACT)
             if code in COMMANDED and cycle in given:
@@ -195,98 +188,95 @@ def events(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         yield Allowance("event", cycle, 1.0, 0.0)
 
 
-def _shown(followed: Followed) -> Iterator[tuple[int, int]]:
+def _shown(run: Followed) -> Iterator[tuple[int, int]]:
     """Give cycles and codes of the events that other outputs and the commands tell of."""
     for name, first, code in (("nErrorId", 0.0, 50), ("nPromise", 4.0, 60), ("bEnabled", 0.0, 0)):
-        values = followed.issued[name]
+        values = run.issued[name]
         for cycle in np.flatnonzero(np.diff(values, prepend=first)).tolist():
             if code or not values[cycle]:
                 yield cycle, int(values[cycle]) + code if code else 10
-    done = followed.issued["bDone"]
+    done = run.issued["bDone"]
     yield from ((cycle, 70) for cycle in np.flatnonzero(np.diff(done, prepend=0.0) > 0.0).tolist())
     before, target = 20, 0.0
-    for order in followed.orders:
+    for order in run.orders:
         code = {POSITION: 21, VELOCITY: 22}.get(order.kind, 20)
         if code != before or (code == 21 and order.values[0] != target):
             yield order.begin, code
         before, target = code, order.values[0] if code == 21 else target
 
 
-def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
+def _unknown(run: Followed) -> tuple[Flags, Flags]:
     """Tell when it may, and when it must be unknown how the load swings."""
-    may_be, must_be = np.zeros((2, followed.cycles), dtype=bool)
-    used = [followed.sensed(axis.of("bSensorUsed")) for axis in followed.axes]
-    sees = np.all(used, axis=0) & motion.stands
-    for order in followed.orders:
-        moving, at = not motion.stands[max(0, order.begin - 1)], order.begin
+    may_be, must_be = np.zeros((2, run.cycles), dtype=bool)
+    used = [run.sensed(axis.of("bSensorUsed")) for axis in run.axes]
+    sees = np.all(used, axis=0) & run.stands
+    for order in run.orders:
+        moving, at = not run.stands[max(0, order.begin - 1)], order.begin
         if order.kind == DISABLED:
             at = order.end
-            moving |= bool(motion.velocity[:, at - 1 : at].any())
-            moved = followed.moved(order.begin, at) > 0.0
-            begun = bool(followed.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
-            refused = bool((followed.issued["nErrorId"][: order.begin] == NO_MOTION).any())
+            moving |= bool(run.velocity[:, at - 1 : at].any())
+            moved = run.moved(order.begin, at) > 0.0
+            begun = bool(run.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
+            refused = bool((run.issued["nErrorId"][: order.begin] == NO_MOTION).any())
             may_be[at:] |= moving or moved or begun or refused
-            must_be[at:] |= (moving or followed.moved(order.begin, at) > FAR_MOVED) and not followed.reserve
+            must_be[at:] |= (moving or run.moved(order.begin, at) > FAR_MOVED) and not run.reserve
         elif order.kind == QUICK_STOP:
-            may_be[at:] |= moving or bool(followed.issued["bBusy"][max(0, at - 1)])
+            may_be[at:] |= moving or bool(run.issued["bBusy"][max(0, at - 1)])
             must_be[at:] |= moving
-        later = [at for at in followed.rest_reports if order.begin <= at < order.end and motion.guided[at]]
+        later = [at for at in run.rest_reports if order.begin <= at < order.end and run.guided[at]]
         for at in later:
-            if motion.stands[at]:
+            if run.stands[at]:
                 must_be[at:] = False
-                may_be[at:] &= followed.issued["bBusy"][at - 1] != 0.0
+                may_be[at:] &= run.issued["bBusy"][at - 1] != 0.0
         if sees[order.begin : order.end].any():
             must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
-    return may_be | (np.cumsum(followed.sensed("nSensorFault")) > 0), must_be
+    return may_be | (np.cumsum(run.sensed("nSensorFault")) > 0), must_be
 
 
-def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def stops(run: Followed) -> Iterator[Allowance]:
     """Judge where a stop leads by the ends that are stated in every cycle."""
-    low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    applies, turns = motion.guided & ~_fenced(followed, motion), _turning(followed, motion)
-    up, down = (high - motion.position) * applies, (motion.position - low) * applies
-    apart = np.abs(followed.of("fStopDistance") - np.maximum(high - motion.position, motion.position - low))
+    low, high = run.of("fStopLow"), run.of("fStopHigh")
+    applies, turns = run.guided & ~_fenced(run), _turning(run)
+    up, down = (high - run.position) * applies, (run.position - low) * applies
+    apart = np.abs(run.of("fStopDistance") - np.maximum(high - run.position, run.position - low))
     yield from greatest("stop distance", apart, EXACT)
     yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
-    widest = max(limits.margin for limits in followed.limits) + EXACT
-    apart = np.maximum(high - motion.position, motion.position - low) * ~motion.guided
+    widest = max(limits.margin for limits in run.limits) + EXACT
+    apart = np.maximum(high - run.position, run.position - low) * ~run.guided
     yield from greatest("loose", apart, widest)
     targets = list[tuple[float, ...]]()
-    for order in followed.orders:
-        if order.kind in (POSITION, VELOCITY) and not followed.reserve:  # else it may be calmed beyond
-            yield from _within_travel(followed, motion, slice(order.begin, order.end))
-        begin = max(
-            0, order.begin - (order.kind in (STOP, VELOCITY))
-        )  # the ends that an interlock saw as it stopped the axis
+    for order in run.orders:
+        if order.kind in (POSITION, VELOCITY) and not run.reserve:  # else it may be calmed beyond
+            yield from _within_travel(run, slice(order.begin, order.end))
+        # the ends that an interlock saw as it stopped the axis
+        begin = max(0, order.begin - (order.kind in (STOP, VELOCITY)))
         own = slice(begin, order.end)
         if order.kind == POSITION:
             targets.append(order.values)
         let_go = order.kind == VELOCITY and not any(order.values)
         if not let_go and order.kind not in (STOP, QUICK_STOP):
             continue
-        place = motion.position[:, own]
+        place = run.position[:, own]
         lowest, highest = (
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
-        if not (
-            followed.reserve and order.begin in followed.enabled
-        ):  # what swings as it is taken over is calmed
+        if not (run.reserve and order.begin in run.enabled):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
-            calms = CALMS * max(limits.margin for limits in followed.limits)
-            yield from greatest("ends", leaves - _asked(followed, order, own), STATED + calms, begin)
+            calms = CALMS * max(limits.margin for limits in run.limits)
+            yield from greatest("ends", leaves - _asked(run, order, own), STATED + calms, begin)
         if let_go:
             continue
         if order.kind == QUICK_STOP:
-            after = begin + np.flatnonzero(motion.stands[begin:])[:1]  # it brakes on when another order comes
-            rest = motion.position[:, [*after, order.end - 1][0]][:, None]
+            after = begin + np.flatnonzero(run.stands[begin:])[:1]  # it brakes on when another order comes
+            rest = run.position[:, [*after, order.end - 1][0]][:, None]
             highest, lowest = np.maximum(highest, rest), np.minimum(lowest, rest)
             wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own]
-            margin = max(limits.margin for limits in followed.limits)
+            margin = max(limits.margin for limits in run.limits)
             yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
-        takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
-        rests = motion.stands[own] & (followed.issued["bBusy"][own] == 0.0)
-        for k, limits in enumerate(followed.limits):
+        takes = run.reaction + slowing(run, run.velocity[:, begin], TO_STOP)
+        rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
+        for k, limits in enumerate(run.limits):
             leads = known[k] + limits.velocity * takes  # a stop that is not planned yet may end there
             yield Allowance("loose", begin, max(up[k, order.begin], down[k, order.begin]), leads)
             yield from greatest(
@@ -294,12 +284,12 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             )
 
 
-def _asked(followed: Followed, order: TimedOrder, own: slice) -> Array:
+def _asked(run: Followed, order: TimedOrder, own: slice) -> Array:
     """Tell how far a stick that is let go of may lead on, by what it asked for last, (axes, cycles)."""
-    lasts = ACTS * followed.period / SLOTS_PER_PERIOD
-    since, until = (order.begin + sign * followed.after(lasts) for sign in (-1, 1))
-    asked = np.zeros((len(followed.axes), own.stop - own.start))
-    for last in followed.orders:
+    lasts = ACTS * run.period / SLOTS_PER_PERIOD
+    since, until = (order.begin + sign * run.after(lasts) for sign in (-1, 1))
+    asked = np.zeros((len(run.axes), own.stop - own.start))
+    for last in run.orders:
         if order.kind == last.kind == VELOCITY and since < last.end and last.begin < order.begin:
             speeds = np.minimum(np.abs(last.values), last.tops)
             np.maximum(asked, lasts * speeds[:, None], out=asked)
@@ -307,53 +297,53 @@ def _asked(followed: Followed, order: TimedOrder, own: slice) -> Array:
     return asked
 
 
-def _within_travel(followed: Followed, motion: IssuedMotion, own: slice) -> Iterator[Allowance]:
+def _within_travel(run: Followed, own: slice) -> Iterator[Allowance]:
     """Measure how far stated ends of a stop lie beyond the travel, and axes beyond the targets' range."""
     since = slice(max(0, own.start - 1), own.stop)
     for k, (low, high, limits) in enumerate(
-        zip(followed.of("fStopLow"), followed.of("fStopHigh"), followed.limits, strict=True)
+        zip(run.of("fStopLow"), run.of("fStopHigh"), run.limits, strict=True)
     ):
         first, last = limits.targets[0] - limits.margin, limits.targets[1] + limits.margin
-        place, beyond = motion.position[k, own], np.maximum(first - low, high - last)[since]
+        place, beyond = run.position[k, own], np.maximum(first - low, high - last)[since]
         beyond *= beyond[0] <= EXACT  # else it is on its way back from there
         yield from greatest("loose", beyond, EXACT, own.start)
         first, last = limits.targets
-        damps = followed.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
-        if first <= place[0] <= last and motion.stands[own.start - 1] and not damps:
+        damps = run.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
+        if first <= place[0] <= last and run.stands[own.start - 1] and not damps:
             beyond = np.maximum(first - place, place - last)
             yield from greatest("outside", beyond, limits.margin + EXACT, own.start)  # room to damp in
 
 
-def _turning(followed: Followed, motion: IssuedMotion) -> Array:
+def _turning(run: Followed) -> Array:
     """Tell how far axes go on that turn round where a plan takes over, (axes, cycles)."""
-    slow = np.array([[TURNING * limits.velocity] for limits in followed.limits])
-    velocity, acceleration = motion.velocity, np.abs(motion.acceleration)
-    turns = (velocity * motion.acceleration < 0.0) & (np.abs(velocity) < slow)
+    slow = np.array([[TURNING * limits.velocity] for limits in run.limits])
+    velocity, acceleration = run.velocity, np.abs(run.acceleration)
+    turns = (velocity * run.acceleration < 0.0) & (np.abs(velocity) < slow)
     way: Array = np.where(turns, velocity**2 / np.maximum(acceleration, STILL), 0.0)
     return way
 
 
-def _fenced(followed: Followed, motion: IssuedMotion) -> Flags:
+def _fenced(run: Followed) -> Flags:
     """Tell when an axis is within an interval that was blocked where it was, or beyond its travel."""
-    fenced = np.zeros(followed.cycles, dtype=bool)
-    for place, limits in zip(motion.position, followed.limits, strict=True):
+    fenced = np.zeros(run.cycles, dtype=bool)
+    for place, limits in zip(run.position, run.limits, strict=True):
         low, high = limits.targets
         fenced |= (place < low - limits.margin) | (place > high + limits.margin)
-    for zone in followed.zones:
-        own, place = slice(zone.begin, zone.end), motion.position[zone.axis, zone.begin : zone.end]
+    for zone in run.zones:
+        own, place = slice(zone.begin, zone.end), run.position[zone.axis, zone.begin : zone.end]
         fenced[own] |= (not zone.limit) & (place > zone.low) & (place < zone.high)
     return fenced
 
 
-def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def blocked(run: Followed) -> Iterator[Allowance]:
     """Judge that no axis goes into a blocked interval, nor says that a stop may lead there."""
-    low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    for zone, stopped in _in_force(followed, motion, TO_STOP):
+    low, high = run.of("fStopLow"), run.of("fStopHigh")
+    for zone, stopped in _in_force(run, TO_STOP):
         before = max(zone.begin - 1, 0)
         led = low[zone.axis, before] < zone.high and high[zone.axis, before] > zone.low
         begin = stopped if led else zone.begin
         own = slice(begin, zone.end)
-        place, guided = motion.position[zone.axis, own], motion.guided[own]
+        place, guided = run.position[zone.axis, own], run.guided[own]
         within = np.minimum(place - zone.low, zone.high - place)
         if not len(within) or within[0] > 0.0:
             continue  # from within it may leave
@@ -361,104 +351,105 @@ def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         above = place >= zone.high - EXACT
         leads = np.where(above, zone.high - low[zone.axis, own], high[zone.axis, own] - zone.low)
         yield from greatest("blocked", leads * guided, EXACT, begin)
-    kept = motion.guided & motion.goes & followed.received.holds
-    for zone in followed.zones:
+    kept = run.guided & run.goes & run.received.holds
+    for zone in run.zones:
         own = slice(zone.begin, zone.end if not zone.limit else 0)
-        place, goal = motion.position[zone.axis, own], (motion.position + motion.way)[zone.axis, own]
+        place, goal = run.position[zone.axis, own], (run.position + run.way)[zone.axis, own]
         ahead = (place <= zone.low) & (goal > zone.low + EXACT)
         behind = (place >= zone.high) & (goal < zone.high - EXACT)
         for begin, end in runs_of(kept[own] & (ahead | behind)):
             yield Allowance("no way", own.start + begin, end - begin, TAKEN_UP)
-    if followed.zones:
-        wrong = followed.issued["nErrorId"] == BLOCKED
+    if run.zones:
+        wrong = run.issued["nErrorId"] == BLOCKED
         for at in np.flatnonzero(np.diff(wrong, prepend=False) & wrong).tolist():
-            number = int(followed.issued["nZone"][at])
+            number = int(run.issued["nZone"][at])
             yield Allowance(
-                "zone", at, float(not any(z.number == number for z in followed.zones if not z.limit)), 0.0
+                "zone", at, float(not any(z.number == number for z in run.zones if not z.limit)), 0.0
             )
 
 
-def slowed(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def slowed(run: Followed) -> Iterator[Allowance]:
     """Judge the velocity within slow intervals."""
-    for zone, begin in _in_force(followed, motion, TO_SLOW):
+    for zone, begin in _in_force(run, TO_SLOW):
         own = slice(begin, zone.end)
-        place = motion.position[zone.axis, own]
-        within = (place > zone.low) & (place < zone.high) & motion.guided[own]
-        slack = (EXACT + 1.5 * followed.reserve) * followed.limits[zone.axis].velocity
+        place = run.position[zone.axis, own]
+        within = (place > zone.low) & (place < zone.high) & run.guided[own]
+        slack = (EXACT + 1.5 * run.reserve) * run.limits[zone.axis].velocity
         if within.any():
-            speed = np.abs(motion.velocity[zone.axis, own]) * within
+            speed = np.abs(run.velocity[zone.axis, own]) * within
             yield from greatest("fast", speed, zone.limit + slack, begin)
 
 
-def _in_force(followed: Followed, motion: IssuedMotion, periods: float) -> Iterator[tuple[Zone, int]]:
+def _in_force(run: Followed, periods: float) -> Iterator[tuple[Zone, int]]:
     """Give zones of both kinds with the cycle from which they must be kept."""
-    for zone in followed.zones:
-        if bool(zone.limit) == (periods == TO_SLOW) and zone.begin < followed.cycles:
-            takes = followed.reaction + slowing(followed, motion.velocity[:, zone.begin], periods)
-            begin = zone.begin + followed.after(takes) * (zone.begin > 0)
-            if begin < min(zone.end, followed.cycles):
+    for zone in run.zones:
+        if bool(zone.limit) == (periods == TO_SLOW) and zone.begin < run.cycles:
+            takes = run.reaction + slowing(run, run.velocity[:, zone.begin], periods)
+            begin = zone.begin + run.after(takes) * (zone.begin > 0)
+            if begin < min(zone.end, run.cycles):
                 yield zone, begin
 
 
-def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def taken_over(run: Followed) -> Iterator[Allowance]:
     """Judge that a disabled block follows its axes, and takes them over where and as fast as they go."""
-    for order in followed.orders:
+    for order in run.orders:
         if order.kind != DISABLED or not order.begin:
             continue
-        last = min(order.end, followed.cycles - 1)
+        last = min(order.end, run.cycles - 1)
         own = slice(order.begin, last + 1)
-        x, v = motion.position[:, order.begin - 1 : last + 1], motion.velocity[:, own]
-        known = np.isfinite(followed.steps[:, own] + followed.speeds[:, own]).all(axis=0)
-        apart = np.abs(np.diff(x, axis=1) - np.where(known, followed.steps[:, own], 0.0))
-        braked = [limits.quick[1] * followed.cycle**3 for limits in followed.limits]
-        apart[:, -1] -= np.abs(v[:, -1]) * followed.cycle + braked
+        x, v = run.position[:, order.begin - 1 : last + 1], run.velocity[:, own]
+        known = np.isfinite(run.steps[:, own] + run.speeds[:, own]).all(axis=0)
+        apart = np.abs(np.diff(x, axis=1) - np.where(known, run.steps[:, own], 0.0))
+        braked = [limits.quick[1] * run.cycle**3 for limits in run.limits]
+        apart[:, -1] -= np.abs(v[:, -1]) * run.cycle + braked
         yield from greatest("taken over", apart, EXACT, order.begin)
-        allowed = np.array([[limits.quick[0]] for limits in followed.limits]) * followed.cycle
-        wrong = np.abs(v - np.where(known, followed.speeds[:, own], v))
+        allowed = np.array([[limits.quick[0]] for limits in run.limits]) * run.cycle
+        wrong = np.abs(v - np.where(known, run.speeds[:, own], v))
         yield from greatest("taken over", wrong[:, :-1], EXACT, order.begin)
         yield from greatest("taken over", wrong[:, -1:] - allowed, EXACT, last)
 
 
-def remains(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def remains(run: Followed) -> Iterator[Allowance]:
     """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
-    yield from _remains_at_last(followed, motion)
-    unknown = [order.begin for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
-    unknown += [*followed.rest_reports, *np.flatnonzero(followed.retold)[:1].tolist()]
-    until = min(unknown, default=followed.cycles)
-    rests = [(begin, min(end, until)) for begin, end in runs_of(motion.stands) if 0 < begin < until]
+    yield from _remains_at_last(run)
+    unknown = [order.begin for order in run.orders if order.kind in (QUICK_STOP, DISABLED)]
+    unknown += [*run.rest_reports, *np.flatnonzero(run.retold)[:1].tolist()]
+    until = min(unknown, default=run.cycles)
+    rests = [(begin, min(end, until)) for begin, end in runs_of(run.stands) if 0 < begin < until]
     ends = [begin for begin, _ in rests]
-    if followed.modes is None or not ends:
+    if run.modes is None or not ends:
         return
-    as_given, at_most = followed.modes.left(motion.acceleration, ends, followed.cycle)
-    limit, stated = followed.sway_limit, followed.issued.get("fSwayLeft")
-    if not followed.modes.damped:
+    as_given, at_most = run.modes.left(run.acceleration, ends, run.cycle)
+    limit, stated = run.sway_limit, run.issued.get("fSwayLeft")
+    if not run.modes.damped:
         worst = int(np.argmax(as_given))
         yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
-    if stated is not None and not followed.modes.damped:
-        long = (
-            np.array(ends) * followed.cycle / (EXACTLY * followed.period)
-        )  # by frequencies that are rounded
+    if stated is not None and not run.modes.damped:
+        long = np.array(ends) * run.cycle / (EXACTLY * run.period)  # by frequencies that are rounded
         beside = BESIDE * limit * np.clip(long**2, 1.0, MOST_BESIDE)
-        first = np.array(ends) * followed.cycle * followed.modes.turns < SPREAD  # later sizes add up
+        first = np.array(ends) * run.cycle * run.modes.turns < SPREAD  # later sizes add up
         above = (stated[ends] - OVERSTATED * at_most) * first - beside
         worst = int(np.argmax(above))
         yield Allowance("sway left", ends[worst], float(above[worst]), 0.0)
-        promised = followed.issued["bPromise"][ends] != 0.0
+        promised = run.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
         below = at_most - [stated[begin:end].min() for begin, end in rests]  # as nothing decays
         worst = int(np.argmax(below))
         yield Allowance("understated", ends[worst], float(below[worst]), BESIDE * limit)
 
 
-def _remains_at_last(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
+def _remains_at_last(run: Followed) -> Iterator[Allowance]:
     """Judge what motions leave that begin and end at rest after the last live parameters were given."""
-    if followed.last_modes is None or followed.last_modes.damped:
+    if run.last_modes is None or run.last_modes.damped:
         return
-    lost = [order.end for order in followed.orders if order.kind in (QUICK_STOP, DISABLED)]
-    known = max(followed.last_known, *lost, 0)
-    rests = [max(begin, known) for begin, end in runs_of(motion.stands) if end > known]
+    lost = [order.end for order in run.orders if order.kind in (QUICK_STOP, DISABLED)]
+    known = max(run.last_known, *lost, 0)
+    rests = [max(begin, known) for begin, end in runs_of(run.stands) if end > known]
     if len(rests) > 1:
         ends = [at - rests[0] for at in rests[1:]]
-        left, *_ = followed.last_modes.left(motion.acceleration[:, rests[0] :], ends, followed.cycle)
+        left, *_ = run.last_modes.left(run.acceleration[:, rests[0] :], ends, run.cycle)
         worst = int(np.argmax(left))
-        yield Allowance("swings", rests[1 + worst], float(left[worst]), UNDISTURBED * followed.sway_limit)
+        yield Allowance("swings", rests[1 + worst], float(left[worst]), UNDISTURBED * run.sway_limit)
+
+
+JUDGES = (truths, velocities, stops, numbers, promises, remains, events, blocked, slowed, taken_over)

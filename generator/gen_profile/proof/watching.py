@@ -16,7 +16,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
+from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of, standing
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import LATER, faults, measured
 from gen_profile.proof.orders import (
@@ -120,15 +120,9 @@ class BlockWatch:
 
     def marks(self, orders: Sequence[TimedOrder]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
-        least = self.reaction / self.cycle
-        starts = [
-            one.begin
-            for one in orders
-            if 0 < one.begin == one.edge
-            and one.end - one.begin > least
-            and one.kind not in (QUICK_STOP, DISABLED)
-        ]
-        return starts[:MOST_COPIES]
+        guided = [one for one in orders if one.kind not in (QUICK_STOP, DISABLED)]
+        held = [one for one in guided if one.end - one.begin > self.reaction / self.cycle]
+        return [one.begin for one in held if 0 < one.begin == one.edge][:MOST_COPIES]
 
     def faults(
         self,
@@ -223,7 +217,7 @@ class BlockWatch:
         )
         return Facts(
             done=issued["bDone"] != 0.0,
-            stands=~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0),
+            stands=standing(velocity, acceleration),
             errors=issued["nErrorId"],
             position=position,
             low=low,

@@ -26,7 +26,6 @@ from gen_profile.work import afford
 
 ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
-LOOKING = 0.5  # likewise to see whether limits can be kept at all
 DIRECTLY = 3.0  # likewise for the direct one
 NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
 PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
@@ -60,7 +59,7 @@ def attempt(
     directly = partial(_direct, problem, coarse=coarse, near=near)
     if method == "direct":
         return in_time(directly, DIRECTLY)
-    solution = in_time(partial(indirect.solve, problem, partial(_within_reach, problem)), SOLVING)
+    solution = in_time(partial(indirect.solve, problem), SOLVING)
     if method == "indirect" or keeps_limits(solution) or solution.status is Status.INFEASIBLE:
         return solution
     other = in_time(directly, DIRECTLY)
@@ -96,12 +95,6 @@ def least_violation(problem: Problem) -> Relaxed | None:
     """Find the motion for which all limits must be widened least; none without limits."""
     places = tuple(problem.limits.stated())
     return Relaxation(problem).least(places) if places else None
-
-
-def _within_reach(problem: Problem) -> bool:
-    """Whether a motion may keep the limits, for all that a few programs tell."""
-    nearest = afford(partial(least_violation, problem), LOOKING)
-    return nearest is None or nearest.wider <= NEARLY
 
 
 def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:

@@ -62,11 +62,7 @@ def attempt(
 
 
 def kept_by_all(
-    problem: Problem,
-    method: SolverName,
-    progress: Progress = no_progress,
-    *,
-    coarse: bool = False,
+    problem: Problem, method: SolverName, progress: Progress = no_progress, *, coarse: bool = False
 ) -> Solution:
     """Solve a problem again with less sway of the nominal machine, until all in its ranges keep the limit.
 

@@ -119,10 +119,8 @@ class StreamOutcome:
         if not columns:
             return None
         promise, errors = columns["promise"].tolist(), columns["error_id"].tolist()
-        return {
-            "promise": bool(promise and promise[-1]),
-            "error_ids": [error for error in dict.fromkeys(errors) if error],
-        }
+        shown = [error for error in dict.fromkeys(errors) if error]
+        return {"promise": bool(promise and promise[-1]), "error_ids": shown}
 
     def _standstill_words(self, standstill: Standstill) -> str:
         axis, many = self.source.plan.target.axes[standstill.column], len(standstill.cycles)

@@ -322,19 +322,17 @@ def _sensor_inputs(spec: Spec, axes: Sequence[BlockAxis], cycle: float) -> tuple
 def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> scaling.Demand:
     """Find what the planner may ask of its axes."""
     limits, can = [spec.limits.of(number) for number in numbers], target.can
+    ends, brakes = list[tuple[int, int]](), list[int]()
+    for number, own, axis in zip(numbers, limits, target.axes, strict=True):
+        ends.append(_ends(own.travel or (0.0, 0.0), axis, can))
+        usual = scaling.magnitude_counts(quick_limits(spec, number)[0], axis)
+        brakes.append(scaling.quick_stop_deceleration(usual, can, axis))
     return scaling.Demand(
         start=None,
-        ends=tuple(
-            _ends(own.travel or (0.0, 0.0), axis, can) for own, axis in zip(limits, target.axes, strict=True)
-        ),
+        ends=tuple(ends),
         velocity=_counted([own.velocity for own in limits], target),
         acceleration=_counted([own.acceleration for own in limits], target),
-        quick_stop=tuple(
-            scaling.quick_stop_deceleration(
-                scaling.magnitude_counts(quick_limits(spec, number)[0], axis), can, axis
-            )
-            for number, axis in zip(numbers, target.axes, strict=True)
-        ),
+        quick_stop=tuple(brakes),
     )
 
 

@@ -89,10 +89,8 @@ def slow(source: Source, start: Sequence[float], target: Sequence[float]) -> Spe
         velocity = FRACTION * demand.velocity[column] / scale or CREEP
         acceleration = FRACTION * demand.acceleration[column] / scale or CREEP
         distance = abs(target[column] - start[column])
-        durations += [
-            PEAK_VELOCITY * distance / velocity,
-            (PEAK_ACCELERATION * distance / acceleration) ** 0.5,
-        ]
+        durations.append(PEAK_VELOCITY * distance / velocity)
+        durations.append((PEAK_ACCELERATION * distance / acceleration) ** 0.5)
         own = spec.limits.of(column)
         limits[name] = attrs.evolve(
             own, velocity=_lower(own.velocity, velocity), acceleration=_lower(own.acceleration, acceleration)

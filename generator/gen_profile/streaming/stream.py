@@ -354,10 +354,7 @@ def _simulated(source: Source, port: Port, tell: Progress) -> Iterator[_Simulati
     from gen_profile_exporters.can.streaming.joint_bus import opened  # noqa: PLC0415
 
     period = frames.period_microseconds(source.spec.can) * 1000
-    with (
-        CraneLoad(source.spec, tell) as load,
-        opened(port, target_of(source.spec)) as bus,
-    ):
+    with CraneLoad(source.spec, tell) as load, opened(port, target_of(source.spec)) as bus:
         clock = SharedClock(longest=period // 4)
         target = source.plan.target
         names = [axis.name for axis in target.axes]

@@ -1,6 +1,7 @@
 """Figures as a page draws them while a knob is turned: one abscissa for all curves of a panel."""
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -49,10 +50,5 @@ def _kept(rows: Sequence[Array]) -> Any:
     if count <= MOST:
         return slice(None)
     stretches = np.array_split(np.arange(count), MOST // (2 * len(rows)))
-    turns = (
-        stretch[turn(row[stretch])]
-        for stretch in stretches
-        for row in rows
-        for turn in (np.argmin, np.argmax)
-    )
-    return np.unique([0, count - 1, *turns])
+    choices = product(stretches, rows, (np.argmin, np.argmax))
+    return np.unique([0, count - 1, *(stretch[turn(row[stretch])] for stretch, row, turn in choices)])

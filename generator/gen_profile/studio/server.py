@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import json
 import math
 import secrets
@@ -18,6 +17,8 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
+from gen_profile.artefacts.manifest import sha256
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.errors import GenProfileError, OutputError, SpecError
 from gen_profile.phrase import plain
 from gen_profile.spec.reading import presets
@@ -99,7 +100,7 @@ class Studio:
             It is no spec that can be read.
         """
         opened = opened_start(name, content, self.start.folder)
-        key = f"{name} ({hashlib.sha256(content).hexdigest()[:6]})"
+        key = f"{name} ({sha256(content)[:6]})"
         self.opened[key] = opened
         while len(self.opened) > MOST_OPENED:
             del self.opened[next(iter(self.opened))]
@@ -136,10 +137,7 @@ class Studio:
 def _digest(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise OutputError(f"Cannot read {path}: it is no file.")
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise OutputError(f"Cannot read {path}: {error.strerror}.") from error
+    return sha256(read_artefact(path))
 
 
 class Asset(Guarded):

@@ -48,18 +48,10 @@ def row_of(grid: Grid, record: Mapping[str, Any]) -> dict[str, Any]:
 TABLE = "sweep.parquet"
 Table = Any  # pyarrow.Table, which has no types
 BATCH = 10_000  # rows that are Python objects at a time
-ARTEFACTS = pa.list_(
-    pa.struct(
-        [
-            ("format", pa.string()),
-            ("path", pa.string()),
-            ("sha256", pa.string()),
-            ("bytes", pa.int64()),
-            ("payload_sha256", pa.string()),
-        ]
-    )
-)
-COLUMNS = {"case": pa.int64(), "status": pa.string(), "folder": pa.string()}
+TEXT, WHOLE = pa.string(), pa.int64()
+FILE = {"format": TEXT, "path": TEXT, "sha256": TEXT, "bytes": WHOLE, "payload_sha256": TEXT}
+ARTEFACTS = pa.list_(pa.struct(FILE))
+COLUMNS = {"case": WHOLE, "status": TEXT, "folder": TEXT}
 
 
 def write_table(folder: Path, grid: Grid, records: Iterable[Mapping[str, Any]]) -> Path:
@@ -111,7 +103,7 @@ def read_table(folder: Path, grid: Grid) -> Table:
     path = folder / TABLE
     try:
         table = pq.ParquetFile(path, page_checksum_verification=True).read()
-        columns = {axis.key: pa.float64() if axis.numeric else pa.string() for axis in grid.axes} | COLUMNS
+        columns = {axis.key: pa.float64() if axis.numeric else TEXT for axis in grid.axes} | COLUMNS
         for name, type_ in columns.items():
             if table.schema.field(name).type != type_:
                 raise pa.ArrowInvalid(f"another type of {name}")
@@ -127,6 +119,6 @@ def read_table(folder: Path, grid: Grid) -> Table:
 def columns_of(rows: Sequence[Mapping[str, Any]], names: Sequence[str] = ()) -> Table:
     """Turn rows, of which some lack cells, into columns: those named, or all as they first appear."""
     names = list(names or dict.fromkeys(name for row in rows for name in row))
-    types = {"artefacts": ARTEFACTS, "spec_sha256": pa.string(), "profile_sha256": pa.string()}
+    types = {"artefacts": ARTEFACTS, "spec_sha256": TEXT, "profile_sha256": TEXT}
     arrays = [pa.array([row.get(name) for row in rows], type=types.get(name)) for name in names]
     return pa.table(arrays, names=names)

@@ -273,12 +273,7 @@ def _rows(
     return (rows[row],), tried
 
 
-def _verdict(
-    spec: Spec,
-    setpoints: SampledProfile,
-    rows: Sequence[Scenario],
-    progress: Progress,
-) -> Check:
+def _verdict(spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario], progress: Progress) -> Check:
     """Judge setpoints by themselves.
 
     Holding velocity over a cycle errs with the cycle's square, so setpoints of twice the cycle tell how much.

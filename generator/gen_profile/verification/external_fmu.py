@@ -24,10 +24,7 @@ SPACING = 0.01  # s, at most, of samples while the axes stand
 
 
 def judge_external(
-    spec: Spec,
-    foreign: ExternalFmu,
-    setpoints: SampledProfile,
-    machines: Sequence[Scenario],
+    spec: Spec, foreign: ExternalFmu, setpoints: SampledProfile, machines: Sequence[Scenario]
 ) -> Check:
     """Let an external FMU judge replayed setpoints.
 

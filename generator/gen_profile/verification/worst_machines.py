@@ -59,10 +59,7 @@ class _Way:
 
 
 def worst_machines(
-    spec: Spec,
-    setpoints: SampledProfile,
-    rows: Sequence[Scenario],
-    progress: Progress = no_progress,
+    spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario], progress: Progress = no_progress
 ) -> tuple[tuple[Scenario, ...], int]:
     """Search the ranges of a check, and of the drives' lag, for the machines that setpoints suit least.
 

@@ -230,10 +230,7 @@ def _records(
     yield 0x60C2, "Interpolation time period", {1: U8, 2: I8}, access, period
     for pdo in PDOS:
         received, sent = _default_mapping(make, pdo)
-        for base, cob_id, mapping, word in (
-            (0x1400, 0x200, received, "RPDO"),
-            (0x1800, 0x180, sent, "TPDO"),
-        ):
+        for base, cob_id, mapping, word in ((0x1400, 0x200, received, "RPDO"), (0x1800, 0x180, sent, "TPDO")):
             used = cob_id + 0x100 * pdo + node | (0 if mapping else OFF)
             if word == "TPDO" and not make.remote_requests:
                 used |= NO_REMOTE_REQUEST

@@ -97,13 +97,9 @@ class _Service:
         self._pacer, self._clock = pacer, pacer.link.clock
         self.begun = False
         self._asked: int | None = None  # when the request was sent that is not answered yet
-        self._requests = itertools.cycle(
-            [
-                _request(_WRITE, pdos.CONTROLWORD, Controlword.QUICK_STOP),
-                _request(_READ, pdos.STATUSWORD),
-                _request(_READ, pdos.ACTUAL_POSITION),
-            ]
-        )
+        stop = _request(_WRITE, pdos.CONTROLWORD, Controlword.QUICK_STOP)
+        looks = (_request(_READ, entry) for entry in (pdos.STATUSWORD, pdos.ACTUAL_POSITION))
+        self._requests = itertools.cycle([stop, *looks])
         pacer.link.subscribe(self._take)
 
     def ask(self) -> None:

@@ -50,18 +50,11 @@ class AxisMotion:
         first, last = ball(self.position[:-1]), ball(self.position[1:])
         speeds = half * self.velocity[:-1], half * self.velocity[1:]
         curvatures = half * half * self.acceleration[:, 0], half * half * self.acceleration[:, 1]
-        mean, turn, bend = (
-            0.5 * (first + last),
-            0.5 * (speeds[1] - speeds[0]),
-            0.5 * (curvatures[0] + curvatures[1]),
-        )
+        mean, way = 0.5 * (first + last), 0.5 * (last - first)
+        lead, turn = 0.5 * (speeds[0] + speeds[1]), 0.5 * (speeds[1] - speeds[0])
+        bend, twist = 0.5 * (curvatures[0] + curvatures[1]), 0.5 * (curvatures[1] - curvatures[0])
         fourth = 0.125 * (bend - turn)
         second = 0.25 * (3.0 * turn - bend)
-        way, lead, twist = (
-            0.5 * (last - first),
-            0.5 * (speeds[0] + speeds[1]),
-            0.5 * (curvatures[1] - curvatures[0]),
-        )
         fifth = 0.125 * (twist - 3.0 * (lead - way))
         third = 0.5 * (lead - way) - 2.0 * fifth
         return stack([mean - second - fourth, way - third - fifth, second, third, fourth, fifth])

@@ -142,9 +142,7 @@ def _positions(text: str) -> list[float]:
 @log_options
 @options.spec_output("learned.toml")
 @options.repeatable(
-    "--export FORMAT",
-    "Design for the ranges that are left, check, and write in this format.",
-    into="formats",
+    "--export FORMAT", "Design for the ranges that are left, check, and write in this format.", into="formats"
 )
 @option(
     "--folder DIR", "Folder for that; ./gen-profile-out by default.", PathType(), default="gen-profile-out"

@@ -135,11 +135,7 @@ def drive_sim(
         deliver(eds, drive_dictionary.eds(spec.can.node, make, eds.name).encode("utf-8"))
         return
     port = chosen_port(interface, channel, spec.can, simulated=False)
-    with (
-        progress() as tell,
-        CraneLoad(spec, tell) as load,
-        joint_bus.opened(port, target_of(spec)) as bus,
-    ):
+    with progress() as tell, CraneLoad(spec, tell) as load, joint_bus.opened(port, target_of(spec)) as bus:
         bank = run.drive_bank(spec, bus, load, make)
         tell("waiting for a stream, or serving it")
         try:

@@ -76,13 +76,8 @@ class MotionJudge(Judge[MotionState]):
                 resting[0] = gain * motion.target + state.shift
                 return resting
             position, velocity, acceleration = motion.between(state.cycle, state.fraction)
-            due = np.array(
-                (
-                    gain * position + state.shift,
-                    gain * velocity * state.rate,
-                    gain * (acceleration * state.rate * state.rate + velocity * state.slope),
-                )
-            )
+            push = acceleration * state.rate * state.rate + velocity * state.slope
+            due = np.array((gain * position + state.shift, gain * velocity * state.rate, gain * push))
         if state.phase == MOVING or (state.setpoints[1:] != 0.0).any():  # it stops in the cycle after
             return due
         resting[0] = due[0]

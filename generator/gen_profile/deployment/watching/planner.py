@@ -76,13 +76,9 @@ class PlannerJudge(Judge[PlannerState]):
         span = (state.calls - before.calls) * self._cycle_time
         if DISABLED in (before.phase, state.phase) or state.disabled_at > before.calls or span > LONGEST_GAP:
             return
-        due = np.array(
-            (
-                before.position + span * (before.velocity + 0.5 * span * before.acceleration),
-                before.velocity + span * before.acceleration,
-                before.acceleration,
-            )
-        )
+        position = before.position + span * (before.velocity + 0.5 * span * before.acceleration)
+        velocity = before.velocity + span * before.acceleration
+        due = np.array((position, velocity, before.acceleration))
         reach = np.array((span**3 / 6.0, 0.5 * span**2, span))[:, None] * self._jerk * (1.0 + ROUNDING)
         apart = np.abs(state.setpoints - due)
         if (far := apart > reach + STEADY).any():

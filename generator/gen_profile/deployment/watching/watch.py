@@ -119,9 +119,8 @@ class _Course:
     def _read(self) -> BlockState | None:
         for _ in range(TORN):
             values = self._link.state()
-            if (state := read_state(values, len(self._table.axes), self._table.state)) is not None or values[
-                0
-            ] == 0.0:
+            state = read_state(values, len(self._table.axes), self._table.state)
+            if state is not None or values[0] == 0.0:
                 return state
         raise DeploymentError(
             "The block's state is of several cycles whenever it is read: let the controller's server take it "

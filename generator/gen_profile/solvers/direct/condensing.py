@@ -110,25 +110,19 @@ def interval_maps(
     numpy.linalg.LinAlgError
         The linearised equations are singular or not finite.
     """
-    rate, by_state, by_axes = _linearized(equations, parameters, axes(local), stages)
-    constant = (
-        rate
-        - np.einsum("ksab,ksb->ksa", by_state, stages)
-        + np.einsum("ksab,ksb->ksa", by_axes, axes.offset - axes(local))
-    )
-    return _eliminated(constant, by_state, by_axes @ axes.matrix, lengths[:, None, None] * GAUSS.A)
-
-
-def _linearized(
-    equations: MotionEquations, parameters: Array, axis_inputs: Array, stages: Array
-) -> tuple[Array, Array, Array]:
-    """Evaluate ẏ and its derivatives by y and by the axes' motion, each (intervals, STAGES, n, …)."""
     intervals, _, n = stages.shape
+    axis_inputs = axes(local)
     values = equations.rate(stages.reshape(-1, n), axis_inputs.reshape(intervals * STAGES, -1), parameters)
     if not np.isfinite(values).all():
         raise np.linalg.LinAlgError("the equations of motion overflow")
-    values = values.reshape(intervals, STAGES, n, -1)
-    return values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
+    values = values.reshape(intervals, STAGES, n, -1)  # the rates, and their derivatives
+    by_state, by_axes = values[..., 1 : 1 + n], values[..., 1 + n :]
+    constant = (
+        values[..., 0]
+        - np.einsum("ksab,ksb->ksa", by_state, stages)
+        + np.einsum("ksab,ksb->ksa", by_axes, axes.offset - axis_inputs)
+    )
+    return _eliminated(constant, by_state, by_axes @ axes.matrix, lengths[:, None, None] * GAUSS.A)
 
 
 def _eliminated(constant: Array, by_state: Array, by_input: Array, integration: Array) -> IntervalMaps:

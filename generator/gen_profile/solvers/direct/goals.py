@@ -52,11 +52,7 @@ def usual_effort(problem: Problem) -> float:
 
 
 def cost(
-    transcription: Transcription,
-    effort: Matrix,
-    sway_cost: SwayCost,
-    iterate: Iterate,
-    maps: IntervalMaps,
+    transcription: Transcription, effort: Matrix, sway_cost: SwayCost, iterate: Iterate, maps: IntervalMaps
 ) -> tuple[Matrix, Array]:
     """Expand eq. (26) about an iterate to second order: P and q of ``½ xᵀ P x + qᵀ x``.
 
@@ -230,7 +226,7 @@ def bound_worst(
     tried: Sequence[Amplitudes],
     maps: Sequence[IntervalMaps],
     most: float | None = None,
-) -> int:
+) -> None:
     """Bound what every load of every machine can swing to by one variable.
 
     The program must have been posed with `worst_case_variables` extra ones, the first of its goal's.
@@ -238,12 +234,7 @@ def bound_worst(
     Parameters
     ----------
     most : float, optional
-        Bound of that variable itself.
-
-    Returns
-    -------
-    int
-        Column of that variable: the worst fraction of a limit.
+        Bound of that variable itself: the worst fraction of a limit.
     """
     column = transcription.variables
     worst = column + worst_case_variables(tried) - 1
@@ -260,7 +251,6 @@ def bound_worst(
         column += len(modes)
     if most is not None:
         program.at_most(place(np.ones((1, 1, 1)), np.array([worst]), program.variables), np.array([most]))
-    return worst
 
 
 def worst_case_variables(tried: Sequence[Amplitudes]) -> int:

@@ -20,11 +20,7 @@ REACHED = 1e-4  # fraction of a limit that may lack of all of it; 1e-3 costs up 
 
 
 def switching(
-    setup: Setup,
-    iterate: Iterate,
-    sway_limit: float | None,
-    widened: Container[str] = (),
-    wider: float = 1.0,
+    setup: Setup, iterate: Iterate, sway_limit: float | None, widened: Container[str] = (), wider: float = 1.0
 ) -> NDArray[np.bool_]:
     """Tell within which intervals some limit begins or ceases to bind, shape (intervals,).
 

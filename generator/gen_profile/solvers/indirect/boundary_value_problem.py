@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array
@@ -102,12 +103,12 @@ class BoundaryValueProblem:
     @cached_property
     def transform(self) -> Array:
         """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
-        return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
+        return np.asarray(block_diag(self.basis, np.linalg.inv(self.basis).T))
 
     @cached_property
     def inverse_transform(self) -> Array:
         """Matrix from states and costates to ζ."""
-        return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
+        return np.asarray(block_diag(np.linalg.inv(self.basis), self.basis.T))
 
     def unknowns(self, points: Array) -> Array:
         """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
@@ -368,11 +369,3 @@ def _finite(values: Array) -> Array:
     if not np.isfinite(values).all():
         raise np.linalg.LinAlgError("the canonical equations overflow")
     return values
-
-
-def _blocks(upper: Array, lower: Array) -> Array:
-    """Write two square matrices into the diagonal of one."""
-    n = len(upper)
-    blocks = np.zeros((2 * n, 2 * n))
-    blocks[:n, :n], blocks[n:, n:] = upper, lower
-    return blocks

@@ -12,7 +12,7 @@ from gen_profile.solvers.collocation import Trajectory, sampled
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 
-MOST_PARTS = (4, 2)  # of an interval at once; the fewer, the nearer to the solution before
+MOST_PARTS = 4  # of an interval at once; with more, refined motions start farther from their solution
 MAX_ROUNDS = 6  # where a fast mode is not resolved, what is split in one place shows in another
 
 
@@ -37,22 +37,19 @@ def refine(
     least : int
         Intervals to begin with.
     """
-    meshes = [np.linspace(0.0, 1.0, least + 1)] if least >= len(coarse.mesh) else []
+    mesh = np.linspace(0.0, 1.0, least + 1) if least >= len(coarse.mesh) else None
     solution, iterations, residual = coarse, 0, 0.0
     for _ in range(MAX_ROUNDS):
-        if not meshes:
+        if mesh is None:
             parts = _parts(canonical, solution)
             if parts.max() == 1:
                 break
-            meshes = [_split(solution.mesh, np.minimum(parts, most)) for most in MOST_PARTS]
-        for mesh in meshes:
-            outcome = solve(canonical, sampled(solution, solution.scheme, mesh))
-            iterations += outcome.iterations
-            if outcome.solution is not None:
-                break
-        else:
+            mesh = _split(solution.mesh, parts)
+        outcome = solve(canonical, sampled(solution, solution.scheme, mesh))
+        iterations += outcome.iterations
+        if outcome.solution is None:
             return attrs.evolve(outcome, iterations=iterations)
-        solution, residual, meshes = outcome.solution, outcome.residual, []
+        solution, residual, mesh = outcome.solution, outcome.residual, None
     return NewtonOutcome(solution=solution, iterations=iterations, residual=residual)
 
 
@@ -64,7 +61,7 @@ def _parts(canonical: BoundaryValueProblem, solution: Trajectory) -> NDArray[np.
         drift = _drift(canonical, solution) / options.drift_tolerance
         wanted = np.maximum(wanted, drift ** (1.0 / (2 * stages)))
     most = max(options.max_intervals, len(wanted))
-    while (parts := np.clip(np.ceil(wanted), 1, MOST_PARTS[0]).astype(np.intp)).sum() > most:
+    while (parts := np.clip(np.ceil(wanted), 1, MOST_PARTS).astype(np.intp)).sum() > most:
         wanted *= 0.9
     return parts
 

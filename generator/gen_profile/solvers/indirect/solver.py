@@ -11,7 +11,6 @@ fast modes, the full Newton's method takes over:
 """
 
 import math
-from collections.abc import Callable
 from contextlib import suppress
 
 import attrs
@@ -35,7 +34,7 @@ from gen_profile.solvers.indirect.extremal import failure, judged, too_steep
 from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
 from gen_profile.solvers.indirect.refinement import refine
 from gen_profile.solvers.indirect.simplified_newton import solve_simplified
-from gen_profile.solvers.solution import HORIZONTAL, LONGER, WIDER, Solution, Status
+from gen_profile.solvers.solution import HORIZONTAL, LONGER, Solution, Status
 
 INTERVALS = 30  # at least
 RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
@@ -83,16 +82,12 @@ def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
 
 
 @one_thread()
-def solve(
-    problem: Problem, far: Callable[[], bool] = lambda: True, options: IndirectOptions = USUAL
-) -> Solution:
+def solve(problem: Problem, options: IndirectOptions = USUAL) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
     Parameters
     ----------
     problem : Problem
-    far : () → bool
-        Whether one that swings far is worth looking for, which takes long; asked where there is no other.
     options : IndirectOptions
 
     Returns
@@ -109,7 +104,7 @@ def solve(
     unweighted = canonical_problem(problem, system)
     asked, redundant = independence(unweighted)
     if redundant:
-        solution = solve(without(problem, redundant), far, options)
+        solution = solve(without(problem, redundant), options)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     final = np.where(asked, unweighted.final, np.nan)
     unweighted = attrs.evolve(unweighted, final=final, options=options)
@@ -117,8 +112,6 @@ def solve(
         simple = _solve_simply(problem, unweighted)
         if simple is not None:
             return simple
-    if not far():
-        return failure(problem, Status.INFEASIBLE, 0, WIDER)
     try:
         return solve_fully(problem, unweighted)
     except np.linalg.LinAlgError:
