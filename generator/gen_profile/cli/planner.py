@@ -254,14 +254,14 @@ def status_line() -> Iterator[Progress]:
 
 
 def _numbers(live_parameters: tuple[str, ...]) -> dict[str, float]:
+    from gen_profile.suggestion import number_meant
+
     numbers = {}
     for text in live_parameters:
         name, _, number = text.partition("=")
         try:
             numbers[name] = float(number)
         except ValueError:
-            from gen_profile.suggestion import number_meant
-
             hint = number_meant(number)
             raise SpecError(f"--live-parameter {text}: state a number, as {name}=5.5{hint}.") from None
     return numbers
