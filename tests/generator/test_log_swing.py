@@ -226,8 +226,9 @@ def encoder(channel, *, answers=True, size=4):
     def message(cob_id, data, **more):
         return can.Message(arbitration_id=cob_id, data=data, **{"is_extended_id": False} | more)
 
-    def swing():
-        with can.Bus(channel, interface="virtual") as bus:
+    with can.Bus(channel, interface="virtual") as bus:  # there before it is asked
+
+        def swing():
             while not ended.is_set():
                 asked = bus.recv(0.01)
                 if asked is not None and asked.arbitration_id == 0x605 and answers:
@@ -239,13 +240,13 @@ def encoder(channel, *, answers=True, size=4):
                 bus.send(message(0x185, bytes(4), is_extended_id=True))
                 bus.send(message(0x185, b"", is_remote_frame=True))
 
-    thread = threading.Thread(target=swing)
-    thread.start()
-    try:
-        yield f"can:virtual:{channel}"
-    finally:
-        ended.set()
-        thread.join()
+        thread = threading.Thread(target=swing)
+        thread.start()
+        try:
+            yield f"can:virtual:{channel}"
+        finally:
+            ended.set()
+            thread.join()
 
 
 @pytest.mark.parametrize(
