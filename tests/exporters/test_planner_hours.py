@@ -136,15 +136,15 @@ def test_an_axis_without_a_promise_moves_on_as_soon(text, seed):
 
 
 def test_what_motions_leave_between_the_machines_watched_is_stated(text):
-    """Where they take each other away on these: 2 % above the worst of them would be 1.5 % too little."""
+    """Where they take each other away on these: 2 % above the worst of them would be 4 % too little."""
     crane = Crane(text, 6.0, 1500.0).hold(0.1, bVelocity=1.0, fVelocityCommand=0.0)
-    for speed, lasts, wait in ((1.005, 2.12, 69.69), (0.419, 4.07, 68.62), (0.664, 3.21, 12.0)):
+    for speed, lasts, wait in ((1.024, 2.222, 69.885), (0.377, 4.168, 68.604), (0.671, 3.181, 12.0)):
         for command, seconds in ((speed, lasts), (-speed, lasts), (0.0, wait)):
             crane.hold(seconds, fVelocityCommand=command)
     out = crane.outputs
     at = rests(out)[-1]
     velocity = out["fVelocity"][:at]
-    assert worst(velocity, 6.0, 1500.0) > 1.03 * worst(velocity, 6.0, 1500.0, watched=True)
+    assert worst(velocity, 6.0, 1500.0) > 1.05 * worst(velocity, 6.0, 1500.0, watched=True)
     require_true(out, at, 6.0, 1500.0)
 
 

@@ -35,10 +35,15 @@ FORMER = {  # machine: how many are drawn, seed, number
         (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
         (400, 13, 106),  # it stood as long as its rope changed, as that was taken over again and again
         (400, 12, 20),  # stop ends 10⁹ m away in a cycle without bEnable, in which a pulse had been weighed
+        (400, 2, 35),  # a stick 3.4 s late, as what was taken away of a motion that speeds up was nothing
+        (400, 13, 12),  # moved by a tap that was given before the machine was known
         (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
     ],
     "wide": [
         (400, 10, 87),  # 4 s against a stick of two axes, one of which was too fast for a plan
+        (300, 43, 144),  # a stop 4 s late, as each search began with too few slots
+        (300, 83, 197),  # a stop 4 s late, as searches that came too late went on as if they had not
+        (300, 80, 155),  # never ready again: disabled while a plan was sought with what was just taken over
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded

@@ -51,7 +51,7 @@ def real(*, robust: bool) -> dict[str, float]:
         "cStalled": 0.01,  # of the full step: likewise
         # slots that a plan to another velocity takes longer than the axis alone
         "cRampSlots": 5.0 if robust else 2.0,
-        "cRampShare": 0.6 if robust else 0.37,  # of the kernel's slots, that it takes at least
+        "cRampShare": 0.6 if robust else 0.37,  # of the kernel's slots, with which the search begins
         "cRampGrowth": 0.4,  # by so much more for full speed
         "cRampBack": 0.6,  # of a stop's slots, that a plan takes longer which leads back
         "cAcross": 0.2,  # of the square of the slope that plans may leave: of the part that is mostly less
