@@ -15,6 +15,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.identification.log_table import read_table
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.phrase import Phrase
+from gen_profile.spec.reading import as_text
 from gen_profile.summary import Sampled
 from gen_profile.units import units_of
 
@@ -122,7 +123,7 @@ def parse_reading(text: str, option: str = "measured") -> DirectReading:
     >>> gp.parse_reading("L1=0.47±0.005")
     DirectReading(parameter='L1', value=0.47, uncertainty=0.005)
     """
-    match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
+    match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", as_text(text, f"{option}: a text"))
     if match is None:
         comma = _decimal_points(text)
         raise SpecError(
@@ -145,7 +146,9 @@ def parse_period(text: str) -> Period:
     >>> gp.parse_period("17.3±0.2/10")
     Period(mode=1, seconds=1.73, uncertainty=0.02)
     """
-    match = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
+    match = re.fullmatch(
+        rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", as_text(text, "period: a text")
+    )
     if match is None:
         raise SpecError(
             f"period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
