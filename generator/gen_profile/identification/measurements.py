@@ -214,7 +214,7 @@ def parse_swing(
         per or _per_stated(cells.cell(head, place), cells.unit(head, place), source, measured, units)
         for place, (per, measured, units) in zip(places, known, strict=True)
     ]
-    table = cells.numbers(head, places) / scales
+    table = cells.numbers(head, places, after * scales[0]) / scales
     return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
 
 
@@ -258,7 +258,6 @@ def cut_swing(
     if len(times) < LEAST_SAMPLES:
         template = "{source}: a swing needs at least {least} samples, found {count}."
         raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
-    require_rising(times, source)
     if quantity == "angle":
         require_angle(values)
     return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
@@ -270,17 +269,6 @@ def require_angle(values: Array) -> None:
         raise SpecError(
             "unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?", span=span
         )
-
-
-def require_rising(times: Array, source: str) -> None:
-    """Refuse, by an `OutputError`, times in s that do not rise."""
-    back = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(back):
-        template = (
-            "{source}: the times must rise from row to row, and do not after {time:.6g} s; sort the rows, "
-            "and remove those that come twice."
-        )
-        raise OutputError(template, source=source, time=times[back[0]])
 
 
 def _positive(where: str, what: str, value: float) -> float:
