@@ -26,6 +26,7 @@ LONG_KEY = re.compile(
     r"(?<![\w-])(?:(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
     rf"{{{MOST_PARTS}}}"
 )
+NO_SPEC = "; a spec is a .toml file, and gen-profile check takes what was exported, before a spec"
 SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
@@ -291,7 +292,8 @@ def _document(text: str, source: str) -> Table:
         last = text.split("\n")
         end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
         problem = re.sub(r"[(]at end of document[)]", end, str(error))
-        raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
+        hint = _slip(text, problem) if Path(source).suffix in {".toml", ""} else NO_SPEC
+        raise SpecError(f"{source}: not valid TOML: {problem}{hint}.") from error
 
 
 def parse_toml(text: str) -> Table:
