@@ -172,6 +172,8 @@ def format_of(path: PurePath | str) -> str:
         return own
     known = formats()
     name = _longest_suffix(path, known)
+    if name is None and PurePath(path).suffix == ".toml":
+        raise SpecError(f"{path}: this is a spec; name the file that was exported of it first.")
     if name is None:
         raise SpecError(
             f"{path}: no format has the suffix {PurePath(path).suffix!r} "

@@ -5,6 +5,7 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from typing import Any
 
 import dask
@@ -77,6 +78,7 @@ def _local_cluster(workers: int) -> LocalCluster:
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(UNWATCHED))
         if sys.platform != "win32":
+            resource_tracker.ensure_running()  # else the first process starts it, and it ends the blocking
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)
         return LocalCluster(

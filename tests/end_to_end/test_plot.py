@@ -118,6 +118,16 @@ def test_pictures_of_one_figure_are_alike_to_the_byte(tmp_path, suffix, monkeypa
     assert pictures[0] == pictures[1]
 
 
+def test_panels_of_a_figure_beside_another_take_up_its_width():
+    """They stood side by side in a fifth of the width, as those of a gantry's two loads."""
+    line = Line(name="line", x=np.arange(3.0), y=np.arange(3.0))
+    panel = Panel(title="panel", x_label="x", y_label="y", lines=[line])
+    picture = draw_side_by_side([Figure("motion", [panel] * 4), Figure("sway", [panel] * 2)], "title")
+    motion, sway = (part.axes for part in picture.subfigs)
+    assert [axis.get_subplotspec().get_geometry()[:2] for axis in motion] == [(2, 2)] * 4
+    assert [axis.get_subplotspec().get_geometry()[:2] for axis in sway] == [(2, 1)] * 2
+
+
 @pytest.mark.parametrize("name", ["picture.xyz", "picture"])
 def test_a_picture_of_unknown_kind_is_refused_before_the_work(tmp_path, name):
     outcome = run_here("compare", "--plot", tmp_path / name)

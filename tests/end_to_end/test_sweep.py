@@ -218,6 +218,26 @@ def test_a_signal_ends_it_quietly(tmp_path, number):
     assert [line for line in err.splitlines() if line and not line.endswith(" …")] == ["Error: Interrupted."]
 
 
+STARTED = """
+import signal
+from multiprocessing import resource_tracker
+from gen_profile import cluster
+
+def start(**_):
+    resource_tracker.ensure_running()  # as the first process of any cluster does
+    return signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+cluster.LocalCluster = start
+print(signal.SIGINT in cluster._local_cluster(2))
+"""
+
+
+def test_no_process_hears_ctrl_c_while_it_starts():
+    """The second one and all others did, and printed where they were."""
+    run = subprocess.run([sys.executable, "-c", STARTED], capture_output=True, text=True, check=True)
+    assert run.stdout == "True\n"
+
+
 @contextmanager
 def cluster(folder, workers):
     """A Dask scheduler and workers, each a process of its own; the scheduler's address."""

@@ -79,6 +79,11 @@ def test_unknown_suffixes_are_refused(path):
         format_of(path)
 
 
+def test_a_spec_is_no_artefact():
+    with pytest.raises(SpecError, match=r"^bay\.toml: this is a spec; name the file that was exported"):
+        format_of("bay.toml")
+
+
 def test_plugins_join_in(plugins):
     plugins(extra="format_plugin:PLUGIN")
     assert formats()["extra"] == PLUGIN

@@ -351,3 +351,10 @@ def test_a_load_that_does_not_swing_has_no_tails():
     """As across the axis that moves."""
     with np.errstate(all="raise"):
         assert (_tails(np.zeros((2, 4, 5, 3)), (3,)) == 0.0).all()
+
+
+def test_a_motion_that_only_hoists_is_proved():
+    spec, setpoints = planned("single-pendulum-crane", "move.target=[0.0, 1.0]", "export.cycle_time=0.01")
+    found = attempt(spec, setpoints)
+    assert found.fraction == 1.0
+    assert greatest(found)[0] < 1e-12

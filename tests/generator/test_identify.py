@@ -86,7 +86,11 @@ def test_logs_with_and_without_a_header(separator, decimal):
         ("t;a\n1;2\n", "needs at least 16 samples, found 1"),
         ("t;a\n1;x\n", "row 2: a holds 'x', which is no number"),
         ("1;2\n1;\n", "needs at least 16 samples, found 1"),
-        ("\n".join("0;1" for _ in range(20)), "the times must rise"),
+        ("\n".join("0;1" for _ in range(20)), "row 2: the times must rise from row to row, and 0 follows 0"),
+        (
+            "Logger 3\n\nt;a\n" + "".join(f"{time};1\n" for time in [*range(9), *range(5, 40)]),
+            "row 13: the times must rise from row to row, and 5 follows 8; .* where the clock was set back",
+        ),
     ],
 )
 def test_faulty_logs(text, why):

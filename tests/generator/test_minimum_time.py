@@ -9,7 +9,7 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
-from gen_profile.errors import CosimulationError
+from gen_profile.errors import Code, CosimulationError, InfeasibleProblem
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers import shortest as searching
@@ -226,3 +226,16 @@ def test_where_the_work_does_not_reach_for_many_intervals_the_motion_on_few_is_t
     assert drafted.excess_sway <= 0.0
     assert drafted.spec.move.duration == pytest.approx(2.6, rel=0.01)
     assert drafted.solution.problem.duration == drafted.spec.move.duration
+
+
+def test_limits_that_take_longer_than_a_move_may_last_are_refused():
+    """By what to change, and not by the number that was tried."""
+    with pytest.raises(InfeasibleProblem, match=r"some 150000 s; .* 100000 s\. Widen the limits") as refusal:
+        draft(preset_spec("bay-crane", ["move.duration=minimum", "limits.sway=1e-9"]))
+    (reason,) = refusal.value.reasons
+    assert (reason.code, reason.place, reason.allowed) == (Code.INFEASIBLE, "move.duration", 1e5)
+
+
+def test_as_much_time_as_a_move_may_last_is_tried_where_its_double_would_not_be_a_move():
+    spec = preset_spec("bay-crane", ["move.duration=minimum", "limits.sway=4e-9"])
+    assert searching._slow(spec, problem_of(spec)).move.duration == 1e5

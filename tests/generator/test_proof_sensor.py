@@ -11,6 +11,7 @@ from gen_profile.charts.proof import damping_figures, worst_damped
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.planner import Planner
 from gen_profile.planner.sensor_log import read_sensor_log
 from gen_profile.proof.closed_loop import ClosedLoop, trace
@@ -209,6 +210,13 @@ def test_python_and_play_give_it_what_the_sensor_shows(text, spec):
     for wrong, words in (("time,value\n0,0\n", "no column time_s"), ("time_s,value\n0,x\n", "line 2")):
         with pytest.raises(SpecError, match=words):
             play(text, "time_s,command,value\n0.0,stop,\n", sensor_text=wrong)
+
+
+@pytest.mark.parametrize("back", ["-0.1,0", "0.2,0\n0.1,0", "0.2,0\nnan,0", "0.2,0\ninf,0"])
+def test_a_time_of_a_sensor_that_goes_back_is_named_by_its_line(back):
+    line = 2 + back.count("\n")
+    with pytest.raises(SpecError, match=f"sensor, line {line}: time_s must rise"):
+        read_sensor_log(f"time_s,value\n{back}\n9.0,0\n", [BlockAxis(name="")])
 
 
 GANTRY = [

@@ -94,7 +94,7 @@ def test_the_exported_table_is_such_a_log(tmp_path):
         (table(["time_s", "sway"], TIMES[:5], TIMES[:5]), "needs at least 16 samples, found 5"),
         (
             table(["time_s", "sway"], TIMES[::-1], TIMES),
-            "the times must rise from row to row, and do not after 0.38 s; sort the rows, and remove",
+            "row 3: the times must rise from row to row, and 0.36 follows 0.38; sort the rows, remove",
         ),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n", "row 22: sway holds 'x', which is no number"),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,1e300\n", "row 22: sway holds '1e300', which is no"),

@@ -36,7 +36,7 @@ def require_drawable(path: Path) -> None:
 
 
 def save(figures: Sequence[parts.Figure], path: Path, salt: str, title: str) -> None:
-    """Draw figures side by side in one file.
+    """Draw figures side by side in one file, the panels of all but the first below each other.
 
     Parameters
     ----------
@@ -75,15 +75,15 @@ def drawn(figures: Sequence[parts.Figure], title: str) -> Any:
     height = max(6.0, 1.0 + rows * (2.4 if rows > 2 and columns == 1 else HIGH[columns - 1]))
     picture = Canvas(figsize=(sum(widths), height), layout="constrained")
     beside = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
-    for part, figure, width in zip(beside, figures, widths, strict=True):
-        _draw(part, figure, width)
+    for number, (part, figure, width) in enumerate(zip(beside, figures, widths, strict=True)):
+        _draw(part, figure, width, 1 if number else columns)
     picture.suptitle(title)
     return picture
 
 
-def _draw(part: Any, figure: parts.Figure, width: float) -> None:
+def _draw(part: Any, figure: parts.Figure, width: float, columns: int) -> None:
     """Draw panels row by row; bars take what is left of their row."""
-    columns, names = _columns(figure), [str(number) for number in range(len(figure.panels))]
+    names = [str(number) for number in range(len(figure.panels))]
     filling = names[-1] if isinstance(figure.panels[-1], parts.Bars) else "."
     mosaic = np.reshape([*names, *[filling] * (-len(names) % columns)], (-1, columns))
     axes = part.subplot_mosaic(mosaic.tolist())

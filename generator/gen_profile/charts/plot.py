@@ -18,7 +18,7 @@ from gen_profile.comparison.compare import Comparison
 from gen_profile.comparison.robustness import Robustness
 from gen_profile.designs.design import Design
 from gen_profile.designs.planner import Deployment
-from gen_profile.errors import OutputError
+from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.phrases import number
 from gen_profile.identification.identify import Identification
 from gen_profile.motion.profile import Profile
@@ -59,6 +59,8 @@ def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) 
 
     Raises
     ------
+    SpecError
+        There is no picture of what is given.
     OutputError
         The file cannot be written, Matplotlib is not installed, or there is nothing to draw.
 
@@ -111,7 +113,7 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
             names = ", ".join(result.estimate.values)
             return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"
         case _:
-            raise TypeError(f"There is no picture of a {type(result).__name__}.")
+            raise SpecError(f"There is no picture of a {type(result).__name__}.")
 
 
 def _check_figure(check: Check) -> Figure:

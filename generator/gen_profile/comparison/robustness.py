@@ -19,7 +19,7 @@ from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, 
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.spec.reading import as_names, as_number, as_spec
 from gen_profile.spec.values import require_whole
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable, Tabled
@@ -235,7 +235,7 @@ def error_grid(
         raise SpecError("parameter: at most two, of which a map is drawn.")
     if points is not None:
         require_whole(points, FEWEST, "points")
-    if half_range is not None and not (isinstance(half_range, float | int) and 0.0 < half_range <= WIDEST):
+    if half_range is not None and not 0.0 < as_number(half_range, "range") <= WIDEST:
         raise SpecError(
             f"range: must be greater than 0 and at most {WIDEST} (0.1 is 10 %), found {half_range}."
         )

@@ -57,17 +57,18 @@ class Fit:
         """Parameters of the spec, over `scale`, shape (p,)."""
         return np.array([self.machine.parameters[name] for name in self.names]) / self.scale
 
-    def solve(self) -> tuple[Array, Array]:
+    def solve(self, *, small_first: bool = True) -> tuple[Array, Array]:
         """Find the unknowns, and the noise of every log.
 
         A long log has many local minima, one for every period that a wrong frequency can lose over it. So its
         first period is fitted first, and then as much again, until it is used up. What a part of the log does
-        not tell stays near the spec meanwhile. Small swings, which take no integration, are tried first.
+        not tell stays near the spec meanwhile. Small swings, which take no integration, are tried first,
+        if asked: where swings are large, they may lead to another minimum.
         """
         names, guess = self.names, self.expected
         if not self.models:
             return self.improved(guess, np.empty(0)), np.empty(0)
-        if (near := self._as_of_small_swings()) is not None:
+        if small_first and (near := self.as_of_small_swings()) is not None:
             return self.near(near)
         until, longest = self.models[0].period, max(model.log.times[-1] for model in self.models)
         starts = [model.guess(self.machine.parameters, until) for model in self.models]
@@ -79,7 +80,7 @@ class Fit:
             until *= 2.0
         return self.near(unknowns)
 
-    def _as_of_small_swings(self) -> Array | None:
+    def as_of_small_swings(self) -> Array | None:
         """Find the unknowns of small swings, where the machine's own swing is hardly another one."""
         if all(model.small for model in self.models):
             return None

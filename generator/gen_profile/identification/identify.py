@@ -30,7 +30,7 @@ from gen_profile.phrase import AND, Phrase, joined
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.spec.reading import as_names, as_number, as_numbers, as_path, as_spec, as_text
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable
 from gen_profile.units import units_of
@@ -174,22 +174,24 @@ def read_swing(
     loads = spec.machine().loads
     if not isinstance(columns, tuple | list) or len(columns) != len(("time", "value")):
         raise SpecError(f"columns: name two, of times and values, such as (1, 2), found {columns!r}.")
-    if time_unit is not None and time_unit not in TIME_UNITS:
+    if time_unit is not None and as_text(time_unit, "time_unit: a unit") not in TIME_UNITS:
         raise SpecError(f"time_unit: unknown unit {time_unit!r}{suggestion(time_unit, TIME_UNITS)}")
-    quantity, _, named = signal.partition(":")
+    quantity, _, named = as_text(signal, "signal: a name").partition(":")
     load = named or loads[0]
     if quantity not in SI_UNITS:
         raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, SI_UNITS)}")
     if load not in loads:
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
-    per_unit = None if unit is None else _per_unit(unit, quantity, SI_UNITS[quantity])
+    per_unit = (
+        None if unit is None else _per_unit(as_text(unit, "unit: a unit"), quantity, SI_UNITS[quantity])
+    )
     return parse_swing(
         read_text(as_path(path), "swing"),
         str(path),
         columns=(str(columns[0]), str(columns[1])),
         per_second=None if time_unit is None else TIME_UNITS[time_unit],
         per_unit=per_unit,
-        after=after,
+        after=as_number(after, "after"),
         quantity=quantity,
         load=load,
     )
@@ -256,7 +258,7 @@ def identify(
     read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
     asked = {*as_names(free), *read}
     _require_known(plant, readings, asked)
-    stood = tuple(spec.move.target if q_a is None else q_a)
+    stood = tuple(spec.move.target if q_a is None else as_numbers(q_a, "at"))
     if len(stood) != len(plant.actuated):
         template = "at: must hold one position per axis ({axes}), found {found}."
         raise SpecError(template, axes=len(plant.actuated), found=len(stood))

@@ -143,18 +143,18 @@ class LogTable:
         """Tell whether a row holds more than numbers."""
         return any(math.isnan(self.number(row, place)) for place in range(len(self.rows[row])))
 
-    def numbers(self, head: int, places: Sequence[int]) -> Array:
+    def numbers(self, head: int, places: Sequence[int], since: float = -math.inf) -> Array:
         """Read columns of numbers, the first of which are times, below a row; shape (rows, columns).
 
         What stands above the first time is passed over, and rows in which a logger left a cell empty. Dates
-        count from the first, in s.
+        count from the first, in s. From the time `since` on they must rise.
 
         Raises
         ------
         OutputError
-            A cell holds no number, or numbers with decimal commas stand between commas.
+            A cell holds no number, numbers with decimal commas stand between commas, or times do not rise.
         """
-        time, values = places[0], array("d")
+        time, values, read = places[0], array("d"), array("L")
         below = range(head + self.is_head(head), len(self.rows))
         first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
         self._require_separate(head, first)
@@ -177,10 +177,25 @@ class LogTable:
                     )
                     raise self._fault(template, row=line, name=name, text=text[:40], hint=hint)
             values.extend(values_here)
+            read.append(row)
         table = np.array(values).reshape(-1, len(places))
         if len(table) and math.isnan(self.number(first, time)):  # a date
             table[:, 0] -= table[0, 0]
+        self._require_rising(table[:, 0], read, since)
         return table
+
+    def _require_rising(self, times: Array, rows: Sequence[int], since: float) -> None:
+        counts = np.flatnonzero(times >= since)
+        back = np.flatnonzero(np.diff(times[counts]) <= 0.0)
+        if len(back):
+            before, after = counts[back[0] : back[0] + 2]
+            template = (
+                "{source}, row {row}: the times must rise from row to row, and {after:.9g} follows "
+                "{before:.9g}; sort the rows, remove those that come twice, or cut the log where the clock "
+                "was set back."
+            )
+            row = self.rows.line(rows[after])
+            raise self._fault(template, row=row, after=times[after], before=times[before])
 
     def _require_separate(self, head: int, first: int) -> None:
         """Refuse numbers whose decimal commas separate columns, too: they are twice as many as the names."""

@@ -15,6 +15,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.identification.log_table import read_table
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.phrase import Phrase
+from gen_profile.spec.reading import as_text
 from gen_profile.summary import Sampled
 from gen_profile.units import units_of
 
@@ -122,7 +123,7 @@ def parse_reading(text: str, option: str = "measured") -> DirectReading:
     >>> gp.parse_reading("L1=0.47±0.005")
     DirectReading(parameter='L1', value=0.47, uncertainty=0.005)
     """
-    match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
+    match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", as_text(text, f"{option}: a text"))
     if match is None:
         comma = _decimal_points(text)
         raise SpecError(
@@ -145,7 +146,9 @@ def parse_period(text: str) -> Period:
     >>> gp.parse_period("17.3±0.2/10")
     Period(mode=1, seconds=1.73, uncertainty=0.02)
     """
-    match = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
+    match = re.fullmatch(
+        rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", as_text(text, "period: a text")
+    )
     if match is None:
         raise SpecError(
             f"period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
@@ -211,7 +214,7 @@ def parse_swing(
         per or _per_stated(cells.cell(head, place), cells.unit(head, place), source, measured, units)
         for place, (per, measured, units) in zip(places, known, strict=True)
     ]
-    table = cells.numbers(head, places) / scales
+    table = cells.numbers(head, places, after * scales[0]) / scales
     return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
 
 
@@ -255,7 +258,6 @@ def cut_swing(
     if len(times) < LEAST_SAMPLES:
         template = "{source}: a swing needs at least {least} samples, found {count}."
         raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
-    require_rising(times, source)
     if quantity == "angle":
         require_angle(values)
     return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
@@ -267,17 +269,6 @@ def require_angle(values: Array) -> None:
         raise SpecError(
             "unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?", span=span
         )
-
-
-def require_rising(times: Array, source: str) -> None:
-    """Refuse, by an `OutputError`, times in s that do not rise."""
-    back = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(back):
-        template = (
-            "{source}: the times must rise from row to row, and do not after {time:.6g} s; sort the rows, "
-            "and remove those that come twice."
-        )
-        raise OutputError(template, source=source, time=times[back[0]])
 
 
 def _positive(where: str, what: str, value: float) -> float:

@@ -163,9 +163,12 @@ class Explanation:
 
 
 def elsewhere(fit: Fit) -> Explanation | None:
-    """Find a fit that leaves nothing but noise, begun at other values of a parameter that was not read."""
+    """Find a fit that leaves nothing but noise, by large swings, or begun at another value of a parameter."""
     if not fit.models:
         return None
+    begun_small = fit.as_of_small_swings() is not None
+    if begun_small and (patiently := nothing_left(fit, (), small_first=False)) is not None:
+        return patiently
     rough, read = _rough(fit), {getattr(reading, "parameter", "") for reading in fit.readings}
     begun = (_of_small_swings(rough, name) for name in fit.names if name not in read)
     found = (nothing_left(attrs.evolve(one.fit, models=fit.models), ()) for one in begun if one.explains)
@@ -259,10 +262,10 @@ def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
     return min(fits, key=lambda one: one.squares)
 
 
-def nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:
+def nothing_left(fit: Fit, freed: tuple[str, ...], *, small_first: bool = True) -> Explanation | None:
     """Identify the parameters; None where lines are left even so, or a range is of no use."""
     try:
-        unknowns, noise = fit.solve()
+        unknowns, noise = fit.solve(small_first=small_first)
         around = uncertainty(fit, unknowns, noise)
     except (InfeasibleProblem, CosimulationError, np.linalg.LinAlgError):
         return None

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, Decimal
 from functools import lru_cache
+from numbers import Real
 from typing import Any, Protocol
 
 import attrs
@@ -388,7 +389,7 @@ def require_samples(value: object, axes: int) -> None:
 
 
 def _require_cycle(cycle_time: float) -> None:
-    if isinstance(cycle_time, str) or not (np.isfinite(cycle_time) and cycle_time > 0.0):
+    if not isinstance(cycle_time, Real) or not (np.isfinite(cycle_time) and cycle_time > 0.0):
         raise GenProfileError("A sampled profile's cycle time must be positive.")
 
 

@@ -1,7 +1,7 @@
 """The planner block as an object in Python: its own text, called cycle by cycle or for whole histories."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
@@ -16,7 +16,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
 from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs, sensed_axes
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec, as_values
+from gen_profile.spec.reading import as_numbers, as_spec, as_values
 from gen_profile.suggestion import suggestion
 from gen_profile.summary import Sampled, Summarised
 
@@ -234,7 +234,9 @@ class Planner(Summarised):
             raise SpecError(f"axis: must be a place in `axes`, from 0 to {last}, found {axis!r}.")
         columns: dict[str, list[float]] = {}
         for what, rows, names in (("blocked", blocked, ZONES[:2]), ("slow", slow, ZONES[2:])):
-            numbers = [[float(_column(what, value, 1)[0]) for value in row] for row in rows]
+            if not isinstance(rows, Iterable):
+                raise SpecError(f"{what}: must be rows of {len(names)} numbers, found {rows!r}.")
+            numbers = [as_numbers(row, f"{what}, a row") for row in rows]
             if any(len(row) != len(names) for row in numbers):
                 raise SpecError(f"{what}: must be rows of {len(names)} numbers, found {list(rows)!r}.")
             columns |= {name: [row[k] for row in numbers] for k, name in enumerate(names)}

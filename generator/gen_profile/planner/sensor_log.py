@@ -118,9 +118,9 @@ def read_sensor_log(text: str, axes: Sequence[BlockAxis]) -> SensorLog:
             readings.append([float(row[name] or "") for name in columns])
         except ValueError:
             raise SpecError(f"sensor, line {line}: {' and '.join(columns)} must be numbers.") from None
+        if not (readings[-2][0] if readings[1:] else 0.0) <= readings[-1][0] < math.inf:
+            raise SpecError(f"sensor, line {line}: time_s must rise from 0 or later on; sort the rows.")
     if not readings:
         raise SpecError(f"sensor: there is no row; write one such as 0.0{',0.01' * len(axes)}.")
     times, *values = np.array(readings).T
-    if not (math.isfinite(times.sum()) and times[0] >= 0.0 and (np.diff(times) >= 0.0).all()):
-        raise SpecError("sensor: time_s must rise from 0 or later on; sort the rows.")
     return SensorLog(axes=axes, times=times, values=np.stack(values, axis=1))

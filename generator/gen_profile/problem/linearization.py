@@ -14,6 +14,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_rows
 from gen_profile.problem.symbolic import Function
+from gen_profile.spec.reading import as_number, as_numbers, as_values
 
 SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
 
@@ -94,10 +95,11 @@ def linearize(
     if not isinstance(plant, Plant):
         kind = type(plant).__name__
         raise SpecError(f"A machine is expected, such as spec.machine() gives, found a {kind}.")
+    parameters = as_values(parameters, "parameters")
     for name in (parameter.name for parameter in plant.parameters):
-        if not math.isfinite(parameters.get(name, math.nan)):
+        if not math.isfinite(as_number(parameters.get(name, math.nan), f"parameters: {name}")):
             raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")
-    axes = [0.0] * len(plant.actuated) if q_a is None else q_a
+    axes = [0.0] * len(plant.actuated) if q_a is None else as_numbers(q_a, "at")
     if len(axes) != len(plant.actuated):
         template = "at: must hold one position per axis ({axes}), found {found}."
         raise SpecError(template, axes=len(plant.actuated), found=len(axes))

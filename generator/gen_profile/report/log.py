@@ -21,7 +21,7 @@ import attrs
 
 from gen_profile.errors import OutputError
 from gen_profile.identification.log_table import SPELLINGS, LogTable, read_table, read_text
-from gen_profile.identification.measurements import LEAST_SAMPLES, SI_UNITS, require_angle, require_rising
+from gen_profile.identification.measurements import LEAST_SAMPLES, SI_UNITS, require_angle
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.spec.model import Spec
 from gen_profile.units import COUNTS, UNITS
@@ -129,7 +129,6 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     if len(times) < LEAST_SAMPLES:
         template = "{where}: needs at least {least} samples, found {count}."
         raise OutputError(template, where=where, least=LEAST_SAMPLES, count=len(times))
-    require_rising(times, where)
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
     for (quantity, owner), values in signals.items():
         if quantity == "angle":

@@ -29,6 +29,7 @@ COARSE = Search(
     precision=5e-3, close=0.06, aim=-0.03, slope=15.0, believed=(1.0, math.inf), growth=8.0, longest=1.0
 )
 EXACT = attrs.evolve(COARSE, precision=1e-3, close=4e-3, aim=-1.5e-3, stride=1e-3, downward=True)
+LONGEST_MOVE = 1e5  # s, of spec.values.Duration
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -85,6 +86,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
 
 def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Problem, Relaxed]:
     """Find the shortest motion within the limits, and the problem with the spread that machines have then."""
+    _require_short(choice.usual_duration(problem))
     swayed = transient_sway.limited(problem)
     least = choice.minimum_time(problem, progress, search=ROUGHLY if swayed else SHORTEST)
     with suppress(OutOfWork), budget(SPREADING * left()):
@@ -106,7 +108,30 @@ def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Pr
             reasons=[Reason(code=Code.INFEASIBLE, place="move.duration")],
             suggestions=better,
         )
+    _require_short(least.duration)
     return problem, least
+
+
+def _require_short(duration: float) -> None:
+    """Refuse limits within which a move lasts longer than a spec may state.
+
+    Raises
+    ------
+    InfeasibleProblem
+    """
+    if duration > LONGEST_MOVE:
+        raise InfeasibleProblem(
+            Phrase(
+                "move.duration: by an estimate, the shortest move within the limits takes some "
+                "{needed:.0f} s; it may last {most:.0f} s.",
+                needed=float(f"{duration:.2g}"),
+                most=LONGEST_MOVE,
+            ),
+            Phrase("Widen the limits, or see whether all numbers of the spec are in its units."),
+            reasons=[
+                Reason(code=Code.INFEASIBLE, place="move.duration", found=duration, allowed=LONGEST_MOVE)
+            ],
+        )
 
 
 def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress: Progress) -> Draft | None:
@@ -159,5 +184,5 @@ def _drafted(spec: Spec, relaxed: Relaxed) -> Draft:
 
 
 def _slow(spec: Spec, problem: Problem) -> Spec:
-    """Give a spec so much time that it is not the time that it lacks."""
-    return lasting(spec, rounded_up(SLOW * choice.usual_duration(problem)))
+    """Give a spec so much time that it is not the time that it lacks, as far as a move may last so long."""
+    return lasting(spec, min(rounded_up(SLOW * choice.usual_duration(problem)), LONGEST_MOVE))

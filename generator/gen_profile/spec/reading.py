@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from importlib.resources import files
+from numbers import Real
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,6 +26,7 @@ LONG_KEY = re.compile(
     r"(?<![\w-])(?:(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
     rf"{{{MOST_PARTS}}}"
 )
+NO_SPEC = "; a spec is a .toml file, and gen-profile check takes what was exported, before a spec"
 SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
@@ -77,7 +79,21 @@ def as_names(names: Sequence[str] | str) -> Sequence[str]:
     """Take names as they are, or a single one, whose letters are no names; raises SpecError likewise."""
     if not isinstance(names, Iterable):
         raise SpecError(f"A name, or a list of names, is expected, found {names!r}.")
-    return (names,) if isinstance(names, str) else names
+    return (names,) if isinstance(names, str) else [as_text(name, "A name") for name in names]
+
+
+def as_text(text: str, what: str) -> str:
+    """Take a text; raises SpecError where it is none."""
+    if not isinstance(text, str):
+        raise SpecError(f"{what} is expected, found {found(text)}.")
+    return text
+
+
+def as_number(number: float, what: str) -> float:
+    """Take a number of any kind; raises SpecError where it is none, or a truth value."""
+    if not isinstance(number, Real) or isinstance(number, bool):
+        raise SpecError(f"{what}: must be a number, found {found(number)}.")
+    return float(number)
 
 
 def as_values(values: Mapping[str, Given], what: str) -> Mapping[str, Given]:
@@ -85,6 +101,13 @@ def as_values(values: Mapping[str, Given], what: str) -> Mapping[str, Given]:
     if not isinstance(values, Mapping):
         raise SpecError(f"{what}: give values by name, such as {{'L1': 6.0}}, found {values!r}.")
     return values
+
+
+def as_numbers(numbers: Sequence[float], what: str) -> list[float]:
+    """Take numbers, one by one; raises SpecError likewise."""
+    if isinstance(numbers, str) or not isinstance(numbers, Iterable):
+        raise SpecError(f"{what}: must be a list of numbers, found {found(numbers)}.")
+    return [as_number(number, what) for number in numbers]
 
 
 def read_text(path: Path) -> str:
@@ -135,8 +158,7 @@ def parse_spec(
     >>> gp.parse_spec("plant.type = 'slosh-tank'\nmove = { distance = 0.5, duration = 2.0 }").plant.type
     'slosh-tank'
     """
-    if not isinstance(text, str):
-        raise SpecError(f"{source}: a text is expected, found {found(text)}.")
+    text = as_text(text, f"{source}: a text")
     document = _document(text, source)
     if not document and not overrides and not tables:
         raise SpecError(f"{source}: the spec is empty; it must state at least [plant] type and [move].")
@@ -237,7 +259,7 @@ def preset_text(name: str) -> str:
     SpecError
         There is no such preset.
     """
-    if name not in presets():
+    if as_text(name, "A preset's name") not in presets():
         raise SpecError(f"preset: unknown preset {name!r}{suggestion(name, presets())}")
     return (files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8")
 
@@ -270,7 +292,8 @@ def _document(text: str, source: str) -> Table:
         last = text.split("\n")
         end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
         problem = re.sub(r"[(]at end of document[)]", end, str(error))
-        raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
+        hint = _slip(text, problem) if Path(source).suffix in {".toml", ""} else NO_SPEC
+        raise SpecError(f"{source}: not valid TOML: {problem}{hint}.") from error
 
 
 def parse_toml(text: str) -> Table:

@@ -166,6 +166,11 @@ class TestOnAChannel:
         assert outcome.code == 0
         assert outcome.out.splitlines()[-1].startswith("No node answers on virtual an empty one: check")
 
+    def test_nobody_in_json_is_no_node_and_no_channel_is_no_answer(self):
+        asked = run_here("can", "list", "--interface", "virtual", "--channel", "an empty one", "--json")
+        assert (asked.code, asked.document["nodes"]) == (0, [])
+        assert run_here("can", "list", "--interface", "virtual", "--json").document["nodes"] is None
+
     def test_a_channel_without_its_interface(self):
         outcome = run_here("can", "list", "--channel", "can0")
         assert (outcome.code, "name its interface" in outcome.err) == (2, True)
