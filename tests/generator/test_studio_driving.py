@@ -19,6 +19,7 @@ LIMITS = {
     "limits.travel": [-1.0, 1.0],
 }
 EDITS = {**LIMITS, "export.cycle_time": 0.01, "planner.live.L1": [0.4, 0.5], "check.residual_sway": 0.02}
+GANTRY = {**LIMITS, "limits.travel": [0.0, 20.0], "check.residual_sway": 0.2}
 
 
 SENSED = {
@@ -129,19 +130,18 @@ def test_what_is_no_command_is_a_sentence():
 
 
 def test_several_axes_take_a_value_each():
-    edits = {**LIMITS, "limits.travel": [-1.0, 20.0], "check.residual_sway": 0.2}
-    (part,) = drive(asked("gantry-crane", edits, drive=5))
+    (part,) = drive(asked("gantry-crane", GANTRY, drive=5))
     assert [axis["name"] for axis in part["axes"]] == ["x", "y"]
-    (part,) = drive(asked("gantry-crane", edits, drive=5, command="velocity", values=(0.1,)))
+    (part,) = drive(asked("gantry-crane", GANTRY, drive=5, command="velocity", values=(0.1,)))
     assert [one["sentence"] for one in part["faults"]] == ["The planner takes 2 values, one for each axis."]
 
 
 @pytest.mark.parametrize(
-    ("preset", "limits", "view"),
-    [("paper", {}, 0), ("gantry-crane", {"limits.travel": [0.0, 20.0], "check.residual_sway": 0.2}, -1)],
+    ("preset", "edits", "view"),
+    [("paper", EDITS, 0), ("gantry-crane", GANTRY, -1)],
 )
-def test_the_target_is_where_the_load_hangs_in_the_picture_that_is_pointed_at(preset, limits, view):
-    going = Drive(asked(preset, {**LIMITS, **limits}).question.spec())
+def test_the_target_is_where_the_load_hangs_in_the_picture_that_is_pointed_at(preset, edits, view):
+    going = Drive(asked(preset, edits).question.spec())
     view %= len(going._bounds)
     there = np.array([0.4] if preset == "paper" else [3.0, 1.2])
     place = going._marks(there)[view]
