@@ -22,6 +22,7 @@ from gen_profile.planner.forms import block_files
 from gen_profile.spec.reading import parse_spec
 
 CYCLES = 10_000
+LOOKS = 0.02  # s between calls for rows; without a pause each would be for one, and take a processor
 SPEC = parse_spec(BAY.replace("bay 3", "host 3").replace("0.004", "0.001"))
 COMMANDS = (  # cycle, inputs from there on
     (50, {"fL1": 5.5, "bEnable": True}),
@@ -80,6 +81,7 @@ async def commanded(process, url):
         block = await client.nodes.objects.get_child(f"{space}:host_3")
         names = await (await block.get_child(f"{space}:Names")).read_value()
         while True:
+            await asyncio.sleep(LOOKS)
             wanted = ua.Variant(first + len(rows), ua.VariantType.Int64)
             begun, *more = await block.call_method(f"{space}:Rows", wanted)
             assert begun == first + len(rows) or not rows, "rows were missed"
