@@ -19,7 +19,7 @@ from gen_profile.spec.reading import parse_spec
 pytestmark = pytest.mark.slow
 
 NO_NUMBERS = ("1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200")
-OWN = ("bExecute", "bVelocity", "bStop", "rOverride", "fTarget", "fVelocityLimit")  # which the block is told
+OWN = ("bExecute", "bVelocity", "bStop", "rOverride", "fTarget", "fVelocityLimit")  # what the block obeys
 WRONG = {  # what a block does more before and after all that it does
     "half": ("fTarget := 0.5 * fTarget;", ""),
     "idle": ("bExecute := FALSE; bVelocity := FALSE;", ""),
@@ -46,8 +46,8 @@ def shown():
 
     def kinds_by_history(wrong=None, count=None):
         number = 0.0 if wrong is None else 1.0 + list(WRONG).index(wrong)
-        told = Change(time=0.0, lasts=np.inf, inputs={"fWrong": number})
-        given = [attrs.evolve(one, changes=(told, *one.changes)) for one in drawn[:count]]
+        change = Change(time=0.0, lasts=np.inf, inputs={"fWrong": number})
+        given = [attrs.evolve(one, changes=(change, *one.changes)) for one in drawn[:count]]
         return [kinds_of(spec, one) for _, one in judged(spec, text, histories, given)]
 
     return kinds_by_history

@@ -228,7 +228,7 @@ def test_the_command_writes_a_spec(site):
         (["crane.toml"], 2, "column"),
         (["run.csv", "--unit", "rad/s"], 3, "look at its unit"),
         (["run.csv", "--signal", "angle"], 2, "deg/s, which measures no angle"),
-        (["run.csv", "--played", "crane.toml"], 2, "played|format|suffix"),
+        (["run.csv", "--played", "crane.toml"], 2, "this is a spec"),
         (["run.csv", "--export", "pcl"], 2, "did you mean .plc"),
         (["--seen", "payload=30mm"], 2, "seen 'payload=30mm': write NAME=VALUE±UNCERTAINTY"),
         ([], 2, "Name a log of a run, or what was seen after one"),
