@@ -37,6 +37,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (400, 12, 20),  # stop ends 10⁹ m away in a cycle without bEnable, in which a pulse had been weighed
         (400, 2, 35),  # a stick 3.4 s late, as what was taken away of a motion that speeds up was nothing
         (400, 13, 12),  # moved by a tap that was given before the machine was known
+        (300, 31, 97),  # fTimeToGo 8 s too short where an axis turned round, as that of the stop was stated
         (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
     ],
     "wide": [
