@@ -17,6 +17,7 @@ from gen_profile.solvers.search import Search, least, slope_of
 from gen_profile.solvers.shape import shaped_motion
 from gen_profile.solvers.suggestions import beside, remedy, sufficient_duration
 from gen_profile.spec.model import Spec
+from gen_profile.spec.values import LONGEST_MOVE
 from gen_profile.work import OutOfWork, budget, left, spend
 
 SLOW = 2.0  # times the usual duration, which is time enough where no duration keeps the limits
@@ -29,7 +30,6 @@ COARSE = Search(
     precision=5e-3, close=0.06, aim=-0.03, slope=15.0, believed=(1.0, math.inf), growth=8.0, longest=1.0
 )
 EXACT = attrs.evolve(COARSE, precision=1e-3, close=4e-3, aim=-1.5e-3, stride=1e-3, downward=True)
-LONGEST_MOVE = 1e5  # s, of spec.values.Duration
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
