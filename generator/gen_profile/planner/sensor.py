@@ -59,6 +59,7 @@ LEAST_EFFECT = 0.3  # of damping pulses on the slowest mode, by what one without
 LEAST_SHOWN = 1e-3  # of the slowest mode, by what the sensor shows of the others
 LARGEST_DELAY, UNKNOWN_DELAY = 0.7, 0.25  # rad of the slowest mode
 ACCURATE = 5e-3  # of what the sensor shows, between the points of interpolation
+IMPULSE_STEP, IMPULSE_PHASE = 0.1, 40.0  # rad of the fastest and the slowest mode: of an impulse's response
 MOST_EXPECTED = 4000  # cycles in which a value may be as old as the oldest
 
 
@@ -183,6 +184,7 @@ def _constants(
         gains=_law().tolist(),
         misread=MISREAD,
         room=damping_room(spec),
+        unfollowed=unfollowed_sway(spec),
     )
 
 
@@ -201,6 +203,43 @@ def largest_innovation(spec: Spec) -> float:
     points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
     sensed = (_sensed(spec, point, one) for point in points for one in directions)
     return _gate(sensor, max(_disturbed(sensor, disturbance, one) for one in sensed))
+
+
+def unfollowed_sway(spec: Spec) -> float:
+    """Find by how much, in m, an estimate of the end load's sway is off in gusts and with wrong frequencies.
+
+    No acceleration within bounds moves it by more than the integral of the size of what an impulse leaves
+    (Desoer and Vidyasagar 1975); wrong frequencies act as an acceleration on the stated swing and on what
+    the axes' own accelerations make of it.
+    """
+    points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
+    own = 2.0 * max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
+    return max(_unfollowed(spec, _sensed(spec, point, one), own) for point in points for one in directions)
+
+
+def _unfollowed(spec: Spec, one: SensedModes, own: float) -> float:
+    assert spec.planner.sensor is not None
+    state, measured, gain = _filter(spec.planner.sensor, one)
+    estimated, pushed = np.zeros((2, len(state)))
+    estimated[:-1:2], pushed[1:-1:2] = one.end_load, one.push
+    step = IMPULSE_STEP / float(one.frequencies[-1])
+    turned, left = expm((state - np.outer(gain, measured[0])) * step), list[float]()
+    for _ in range(round(IMPULSE_PHASE / (step * float(one.frequencies[0])))):
+        left.append(abs(float(estimated @ pushed)))
+        pushed = turned @ pushed
+    return float(np.sum(left) * step * (_accelerations(spec, one) + _misjudged(spec) * own))
+
+
+def _accelerations(spec: Spec, one: SensedModes) -> float:
+    """Find what acts as an acceleration in m/s² and is not known: gusts, and wrong frequencies."""
+    gust = spec.planner.disturbance.gust if spec.planner.disturbance else None
+    restoring = float(one.frequencies[0]) ** 2 * one.swing / abs(float(one.push[0]))
+    return (gust.acceleration if gust else 0.0) + _misjudged(spec) * restoring
+
+
+def _misjudged(spec: Spec) -> float:
+    """By which share the slowest mode's stiffness may be wrong."""
+    return 2.0 * float(frequency_errors(spec)[0])
 
 
 def _gate(sensor: SensorSpec, disturbed: float) -> float:
@@ -295,7 +334,7 @@ def _known_sway(spec: Spec, one: SensedModes) -> Array:
     return known
 
 
-def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedModes) -> float:
+def _others(spec: Spec, sensor: SensorSpec, one: SensedModes) -> float:
     """Find how much of what differs is not the sensor's fault at most.
 
     It comes from gusts, what is unknown at first, wrong frequencies and noise: the root of its square's
@@ -311,13 +350,15 @@ def _others(spec: Spec, sensor: SensorSpec, disturbance: DisturbanceSpec, one: S
         abs(measured[0] @ np.linalg.solve(1j * frequency * np.eye(len(state)) - corrected, pushed))
         for frequency in slowest * np.geomspace(0.1, 10.0, 100)
     )
-    accelerations = disturbance.gust.acceleration if disturbance.gust else 0.0
-    accelerations += 2.0 * float(frequency_errors(spec)[0]) * slowest**2 * one.swing / abs(float(one.push[0]))
     period = 2.0 * np.pi / slowest
     later = expm(corrected * period) @ freed
     energy = later.T @ solve_continuous_lyapunov(corrected.T, -measured.T @ measured) @ later
     noise = SURE_OTHERS * sensor.noise * np.sqrt(max(NOISE_TIME, spec.export.cycle_time))
-    seen = peak * accelerations * np.sqrt(0.5 * MEMORY * period) + np.sqrt(np.linalg.norm(energy, 2)) + noise
+    seen = (
+        peak * _accelerations(spec, one) * np.sqrt(0.5 * MEMORY * period)
+        + np.sqrt(np.linalg.norm(energy, 2))
+        + noise
+    )
     return float(seen * np.sqrt(slowest))
 
 
@@ -327,8 +368,8 @@ def _rows(spec: Spec, directions: Mapping[int, SensedDirection], point: Sequence
     These are the offset's gain, and `_others`. The gains are those for a cycle, of what differed as long ago
     as a value usually is old. Of an axis without a sensor all are 0.
     """
-    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
-    assert sensor is not None and disturbance is not None
+    sensor = spec.planner.sensor
+    assert sensor is not None
     modes, rows = len(linearized(spec, point).distinct_frequencies), list[Array]()
     for number in planned_axes(spec):
         rows.append(np.zeros(model_rows(modes)))
@@ -336,7 +377,7 @@ def _rows(spec: Spec, directions: Mapping[int, SensedDirection], point: Sequence
             one = _sensed(spec, point, directions[number])
             state, _, gain = _filter(sensor, one)
             now = spec.export.cycle_time * expm(state * _age(sensor)) @ gain
-            others = _others(spec, sensor, disturbance, one)
+            others = _others(spec, sensor, one)
             rows[-1][:] = *one.push, *one.shown, *one.end_load, *now[:-1:2], *now[1:-1:2], now[-1], others
     return np.concatenate(rows)
 

@@ -12,7 +12,7 @@ from gen_profile.planner.machine import driven_modes, planned_axes, sensed_direc
 from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
-from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
+from gen_profile.spec.planner import DisturbanceSpec, GustSpec, SensorSpec
 from gen_profile_fmu.running.block_run import BlockRun, Measurement
 
 CHOICES = 14
@@ -40,7 +40,6 @@ NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
 JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
-OFF = 0.3  # of the stated swing, by which an estimate may be off beside: by gusts, and a wrong rope (0.26)
 SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
 STRONG = 1.5  # own motions by gusts, root mean square of a period, at which that is known
 KNOWN_TO = 0.4  # (0.35)
@@ -259,6 +258,7 @@ def sensor_faults(
     cycle: float,
     period: float,
     last: float,
+    unfollowed: float,
     resets: Sequence[float] = (),
 ) -> Iterator[str]:
     """Say what is wrong with how a block used its sensor, each in words that end a sentence.
@@ -272,6 +272,8 @@ def sensor_faults(
     outputs : sequence of str
     cycle, period, last : float
         s: a cycle, the slowest swing, and when the last command came, or an input last changed.
+    unfollowed : float
+        m, by which an estimate may be off beside what it states, from `unfollowed_sway`.
     resets : sequence of float
         s, when bReset was set.
     """
@@ -281,7 +283,10 @@ def sensor_faults(
     for place, (number, direction) in enumerate(sensed_directions(spec).items()):
         axis, fault = axes[number], one.fault if place == one.failing else ""
         sway = run.trace[:, len(outputs) + direction.end_load]
-        yield from _misstated(disturbance, one, fault, (axis, issued, sway), (cycle, period, resets))
+        if not one.fault:
+            yield from _misestimated((axis, issued, sway), unfollowed, cycle)
+        if fault in SHOWS and disturbance.gust is not None:
+            yield from _misread(disturbance.gust, one, fault, (axis, issued), (cycle, period, resets))
         noticed = issued[axis.of("nSensorFault")]
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
@@ -311,24 +316,29 @@ def sensor_faults(
             )
 
 
-def _misstated(
-    disturbance: DisturbanceSpec,
+def _misestimated(
+    given: tuple[BlockAxis, Mapping[str, Array], Array], unfollowed: float, cycle: float
+) -> Iterator[str]:
+    """Say whether the estimated sway is off by more than is stated."""
+    axis, issued, sway = given
+    uncertainty = axis.of("fSwayUncertainty")
+    off = np.abs(issued[axis.of("fSwayEstimated")] - sway) - issued[uncertainty] - unfollowed
+    off *= issued[axis.of("bSensorUsed")] != 0.0
+    at = int(np.argmax(off))
+    if off[at] > 0.0:
+        yield f"{uncertainty} is too small by {off[at]:.3g} m, at {at * cycle:.2f} s"
+
+
+def _misread(
+    gust: GustSpec,
     one: SensedHistory,
     fault: str,
-    given: tuple[BlockAxis, Mapping[str, Array], Array],
+    given: tuple[BlockAxis, Mapping[str, Array]],
     times: tuple[float, float, Sequence[float]],
 ) -> Iterator[str]:
-    """Say whether what it estimates, or finds a sensor to show of the axis's own motions, is wrong."""
-    (axis, issued, sway), (cycle, period, resets) = given, times
+    """Say whether what a sensor is found to show of the axis's own motions is wrong."""
+    (axis, issued), (cycle, period, resets) = given, times
     used = issued[axis.of("bSensorUsed")] != 0.0
-    if not one.fault:
-        uncertainty = axis.of("fSwayUncertainty")
-        apart = (np.abs(issued[axis.of("fSwayEstimated")] - sway) - issued[uncertainty]) * used
-        at = int(np.argmax(apart))
-        if apart[at] > OFF * min(disturbance.swing.values()):
-            yield f"{uncertainty} is too small by {apart[at]:.3g} m, at {at * cycle:.2f} s"
-    if fault not in SHOWS or disturbance.gust is None:
-        return
     from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
 
     cycles = np.arange(len(used))
@@ -339,7 +349,7 @@ def _misstated(
     moved = issued[axis.of("fAcceleration")][:, None] * np.hstack([since_first, np.ones_like(since_first)])
     share = cycle / period
     own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
-    strength = rate**2 * np.sqrt(own[:, 0]) / disturbance.gust.acceleration
+    strength = rate**2 * np.sqrt(own[:, 0]) / gust.acceleration
     strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
     strength *= cycles < min((round(time / cycle) for time in resets), default=len(used))  # when it forgets
     at = int(np.argmax(strength))
