@@ -154,6 +154,8 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     stronger = np.where(np.arange(5000) * CYCLE < dead.fails, 30.0, 1.0) * swings  # which is still remembered
     assert not faults(dead, fSensorScale=0.6, fAcceleration=stronger)
     assert faults(dead, fSensorScale=0.6, fAcceleration=swings)
+    swung = followed(np.where(np.arange(5000) * CYCLE < dead.fails, 0.5, 0.0), fAcceleration=swings)
+    assert not [*sensor_faults(spec, dead, *swung, cycle=CYCLE, period=3.0, last=1.0, unfollowed=0.15)]
     assert not faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.06)
     (off,) = faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.04)
     assert off.startswith("fSwayUncertainty is too small by 0.01 m")

@@ -41,7 +41,7 @@ JUMP = 2.2  # by the greatest difference from what is expected that counts as a 
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
-STRONG = 1.5  # own motions by gusts, root mean square of a period, at which that is known
+STRONG = 1.5  # own motions by what else swings, root mean square of a period, at which that is known
 KNOWN_TO = 0.4  # (0.35)
 LEAKY = 0.3  # damping ratio by which what is shown of them is forgotten
 ONCE, AS_OFTEN = 1, 3  # that an axis moves on at rest, where a load seems to swing by just too much
@@ -286,7 +286,7 @@ def sensor_faults(
         if not one.fault:
             yield from _misestimated((axis, issued, sway), unfollowed, cycle)
         if fault in SHOWS and disturbance.gust is not None:
-            yield from _misread(disturbance.gust, one, fault, (axis, issued), (cycle, period, resets))
+            yield from _misread(disturbance.gust, one, fault, (axis, issued, sway), (cycle, period, resets))
         noticed = issued[axis.of("nSensorFault")]
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
@@ -333,11 +333,11 @@ def _misread(
     gust: GustSpec,
     one: SensedHistory,
     fault: str,
-    given: tuple[BlockAxis, Mapping[str, Array]],
+    given: tuple[BlockAxis, Mapping[str, Array], Array],
     times: tuple[float, float, Sequence[float]],
 ) -> Iterator[str]:
     """Say whether what a sensor is found to show of the axis's own motions is wrong."""
-    (axis, issued), (cycle, period, resets) = given, times
+    (axis, issued, sway), (cycle, period, resets) = given, times
     used = issued[axis.of("bSensorUsed")] != 0.0
     from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
 
@@ -349,7 +349,9 @@ def _misread(
     moved = issued[axis.of("fAcceleration")][:, None] * np.hstack([since_first, np.ones_like(since_first)])
     share = cycle / period
     own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
-    strength = rate**2 * np.sqrt(own[:, 0]) / gust.acceleration
+    before = sway[max(0, round((first - period) / cycle)) : round(first / cycle)]  # shown otherwise later
+    others = gust.acceleration + rate**2 * np.abs(before).max(initial=0.0)
+    strength = rate**2 * np.sqrt(own[:, 0]) / others
     strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
     strength *= cycles < min((round(time / cycle) for time in resets), default=len(used))  # when it forgets
     at = int(np.argmax(strength))
