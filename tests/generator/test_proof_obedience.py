@@ -268,6 +268,7 @@ def test_a_command_that_changes_nothing_for_too_long_is_obeyed_late():
     assert late not in kinds(early, {120: 49})
     assert late in kinds(early, {120: 52})
     assert kinds(obedient(), {TOLD: 152, STOPPED: 152}) == set()  # the way was the right one
+    assert kinds(attrs.evolve(obedient(), reaction=1.505), {TOLD: 151}) == set()  # between two cycles
     assert kinds(obedient(), {STOPPED: None}) == set()  # what came before ended anyway, and in time
 
 

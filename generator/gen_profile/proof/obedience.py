@@ -305,10 +305,12 @@ def _reactions(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[A
         allowed = run.reaction + calmed(run) * run.period
         if before.any():
             allowed = run.reaction + slowing(run, before, RUN_OUT)
-        late = run.after(allowed)
-        if reacted_after is None or (reacted_after > late and _obeys_anyway(run, order, order.begin + late)):
+        if reacted_after is None:
+            continue
+        takes = reacted_after * run.cycle
+        if takes > allowed and _obeys_anyway(run, order, order.begin + run.after(allowed)):
             continue  # what came before ends or goes on as the order asks
-        yield Allowance("reaction", order.begin, reacted_after * run.cycle, allowed)
+        yield Allowance("reaction", order.begin, takes, allowed)
 
 
 def _obeys_anyway(run: Followed, order: TimedOrder, at: int) -> bool:
