@@ -223,11 +223,11 @@ def _unfollowed(spec: Spec, one: SensedModes, own: float) -> float:
     estimated, pushed = np.zeros((2, len(state)))
     estimated[:-1:2], pushed[1:-1:2] = one.end_load, one.push
     step = IMPULSE_STEP / float(one.frequencies[-1])
-    turned, left = expm((state - np.outer(gain, measured[0])) * step), list[float]()
+    transition, sizes = expm((state - np.outer(gain, measured[0])) * step), list[float]()
     for _ in range(round(IMPULSE_PHASE / (step * float(one.frequencies[0])))):
-        left.append(abs(float(estimated @ pushed)))
-        pushed = turned @ pushed
-    return float(np.sum(left) * step * (_accelerations(spec, one) + _misjudged(spec) * own))
+        sizes.append(abs(float(estimated @ pushed)))
+        pushed = transition @ pushed
+    return float(np.sum(sizes) * step * (_accelerations(spec, one) + _misjudged(spec) * own))
 
 
 def _accelerations(spec: Spec, one: SensedModes) -> float:
