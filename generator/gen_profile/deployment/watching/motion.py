@@ -1,7 +1,5 @@
 """A playback block that is watched: each setpoint against the table that was proved."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_profile.deployment.block_state import ABORTED, DONE, FAILED, MOVING, MotionState
