@@ -58,6 +58,16 @@ class BlockVariable:
         """Initial values of an array."""
         return [text.strip() for text in self.initial.strip("[] \n").split(",")] if self.initial else []
 
+    @property
+    def values(self) -> list[str]:
+        """Initial values, of which a scalar has one."""
+        return self.elements if self.array else [self.initial]
+
+    @property
+    def scalar_type(self) -> str:
+        """Type, or that of an array's elements."""
+        return self.array[2] if self.array else self.type
+
 
 @attrs.frozen(kw_only=True)
 class BlockSource:
@@ -85,10 +95,7 @@ class BlockSource:
 
     def program(self) -> tuple[object, ...]:
         """Give what the block does, however its text is laid out, spelled and commented."""
-        variables = {
-            (v.section, v.name.lower(), bare(v.type), *map(bare, v.elements if v.array else [v.initial]))
-            for v in self.variables
-        }
+        variables = {(v.section, v.name.lower(), bare(v.type), *map(bare, v.values)) for v in self.variables}
         return variables, COMMENT.sub(" ", self.body).lower().split()
 
     def declaration(self) -> str:

@@ -71,11 +71,10 @@ def each(template: str, places: Sequence[Mapping[str, str]]) -> str:
     return "\n".join(template.format(**place) for place in places)
 
 
-def around(template: str, statements: str, library: MotionLibrary) -> str:
+def around(texts: Mapping[str, str], part: str, library: MotionLibrary) -> str:
     """Put a library's statements into a wrapper's, where ``{vendor}`` is; the axis's places stay open."""
-    return template.format(
-        n="{n}", i="{i}", vendor=statements, let_go=LET_GO, **attrs.asdict(library, recurse=False)
-    )
+    values = attrs.asdict(library, recurse=False)
+    return texts[part].format(n="{n}", i="{i}", vendor=values[part], let_go=LET_GO, **values)
 
 
 HOMED = BlockVariable("VAR_INPUT", "bHomed{n}", "BOOL", comment="the axis's position is known")

@@ -132,10 +132,7 @@ def _own(block: BlockSource, units: Mapping[str, float], library: MotionLibrary)
 def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary) -> str:
     places = [{"n": n} for n in units]
     # until it is enabled, the block follows the axis, which goes on as fast as it does
-    prepare, feed = (
-        each(around(template, statements, library), places)
-        for template, statements in ((TEXTS["prepare"], library.prepare), (TEXTS["feed"], library.feed))
-    )
+    prepare, feed = (each(around(TEXTS, part, library), places) for part in ("prepare", "feed"))
     inputs, outputs = ([v for v in block.variables if v.section == section] for section in INTERFACE)
     given = {v.name: v.name for v in inputs if not v.array} | {
         "bEnable": "bGuided AND (nStage >= cGuiding)",

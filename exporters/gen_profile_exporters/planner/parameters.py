@@ -65,7 +65,7 @@ def constant_planner(source: BlockSource) -> BlockSource:
     ours = {f"{name}{OURS}" if f"{name}{OURS}" in there else name for name in names}
     try:
         variables = [
-            _constant(one, [next(texts) for _ in _elements(one)])
+            _constant(one, [next(texts) for _ in one.values])
             if one.section == "VAR" and _NUMBER.fullmatch(one.name)
             else one
             for one in source.variables
@@ -91,15 +91,7 @@ def constant_planner(source: BlockSource) -> BlockSource:
 
 
 def _is_number(variable: BlockVariable) -> bool:
-    return variable.section == "VAR CONSTANT" and _type(variable) != "BOOL"
-
-
-def _type(variable: BlockVariable) -> str:
-    return variable.array[2] if variable.array else variable.type
-
-
-def _elements(variable: BlockVariable) -> list[str]:
-    return variable.elements if variable.array else [variable.initial]
+    return variable.section == "VAR CONSTANT" and variable.scalar_type != "BOOL"
 
 
 def _initial(numbers: list[BlockVariable], name: str) -> str:
@@ -107,7 +99,7 @@ def _initial(numbers: list[BlockVariable], name: str) -> str:
 
 
 def _constant(variable: BlockVariable, texts: list[str]) -> BlockVariable:
-    if _type(variable) == "DINT":
+    if variable.scalar_type == "DINT":
         texts = [text.removesuffix(".0") for text in texts]
     initial = initialiser(texts) if variable.array else texts[0]
     return attrs.evolve(variable, section="VAR CONSTANT", initial=initial)
@@ -118,7 +110,7 @@ def _own(
 ) -> tuple[list[BlockVariable], Callable[[str], str]]:
     """Declare what is added, and give what renames it in statements where the block has such names."""
     cycle = float(_initial(numbers, "cCycle"))
-    content = [text if "." in text else f"{text}.0" for one in numbers for text in _elements(one)]
+    content = [text if "." in text else f"{text}.0" for one in numbers for text in one.values]
     texts = buffers.with_head(content, cycle)
     own = buffers.declared(
         texts,
@@ -174,8 +166,8 @@ def _taken(numbers: list[BlockVariable], base: str, counter: str) -> Iterator[st
     """Take the numbers over from the buffer in use."""
     place = len(buffers.HEAD)
     for one in numbers:
-        convert = "LREAL_TO_DINT({})" if _type(one) == "DINT" else "{}"
-        count = len(_elements(one))
+        convert = "LREAL_TO_DINT({})" if one.scalar_type == "DINT" else "{}"
+        count = len(one.values)
         if one.array:
             value = convert.format(f"{buffers.TABLE}[{base} + {counter} + {place}]")
             yield from _loop(counter, count, f"{one.name}[{counter}] := {value};")
@@ -189,7 +181,7 @@ def _begun(source: BlockSource, counter: str) -> Iterator[str]:
     for one in source.variables:
         if one.section not in ("VAR", "VAR_OUTPUT"):
             continue
-        nothing = _NOTHING[_type(one)]
+        nothing = _NOTHING[one.scalar_type]
         if not one.array:
             yield f"{one.name} := {one.initial or nothing};"
         elif one.initial:

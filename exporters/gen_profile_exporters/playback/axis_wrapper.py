@@ -74,10 +74,7 @@ def _body(inputs: list[str], outputs: list[str], places: list[dict[str, str]], l
     triggers = _triggers(inputs)
     several = len(places) > 1
     stand = each("fStand{i} := " + library.setpoint + ";", places) if several else ""
-    prepare, feed = (
-        each(around(template, statements, library), places)
-        for template, statements in ((TEXTS["prepare"], library.prepare), (TEXTS["feed"], library.feed))
-    )
+    prepare, feed = (each(around(TEXTS, part, library), places) for part in ("prepare", "feed"))
     given = {key: f"{key}Now" if key in triggers else key for key in inputs}
     given |= {
         "bAbort": "bAbort OR (nStage = cStopping)",

@@ -141,7 +141,7 @@ def _buffered(
     sources: Sequence[BlockSource], target: Target, capacity: int | None, *, library: bool
 ) -> BlockSource:
     constants = {variable.name: variable for variable in sources[0].variables}
-    layout, axes = layout_of(sources[0].declaration()), len(_split(constants["cStart"]))
+    layout, axes = layout_of(sources[0].declaration()), len(constants["cStart"].values)
     cycle = float(constants["cCycleTime"].initial)
     texts = _texts([_motion_texts(source, layout, axes) for source in sources], cycle, library=library)
     if capacity is None:
@@ -303,15 +303,11 @@ def _motion_texts(source: BlockSource, layout: str, axes: int) -> list[str]:
     """List the values of a block of constants in the order of a buffer, as literals of LREAL."""
     variables = {variable.name: variable for variable in source.variables}
     scalars = [variables[f"c{name}"].initial if f"c{name}" in variables else "0" for name in SCALARS]
-    own = [_split(variables[f"c{name}"]) for name in PER_AXIS]
-    rows = [_split(variables[f"c{name}"]) for name in COLUMNS[layout]]
+    own = [variables[f"c{name}"].values for name in PER_AXIS]
+    rows = [variables[f"c{name}"].values for name in COLUMNS[layout]]
     if layout == "segments":  # of every axis alike
         rows[-1] = [text for text in rows[-1] for _ in range(axes)]
     return [_as_real(text) for text in chain(scalars, *zip(*own, strict=True), *rows)]
-
-
-def _split(variable: BlockVariable) -> list[str]:
-    return variable.elements if variable.array else [variable.initial]
 
 
 def _as_real(text: str) -> str:

@@ -153,9 +153,7 @@ def _common(source: BlockSource) -> tuple[object, ...]:
     return (
         source.body,
         *(
-            (variable.section, variable.name, variable.array[2] if variable.array else variable.type)
-            if variable.name in OWN
-            else variable
+            (variable.section, variable.name, variable.scalar_type) if variable.name in OWN else variable
             for variable in source.variables
         ),
     )
@@ -171,10 +169,8 @@ def _merged(same: Sequence[BlockVariable]) -> BlockVariable:
     first = same[0]
     if first.name not in OWN or first.name in OUTPUTS:
         return first
-    values = [
-        text for variable in same for text in (variable.elements if variable.array else [variable.initial])
-    ]
-    return _array(first.name, first.array[2] if first.array else first.type, values, first.comment)
+    values = [text for variable in same for text in variable.values]
+    return _array(first.name, first.scalar_type, values, first.comment)
 
 
 def _array(name: str, type_: str, values: Sequence[str], comment: str = "") -> BlockVariable:

@@ -5,6 +5,7 @@ over at both ends (quintic Hermite interpolation), so the whole is twice continu
 are as long as the error at the cycles between allows; a single cycle always fits.
 """
 
+import math
 from functools import lru_cache
 
 import attrs
@@ -67,7 +68,7 @@ class QuinticSegments:
         powers = time[:, :, None] ** np.arange(5)
         size: dict[int, Array] = {}
         for order in (5, 4, 3, 2, 1):
-            factors = np.array([_falling(power, order) for power in range(order, 6)])
+            factors = np.array([math.perm(power, order) for power in range(order, 6)], dtype=np.float64)
             scaled = self.coefficients[:, order:, :] * factors[:, None]
             values = np.abs(powers[:, :, : 6 - order] @ scaled)
             spacing = (length / (points - 1))[:, None]
@@ -170,8 +171,3 @@ def _interpolation(length: int, cycle_time: float) -> Array:
     ends, times = np.eye(6), np.arange(1, length, dtype=np.float64) * cycle_time
     position, _, acceleration = horner(hermite(ends[:3], ends[3:], length * cycle_time), times[:, None])
     return np.array([position / POSITION_ERROR, acceleration / ACCELERATION_ERROR])
-
-
-def _falling(power: int, order: int) -> float:
-    """Factor that differentiating a power so often brings down."""
-    return float(np.prod(np.arange(power, power - order, -1)))

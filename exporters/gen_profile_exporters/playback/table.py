@@ -94,7 +94,7 @@ class PlaybackTable:
         """Cycle from which a stop by the motion's own peaks would end no sooner than the motion."""
         if self.stated_play_on is not None:
             return self.stated_play_on
-        _, velocity, acceleration = _quantities(self.played)
+        _, velocity, acceleration = quantities(self.played)
         return latest_stop(self.limits, velocity, acceleration, self.cycle_time)
 
     @cached_property
@@ -184,13 +184,13 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     axes = counted_axes(target, target.export.plc_layout)
     first, last = None, len(motion.position) - 1
     if target.export.plc_layout == "segments":
-        segments = fit(_quantities(motion), motion.cycle_time)
+        segments = fit(quantities(motion), motion.cycle_time)
         first = segments.first[:-1].astype(np.float64)
         factor = np.array([axis.factor for axis in axes])
         columns = _literal(setpoints.in_axis_units(np.moveaxis(segments.coefficients, 1, 0), factor))
         end = _literal(setpoints.in_axis_units(segments.target, factor))
     else:
-        columns = _quantities(setpoints.axis_table(motion, axes))
+        columns = quantities(setpoints.axis_table(motion, axes))
         columns = _literal(_whole(columns, axes) if target.export.plc_layout == "counts" else columns)
         end = columns[0, -1]
     return PlaybackTable(
@@ -205,10 +205,10 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     )
 
 
-def _quantities(table: setpoints.AxisTable | SampledProfile) -> Array:
-    """Stack position, velocity and acceleration."""
-    quantities = (table.position, table.velocity, table.acceleration)
-    return np.stack([values for values in quantities if values is not None])
+def quantities(table: setpoints.AxisTable | SampledProfile) -> Array:
+    """Stack position, velocity and acceleration, shape (3, samples, axes)."""
+    columns = (table.position, table.velocity, table.acceleration)
+    return np.stack([values for values in columns if values is not None])
 
 
 def counted_axes(target: Target, layout: str) -> tuple[AxisScale, ...]:

@@ -6,7 +6,6 @@ place by a rename: a reader sees whole files only. The list of checksums comes l
 """
 
 import errno
-import hashlib
 import json
 import logging
 import os
@@ -18,6 +17,7 @@ from pathlib import Path
 
 import platformdirs
 
+from gen_profile.artefacts.manifest import sha256
 from gen_profile.errors import CosimulationError
 from gen_profile.private_folder import is_private, make_private, others_may_write, temporary_folder
 from gen_profile.strict_json import parse_json
@@ -129,7 +129,7 @@ def is_intact(entry: Path) -> bool:
             return False
         stamps = _stamps(entry, (_CHECKSUMS, *checksums))
         intact = bool(checksums) and all(
-            _sha256((entry / name).read_bytes()) == checksum for name, checksum in checksums.items()
+            sha256((entry / name).read_bytes()) == checksum for name, checksum in checksums.items()
         )
     except (OSError, ValueError, AttributeError, TypeError):
         return False
@@ -155,14 +155,10 @@ def write_entry(entry: Path, files: Mapping[str, bytes]) -> None:
     OSError
         When the folder cannot be written.
     """
-    checksums = {name: _sha256(content) for name, content in sorted(files.items())}
+    checksums = {name: sha256(content) for name, content in sorted(files.items())}
     listing = (json.dumps(checksums, indent=1) + "\n").encode("utf-8")
     with temporary_folder(entry.parent, ".new-") as new:
         for name, content in (*sorted(files.items()), (_CHECKSUMS, listing)):
             own_folder((entry / name).parent, within=entry.parent)
             (new / "file").write_bytes(content)
             (new / "file").replace(entry / name)
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -1,28 +1,14 @@
 """Writing files, alone or as a folder of artefacts, so that half of it is never seen."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Protocol
 
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import OutputError
 from gen_profile.interrupts import interrupts_collected
 from gen_profile.private_folder import temporary_folder
-
-
-class Staging(Protocol):
-    """Where files wait until they are judged."""
-
-    def write(self, name: str, content: bytes) -> bytes:
-        """Write a file and return what is there of it."""
-
-    def earlier(self, name: str) -> bytes | None:
-        """Read a file of this name at the destination, if there is one."""
-
-    def deliver(self) -> None:
-        """Pass all files on."""
 
 
 class Kept:
@@ -75,6 +61,9 @@ class StagingFolder:
                 (self._folder / name).replace(self._destination / name)
 
 
+Staging = StagingFolder | Kept  # where files wait until they are judged
+
+
 @contextmanager
 def staged(destination: Path) -> Iterator[StagingFolder]:
     """Open a staging folder in an output folder; what is not delivered when it closes is gone.
@@ -111,8 +100,20 @@ def deliver(path: Path, content: bytes) -> None:
         It cannot be written, or a device or pipe stands in its place.
     """
     _require_regular(path)
-    with staged(path.parent) as staging:
-        staging.write(path.name, content)
+    deliver_all(path.parent, {path.name: content})
+
+
+def deliver_all(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files to a folder, by name and in this order, each whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        The folder or a file in it cannot be written.
+    """
+    with staged(folder) as staging:
+        for name, content in files.items():
+            staging.write(name, content)
         staging.deliver()
 
 

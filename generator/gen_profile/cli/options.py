@@ -214,20 +214,26 @@ def spec_output(name: str) -> Callable[[Command], Command]:
     return option("--out", words, OutputFile(replaces="spec_path"), default=name)
 
 
-def spec(command: Callable[..., Any]) -> Callable[..., Any]:
+def spec_shown_as(metavar: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add what every command that takes a spec takes; the command gets it as `chosen`."""
 
-    @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=PathType())
-    @preset("Use a built-in spec (see gen-profile presets).")
-    @repeatable("--set KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
-    @wraps(command)
-    def choosing(
-        *, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], **options: Any
-    ) -> Any:
-        chosen = SpecChoice(path=spec_path, preset=preset, overrides=overrides)
-        return command(chosen=chosen, **options)
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @click.argument("spec_path", metavar=metavar, required=False, type=PathType())
+        @preset("Use a built-in spec (see gen-profile presets).")
+        @repeatable("--set KEY=VALUE", "Override a key of the spec, such as plant.L1=0.5.", into="overrides")
+        @wraps(command)
+        def choosing(
+            *, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], **options: Any
+        ) -> Any:
+            chosen = SpecChoice(path=spec_path, preset=preset, overrides=overrides)
+            return command(chosen=chosen, **options)
 
-    return choosing
+        return choosing
+
+    return decorate
+
+
+spec = spec_shown_as("[SPEC.toml]")
 
 
 def together(*several: Callable[[Any], Any]) -> Callable[[Any], Any]:

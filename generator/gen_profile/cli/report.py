@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @cli.command(epilog="Example: gen-profile report crane.toml --out crane.html")
-@options.spec
+@options.spec_shown_as("[SPEC.toml|FILE]")
 @option(
     "--out",
     "File to write, .html or .pdf; an .html named after the spec in this folder by default.",
@@ -92,11 +92,6 @@ def report(
     print_outcome(made.to_dict(out), words(made, out))
     if faults := made.faults():
         fail(faults)
-
-
-for parameter in report.params:
-    if parameter.name == "spec_path":
-        parameter.metavar = "[SPEC.toml|FILE]"
 
 
 # what a report is about: its name, and how a page is made and described

@@ -1,7 +1,5 @@
 """The commands around profile libraries: sweep, look one up, and put one into a PLC."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

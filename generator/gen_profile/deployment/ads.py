@@ -3,8 +3,6 @@
 ADS has no security of its own: the controller admits computers to which it has a route, by their address.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 Telegrams are those of Beckhoff's "ADS-TCP" specification: as much of it as access by names needs.
 """
 
-from __future__ import annotations
-
 import struct
 import threading
 from collections.abc import Iterator

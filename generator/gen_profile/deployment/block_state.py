@@ -1,7 +1,5 @@
 """What a block shows of itself in every cycle: ``aState``, that ``state.st`` and ``buffers.st`` write."""
 
-from __future__ import annotations
-
 from typing import ClassVar, TypeVar
 
 import attrs

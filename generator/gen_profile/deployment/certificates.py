@@ -1,7 +1,5 @@
 """Application certificates of OPC UA: a PEM file of a certificate and its key, made where it is not there."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

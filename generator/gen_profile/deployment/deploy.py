@@ -1,7 +1,5 @@
 """Putting a proved table into a controller: written to the idle buffer, read back, checked, switched to."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any, Literal
 

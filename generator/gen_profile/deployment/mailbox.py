@@ -1,7 +1,5 @@
 """Requests to a playback block whose numbers are variables, and its replies (``buffers.st`` answers them)."""
 
-from __future__ import annotations
-
 import secrets
 import time
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A playback block behind an OPC UA server: found by browsing, reached through its arrays."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import time

@@ -1,7 +1,5 @@
 """A simulated controller: an OPC UA server with a playback block that runs behind it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``deployments.json`` beside the manifest: what was put into which controllers, by whom and when."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from datetime import UTC, datetime

@@ -6,8 +6,6 @@ number at both ends, and what it asks for in its first part: half of one is none
 client wrote in between are found out by their echo.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from contextlib import suppress

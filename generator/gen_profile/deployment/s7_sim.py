@@ -1,7 +1,5 @@
 """A simulated Siemens controller: an S7 server with a playback block that runs behind it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """A block in a simulated controller: its own text, compiled, called cycle by cycle behind a server."""
 
-from __future__ import annotations
-
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable

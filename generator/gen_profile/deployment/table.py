@@ -1,7 +1,5 @@
 """Tables of a written playback block, as the values of a buffer, and the blocks that such values make."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path

@@ -1,6 +1,5 @@
 """From a spec to an FMU of its plant, motion or planner, of the plant with either, or to a system of FMUs."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
+from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.writing import deliver
 from gen_profile.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
 from gen_profile.motion.profile import Profile
@@ -62,7 +62,7 @@ class Export:
         host = host_platform()
         return {
             "path": str(self.path),
-            "sha256": hashlib.sha256(self.content).hexdigest(),
+            "sha256": sha256(self.content),
             "bytes": len(self.content),
             "fmi": self.version.value,
             "model_identifier": self.identifier,

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 import tomli_w
 
-from gen_profile.artefacts.writing import staged
+from gen_profile.artefacts.writing import deliver_all
 from gen_profile.errors import InfeasibleProblem, SpecError, rounded_up
 from gen_profile.identification.estimation import CONFIDENCE, INITIAL_RESIDUAL_RATIO, Estimate, estimate
 from gen_profile.identification.log_table import read_text
@@ -295,11 +295,9 @@ def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
     ------
     OutputError
     """
-    with staged(path.parent) as staging:
-        if spec.plant.file is not None:
-            staging.write(spec.plant.file.name, spec.plant.file.content)
-        staging.write(path.name, (text or tomli_w.dumps(spec.to_dict())).encode("utf-8"))
-        staging.deliver()
+    machine = {} if spec.plant.file is None else {spec.plant.file.name: spec.plant.file.content}
+    written = (text or tomli_w.dumps(spec.to_dict())).encode("utf-8")
+    deliver_all(path.parent, {**machine, path.name: written})
 
 
 def _log_warnings(row: Mapping[str, Any]) -> Iterator[str]:

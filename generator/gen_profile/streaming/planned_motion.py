@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, Protocol
+from typing import Any
 
 import attrs
 import can
@@ -19,6 +19,7 @@ from gen_profile.planner.interface import ISSUED, LOST, SENSOR, BlockAxis, live_
 from gen_profile.planner.machine import planned_axes, sensed_directions
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
+from gen_profile.streaming.keyboard import Keyboard
 from gen_profile.streaming.status import StatusLine
 from gen_profile.suggestion import suggestion
 from gen_profile.units import AxisScale
@@ -34,30 +35,8 @@ MARGIN = 100_000  # cycles for that stop
 ROUNDING = 1e-9  # relative, of a period counted in the block's cycles
 
 
-class Operator(Protocol):
-    """Who commands a planner."""
-
-    @property
-    def over(self) -> bool:
-        """Whether no further command will come."""
-
-    @property
-    def attends(self) -> bool:
-        """Whether it sees what the block shows, and can command something else."""
-
-    @property
-    def commanded(self) -> str:
-        """What holds now, in words; empty where who commanded it knows."""
-
-    def operated(self) -> AbstractContextManager[object]:
-        """Hold what commands are taken from."""
-
-    def due(self, cycle: int) -> Iterable[Command]:
-        """Give the commands that begin in a cycle of the block, or began since the one before."""
-
-
 class CommandList:
-    """Commands that are known beforehand: an `Operator`.
+    """Commands that are known beforehand, in the place of a `Keyboard`.
 
     Parameters
     ----------
@@ -84,6 +63,9 @@ class CommandList:
         """Give the commands that begin in a cycle of the block."""
         while self._left and self._left[0][0] <= cycle:
             yield self._left.pop(0)[1]
+
+
+Operator = Keyboard | CommandList
 
 
 class PlannedMotion:

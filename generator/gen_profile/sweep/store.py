@@ -25,7 +25,7 @@ from pyarrow import compute
 
 from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
 from gen_profile.artefacts.reading import read_artefact
-from gen_profile.artefacts.writing import deliver, staged
+from gen_profile.artefacts.writing import deliver, deliver_all
 from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.spec.model import Spec
@@ -92,11 +92,8 @@ class Store:
         ------
         OutputError
         """
-        with staged(self.case_folder(outcome.record["case"])) as staging:
-            for name, content in outcome.files.items():
-                staging.write(name, content)
-            staging.write(RECORD, _json(outcome.record))
-            staging.deliver()
+        files = {**outcome.files, RECORD: _json(outcome.record)}
+        deliver_all(self.case_folder(outcome.record["case"]), files)
 
     def records(self) -> Iterator[dict[str, Any]]:
         """Read the records of all cases in their order.
@@ -369,7 +366,4 @@ def take_out(path: Path, row: Mapping[str, Any], folder: Path) -> None:
     ------
     OutputError
     """
-    with staged(folder) as staging:
-        for name, content in case_files(path, row).items():
-            staging.write(name, content)
-        staging.deliver()
+    deliver_all(folder, case_files(path, row))

@@ -1,7 +1,9 @@
 """The same frames for bus analysers: Vector's text format ASC and binary format BLF."""
 
+from collections import defaultdict
 from collections.abc import Iterable
 from io import BytesIO
+from itertools import count
 
 import can
 from can.io.blf import BLFWriter
@@ -20,7 +22,7 @@ Begin Triggerblock Thu Jan 1 00:00:00.000 1970
 
 def asc(frames: Iterable[Frame]) -> bytes:
     """Render as ASC, for CANoe, CANalyzer and python-can."""
-    numbers = _Numbers()
+    numbers = defaultdict[str, int](count().__next__)  # of channels, as they come
     lines = [
         f"{frame.stamp // MICROSECONDS:4d}.{frame.stamp % MICROSECONDS:06d} {numbers[frame.channel] + 1}  "
         f"{frame.cob_id:<15X} Tx   d {len(frame.data)} {frame.data.hex(' ').upper()}".rstrip()
@@ -31,7 +33,7 @@ def asc(frames: Iterable[Frame]) -> bytes:
 
 def blf(frames: Iterable[Frame]) -> bytes:
     """Render as BLF, for the same."""
-    file, numbers = _Kept(), _Numbers()
+    file, numbers = _Kept(), defaultdict[str, int](count().__next__)
     with BLFWriter(file) as writer:
         for frame in frames:
             writer.on_message_received(
@@ -45,14 +47,6 @@ def blf(frames: Iterable[Frame]) -> bytes:
                 )
             )
     return file.getvalue()
-
-
-class _Numbers(dict[str, int]):
-    """Channels counted from 0, as they come."""
-
-    def __missing__(self, channel: str) -> int:
-        self[channel] = len(self)
-        return self[channel]
 
 
 class _Kept(BytesIO):

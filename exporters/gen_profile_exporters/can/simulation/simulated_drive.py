@@ -307,7 +307,7 @@ class SimulatedDrive:
         follows = FOLLOWS if self.state is State.ENABLED and interpolating else 0
         voltage = VOLTAGE if self.state in POWERED else 0
         self.store(0x6041, 0, self.state.bits | follows | voltage | REMOTE | self._flags)
-        self.store(0x6064, 0, _int32(round(self.actual)))
+        self.store(0x6064, 0, min(max(round(self.actual), -(2**31)), 2**31 - 1))
 
     def _tpdos(self, due: Callable[[int], bool]) -> Iterator[tuple[int, int, bytes]]:
         """Go through the TPDOs that are on and whose transmission type is due: number, COB-ID, content."""
@@ -368,7 +368,3 @@ def _unpacked(mapping: list[int], data: bytes) -> list[tuple[int, int, int]]:
 
 def _over(now: int, since: int, milliseconds: int) -> bool:
     return now - since > milliseconds * NANOSECONDS // 1000
-
-
-def _int32(value: int) -> int:
-    return min(max(value, -(2**31)), 2**31 - 1)

@@ -104,7 +104,8 @@ def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
 
             def report(state: BlockState, at: float, events: str) -> None:
                 nonlocal last
-                if not _moves(state) and not events and at - last < IDLE_PERIOD:
+                moves = state.phase == block_state.MOVING or (state.velocity != 0.0).any()
+                if not moves and not events and at - last < IDLE_PERIOD:
                     return
                 if last < 0.0:
                     events = "; ".join(filter(None, (f"began {began.isoformat(timespec='seconds')}", events)))
@@ -122,10 +123,6 @@ def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
             yield report
     except OSError as error:
         raise OutputError(f"{path}: cannot be written on: {error.strerror}.") from error
-
-
-def _moves(state: BlockState) -> bool:
-    return state.phase == block_state.MOVING or bool((state.velocity != 0.0).any())
 
 
 @contextmanager

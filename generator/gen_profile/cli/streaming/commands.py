@@ -33,7 +33,7 @@ _bus_options = options.together(
 
 
 @cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
-@options.spec
+@options.spec_shown_as("[ARTEFACT|SPEC.toml]")
 @_bus_options
 @planner_options
 @option("--mode", "Mode of the drives, for a spec.", click.Choice(["csp", "ip", "csv"]))
@@ -153,11 +153,6 @@ def drive_sim(
         for axis, place, state in zip(spec.machine().actuated, places, states, strict=True)
     ]
     print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}")
-
-
-for parameter in stream.params:
-    if parameter.name == "spec_path":
-        parameter.metavar = "[ARTEFACT|SPEC.toml]"
 
 
 def _require_room(table: Path, source: Source) -> None:

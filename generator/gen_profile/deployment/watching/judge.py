@@ -1,7 +1,5 @@
 """Judging the states of a block in a controller: what was seen, and what holds for every kind of block."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any, Generic
 

@@ -1,7 +1,5 @@
 """A playback block that is watched: each setpoint against the table that was proved."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_profile.deployment.block_state import ABORTED, DONE, FAILED, MOVING, MotionState
@@ -9,7 +7,7 @@ from gen_profile.deployment.table import BlockTable
 from gen_profile.deployment.watching.judge import QUANTITIES, Judge
 from gen_profile.errors import CheckFailed
 from gen_profile.motion.profile import Array
-from gen_profile_exporters.playback.table import PlaybackTable
+from gen_profile_exporters.playback.table import quantities
 
 LAST_DIGITS = 1e-12  # of the greatest setpoint: what a compiler that fuses operations changes
 REFUSALS = {
@@ -34,7 +32,7 @@ class MotionJudge(Judge[MotionState]):
     def __init__(self, table: BlockTable) -> None:
         super().__init__(table)
         self._motions = table.motions
-        self._greatest = [_greatest(motion) for motion in self._motions]
+        self._greatest = [np.abs(quantities(one.played)).max(axis=1) for one in self._motions]  # (3, axes)
 
     def _require_setpoints(self, state: MotionState) -> None:
         """Compare with the table where the motion is, and with rest where nothing moves."""
@@ -126,13 +124,6 @@ class MotionJudge(Judge[MotionState]):
             seen.refused += state.phase == FAILED
             words += [_phase_words(state)] if state.phase in (DONE, ABORTED, FAILED) else []
         return words
-
-
-def _greatest(motion: PlaybackTable) -> Array:
-    """Give the greatest setpoints, shape (3, axes)."""
-    played = motion.played
-    quantities = (played.position, played.velocity, played.acceleration)
-    return np.array([np.abs(one).max(axis=0) for one in quantities if one is not None])
 
 
 def _phase_words(state: MotionState) -> str:

@@ -4,8 +4,6 @@ What it is commanded is not known here from cycle to cycle, so that its setpoint
 do whatever it is commanded was proved, and is held to.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_profile.deployment.block_state import (

@@ -1,7 +1,5 @@
 """What a watched block did so far, beside what it was to do: what pictures of it are drawn from."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import numpy as np

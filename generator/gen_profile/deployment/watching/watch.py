@@ -1,7 +1,5 @@
 """Watching a block in a controller while it runs, until something is not as proved."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any
