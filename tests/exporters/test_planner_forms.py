@@ -16,8 +16,8 @@ from system_parts import program as program_of
 import gen_profile as gp
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play, read_commands
-from gen_profile.planner.events import read_events
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.events import read_events
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis

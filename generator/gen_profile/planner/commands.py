@@ -211,8 +211,8 @@ def start_cycles_of(commands: Sequence[Command], cycle: float) -> list[int]:
     """Tell in which cycles commands begin.
 
     A stick waits for a cycle in which the block is enabled without it, as one that is deflected then does not
-    count. A position waits for a cycle without bExecute, to be an edge. Of several at once each begins a cycle
-    after the one before.
+    count. A position waits for a cycle without bExecute, to be an edge. Of several at once each begins a
+    cycle after the one before.
     """
     start_cycles, edge, free = list[int](), -2, 0
     for command in commands:
