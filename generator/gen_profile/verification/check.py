@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.reading import manifest_beside, read_motion
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.evaluation.simulation import Response, Sway
@@ -188,7 +188,7 @@ def check_artefact(
     True
     """
     path = as_path(path)
-    content, format_ = read_artefact(path), format_of(path)
+    content, format_ = read_motion(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     agreement = provenance(manifest, content, spec)
@@ -241,7 +241,7 @@ def replayed(path: Path, spec: Spec) -> SampledProfile:
     SpecError
         It moves other axes than the spec's machine.
     """
-    content, exporter = read_artefact(path), find_exporter(format_of(path))
+    content, exporter = read_motion(path), find_exporter(format_of(path))
     try:
         own, _ = spec_and_manifest(path, content, None)
     except OutputError:
