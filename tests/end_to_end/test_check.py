@@ -293,6 +293,21 @@ def test_a_suffix_that_no_format_has_is_a_sentence(folder):
         assert "no format has the suffix" in outcome.errors[0]
 
 
+def test_a_file_that_goes_with_a_motion_names_the_one_that_holds_it(folder):
+    for name in ("paper.asc", "paper.startup.csv"):
+        outcome = run_here("check", folder / name)
+        words = f"Error: {folder / name}: it goes with paper.log, which holds the motion; name that."
+        assert (outcome.code, outcome.errors) == (2, [words])
+
+
+def test_a_setpoint_that_no_machine_can_follow_is_named(folder):
+    table = folder / "paper.csv"
+    table.write_text(altered_row(table.read_text(), 100, 1e8))
+    outcome = run_here("check", table)
+    assert (outcome.code, outcome.out) == (4, "")
+    assert "The setpoint of cart at 0.396 s lies off the others" in outcome.errors[0]
+
+
 def test_the_folder_itself_is_no_artefact(folder):
     outcome = run_here("check", folder)
     assert (outcome.code, outcome.errors) == (2, [f"Error: Cannot read {folder}: Is a directory."])

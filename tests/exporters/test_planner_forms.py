@@ -17,6 +17,7 @@ import gen_profile as gp
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play, read_commands
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.events import read_events
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis
@@ -266,6 +267,29 @@ def test_every_variable_of_openplc_has_an_address_of_its_own(block, inputs):
 def test_commands_that_cannot_be_meant_are_refused_with_their_line(block, table, words):
     with pytest.raises(SpecError, match=re.escape(words)):
         play(block.text, table)
+
+
+@pytest.mark.parametrize("before", ["1,position,0.5", "0,position,0.6\n1,stop,"])
+def test_of_commands_at_the_same_time_the_last_one_is_obeyed(block, before):
+    issued = play(block.text, f"time_s,command,value\n{before}\n1,position,0.4\n")
+    assert float(issued.table.splitlines()[-1].split(",")[1]) == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("time_s,code,value\n1,21,inf\n", "line 2: a time, a whole number and a value are wanted"),
+        ("time_s,code,value,value\n1,21,0,1\n", "two columns are called 'value'"),
+    ],
+)
+def test_events_that_no_block_keeps_are_refused(table, words):
+    with pytest.raises(SpecError, match=re.escape(words)):
+        read_events(table)
+
+
+def test_an_event_at_rest_does_not_show_rounding_errors():
+    (event,) = read_events("time_s,code,value\n1,12,-4.4e-16\n")
+    assert event.words == "1.000 s: the axis moves, from 0"
 
 
 def test_lines_may_end_as_in_any_system():

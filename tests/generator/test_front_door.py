@@ -217,6 +217,22 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
         ),
         (lambda spec: gp.read_swing("a.csv", spec, columns=(1, 2), time_unit="min"), "unknown unit 'min'"),
         (lambda spec: gp.run_sweep(spec, ["plant.L1=1:2:3"], "plc", "unused"), "vary: give values by key"),
+        (
+            lambda spec: gp.run_sweep(spec, {"plant.L1": 0.5}, "plc", "unused"),
+            "vary plant.L1: give a list of values, found 0.5",
+        ),
+        (
+            lambda spec: gp.run_sweep(spec, {"move.duration": [1e6, "minimum"]}, "plc", "unused"),
+            "move.duration: .*found 1000000.0",
+        ),
+        (
+            lambda spec: gp.run_sweep(spec, {"plant.L1": [[0.4, 0.5], [0.6]]}, "plc", "unused"),
+            "plant.L1: must be a number",
+        ),
+        (
+            lambda spec: gp.run_sweep(spec, {"plant.L1": [1, 2]}, "plc", "unused", workers=1.5),
+            "workers: must be a whole number of at least 1, found 1.5",
+        ),
         (lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(axis="cart"), "axis: .* found 'cart'"),
         (
             lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(blocked=(1.0, 2.0)),

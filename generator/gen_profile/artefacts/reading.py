@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from gen_profile.artefacts.manifest import FILENAME, Manifest, parse_manifest, sha256
+from gen_profile.artefacts.manifest import FILENAME, PLANNER, Manifest, parse_manifest, sha256
 from gen_profile.bounded_file import DOCUMENT, MOST, read_bounded
-from gen_profile.errors import OutputError
+from gen_profile.errors import OutputError, SpecError
 
 
 def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
@@ -18,6 +18,29 @@ def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
         return read_bounded(path, most)
     except OSError as error:
         raise OutputError(f"Cannot read {what}{path}: {error.strerror or error}.") from error
+
+
+def read_motion(path: Path) -> bytes:
+    """Read a file that is to hold a motion, or a planner block.
+
+    Raises
+    ------
+    OutputError
+    SpecError
+        By the manifest beside it, it only goes with the file that holds the motion, as a wrapper does.
+    """
+    content = read_artefact(path)
+    try:
+        manifest = parse_manifest(read_artefact(path.parent / FILENAME, DOCUMENT), FILENAME)
+    except OutputError:
+        return content
+    for artefacts in (one.artefacts for one in (manifest, *manifest.earlier)):
+        own = next((known for known in artefacts if known.path == path.name), None)
+        if own is not None and own.format != PLANNER:
+            holds = next(known.path for known in artefacts if known.format == own.format)
+            if holds != own.path:
+                raise SpecError(f"{path}: it goes with {holds}, which holds the motion; name that.")
+    return content
 
 
 def decoded(content: bytes, path: Path, what: str) -> str:

@@ -76,8 +76,6 @@ def read_commands(text: str, axes: Sequence[BlockAxis], live: Collection[str]) -
     """
     required = (*FIRST, *(axis.of("value") for axis in axes))
     names, rows = read_rows(text, "commands", required)
-    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        raise SpecError(f"commands: two columns are called {twice[0]!r}.")
     if unknown := [name for name in names if name not in (*required, *live)]:
         known = ", ".join(live) or "none"
         raise SpecError(f"commands: the block has no live parameter {unknown[0]!r}; it has {known}.")
@@ -213,14 +211,16 @@ def start_cycles_of(commands: Sequence[Command], cycle: float) -> list[int]:
     """Tell in which cycles commands begin.
 
     A stick waits for a cycle in which the block is enabled without it, as one that is deflected then does not
-    count. A position waits for a cycle without bExecute, to be an edge.
+    count. A position waits for a cycle without bExecute, to be an edge. Of several at once each begins a
+    cycle after the one before.
     """
-    start_cycles, edge = list[int](), -2
+    start_cycles, edge, free = list[int](), -2, 0
     for command in commands:
-        begin = max(command.begin(cycle), *start_cycles[-1:], int(command.command == "velocity"))
+        begin = max(command.begin(cycle), free, int(command.command == "velocity"))
         if command.command == "position":
             edge = begin = begin + (begin == edge + 1)
         start_cycles.append(begin)
+        free = begin + 1
     return start_cycles
 
 

@@ -29,7 +29,8 @@ class Event(NamedTuple):
     def words(self) -> str:
         """Put it into words."""
         known = WORDS.get(self.code, "an event {code} that is not known here")
-        return f"{self.time:.3f} s: {known.format(self.value, code=self.code)}"
+        value = round(self.value, 9) + 0.0  # a position that rounding errors keep from 0 is 0, and no −0
+        return f"{self.time:.3f} s: {known.format(value, code=self.code)}"
 
 
 def error_words(number: int) -> str:
@@ -88,7 +89,7 @@ def read_events(text: str) -> list[Event]:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
         except ValueError:
             time, code, value = math.nan, math.nan, math.nan
-        if None in row or not (math.isfinite(time) and code.is_integer()):
+        if None in row or not (math.isfinite(time + value) and code.is_integer()):
             hint = next((hint for text in cells if "point" in (hint := number_meant(text))), "")
             raise SpecError(
                 f"events, line {line}: a time, a whole number and a value are wanted, "

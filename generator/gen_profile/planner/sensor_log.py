@@ -38,7 +38,7 @@ def read_rows(text: str, what: str, required: Sequence[str]) -> tuple[list[str],
     Raises
     ------
     SpecError
-        A column is missing; while rows are taken, too: it is no table.
+        A column is missing, or there twice; while rows are taken, too: it is no table.
     """
     table = csv.DictReader(io.StringIO(text, newline=None), skipinitialspace=True)
 
@@ -59,6 +59,8 @@ def read_rows(text: str, what: str, required: Sequence[str]) -> tuple[list[str],
             f"{what}: there is no column {missing[0]}; the first line must name {', '.join(required)}, "
             "with commas between."
         )
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise SpecError(f"{what}: two columns are called {twice[0]!r}.")
     return names, found
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 
 from gen_profile.artefacts.manifest import sha256
-from gen_profile.artefacts.reading import read_artefact
+from gen_profile.artefacts.reading import read_motion
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import Design, design
 from gen_profile.errors import OutputError
@@ -135,7 +135,7 @@ def artefact_report(path: Path, **options: Any) -> Report:
     GenProfileError
         As of `report`; or the file is not what its manifest says, or this version writes another one.
     """
-    content = read_artefact(path)
+    content = read_motion(path)
     spec, manifest = spec_and_manifest(path, content, None)
     if provenance(manifest, content, spec) != "matches":
         raise OutputError(f"{path} was altered after its export: gen-profile check judges it as it is now.")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, PLANNER, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.reading import manifest_beside, read_motion
 from gen_profile.errors import CheckFailed, SpecError, StreamAborted
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.can import CanSpec
@@ -72,9 +72,9 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     ExportError
         It is damaged.
     """
+    content = read_motion(path)
     if format_of(path) != "can":
         raise SpecError(f"{path}: only the log of the format can is streamed; export that.")
-    content = read_artefact(path)
     spec = _vouched_spec(path, content, "can", accept_unverified)
     require_rest(spec)
     return Source(spec=spec, plan=plan_of(content, target_of(spec)))
@@ -98,7 +98,7 @@ def verified_block(path: Path, *, accept_unverified: bool = False) -> tuple[Spec
 
     if not is_planner_block(path):
         raise SpecError(f"{path}: it holds no planner block that can be executed; C cannot be.")
-    content = read_artefact(path)
+    content = read_motion(path)
     spec = _vouched_spec(path, content, PLANNER, accept_unverified)
     return spec, BlockInstance(block_in(path, content))
 

@@ -23,6 +23,7 @@ from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.spec.values import require_whole
 from gen_profile.summary import Summarised
 from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
 from gen_profile.sweep.grid import Grid, grid_of_values
@@ -284,7 +285,13 @@ def run_sweep(
     spec = as_spec(spec)
     if not isinstance(vary, Mapping):
         raise SpecError(f"vary: give values by key, such as {{'plant.L1': [0.45, 0.5]}}, found {vary!r}.")
-    grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
+    if workers is not None:
+        require_whole(workers, 1, "workers")
+    for key, values in vary.items():
+        if isinstance(values, str) or not isinstance(values, Iterable):
+            raise SpecError(f"vary {key}: give a list of values, found {values!r}.")
+    listed = {key: [np.asarray(value).tolist() for value in values] for key, values in vary.items()}
+    grid = grid_of_values(listed)  # value by value: numbers beside texts would become texts
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
     store = prepare(text, (), grid, as_names(formats), as_path(folder))
     return sweep(store, scheduler=scheduler, workers=workers)

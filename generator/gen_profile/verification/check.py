@@ -13,8 +13,8 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.artefacts.reading import manifest_beside, read_motion
+from gen_profile.errors import CosimulationError, OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
@@ -26,6 +26,7 @@ from gen_profile.suggestion import suggestion
 from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, sample_spacing
 from gen_profile.verification.judging import verdict
+from gen_profile.verification.plausibility import implausibilities
 from gen_profile.verification.setpoint_path import lag_of, path_taken
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
@@ -188,15 +189,18 @@ def check_artefact(
     True
     """
     path = as_path(path)
-    content, format_ = read_artefact(path), format_of(path)
+    content, format_ = read_motion(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     agreement = provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     asked, played, variant = varied(spec, setpoints, *map(as_names, (scale, mirror, offset)))
-    rows, searched = _rows(asked, played, row, progress)
-    check = _verdict(asked, played, rows, progress)
+    try:
+        rows, searched = _rows(asked, played, row, progress)
+        check = _verdict(asked, played, rows, progress)
+    except CosimulationError as error:  # as of setpoints that no machine can follow
+        raise CosimulationError(" ".join([str(error), *implausibilities(asked, played)])) from error
     faults = (*check.faults, *alterations(path, agreement))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
     return Judgement(path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant)
@@ -241,7 +245,7 @@ def replayed(path: Path, spec: Spec) -> SampledProfile:
     SpecError
         It moves other axes than the spec's machine.
     """
-    content, exporter = read_artefact(path), find_exporter(format_of(path))
+    content, exporter = read_motion(path), find_exporter(format_of(path))
     try:
         own, _ = spec_and_manifest(path, content, None)
     except OutputError:
