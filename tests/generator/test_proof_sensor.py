@@ -13,7 +13,7 @@ from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.planner import Planner
-from gen_profile.planner.sensor import unfollowed_sway
+from gen_profile.planner.sensor import estimation_error
 from gen_profile.planner.sensor_log import read_sensor_log
 from gen_profile.proof.closed_loop import ClosedLoop, trace
 from gen_profile.proof.histories import Histories
@@ -103,7 +103,9 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
     times = np.arange(5000) * CYCLE
 
     def faults(one, run, outputs):
-        return [*sensor_faults(spec, one, run, outputs, cycle=CYCLE, period=3.0, last=1.0, unfollowed=0.15)]
+        return [
+            *sensor_faults(spec, one, run, outputs, cycle=CYCLE, period=3.0, last=1.0, estimation_error=0.15)
+        ]
 
     assert not faults(sound, *followed(0.2 * (times < 12.9)))
     (late,) = faults(sound, *followed(0.2 * (times < 14.0)))
@@ -142,7 +144,7 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     swings = 0.3 * np.sin(2.0 * np.pi / 3.0 * np.arange(5000) * CYCLE)
 
     def faults(one, resets=(), **given):
-        known = {"cycle": CYCLE, "period": 3.0, "last": 1.0, "unfollowed": 0.15, "resets": resets}
+        known = {"cycle": CYCLE, "period": 3.0, "last": 1.0, "estimation_error": 0.15, "resets": resets}
         return [*sensor_faults(spec, one, *followed(0.0, **given), **known)]
 
     assert not faults(sound, fSensorScale=1.3, fAcceleration=swings)
@@ -155,7 +157,7 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     assert not faults(dead, fSensorScale=0.6, fAcceleration=stronger)
     assert faults(dead, fSensorScale=0.6, fAcceleration=swings)
     swung = followed(np.where(np.arange(5000) * CYCLE < dead.fails, 0.5, 0.0), fAcceleration=swings)
-    assert not [*sensor_faults(spec, dead, *swung, cycle=CYCLE, period=3.0, last=1.0, unfollowed=0.15)]
+    assert not [*sensor_faults(spec, dead, *swung, cycle=CYCLE, period=3.0, last=1.0, estimation_error=0.15)]
     assert not faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.06)
     (off,) = faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.04)
     assert off.startswith("fSwayUncertainty is too small by 0.01 m")
@@ -181,7 +183,7 @@ def test_a_jump_that_counts_as_an_offset_leaves_the_axis_at_rest(spec, text, jum
 
 @pytest.mark.slow
 def test_gusts_in_time_with_the_swing_lead_the_estimate_away_by_less_than_the_block_states(spec, text):
-    stated, histories = unfollowed_sway(spec), Histories.of(spec)
+    stated, histories = estimation_error(spec), Histories.of(spec)
     assert f"current gusts and stated errors add up to {stated:.3g} m" in text
     drawn = (histories.history(choices) for choices in Numbering.of(histories, 60, 0).drawn)
     longest_rope = (one for one in drawn if one.sensed and not one.sensed.fault and one.live["L1"] == 9.0)

@@ -53,7 +53,7 @@ class SensorConstants:
         By which share the axis's own motions may show otherwise than expected.
     room : float
         m, by which damping may lead away.
-    unfollowed : float
+    estimation_error : float
         m, by which gusts and wrong frequencies may move the estimate away.
     """
 
@@ -79,7 +79,7 @@ class SensorConstants:
     gains: Sequence[float]
     misread: float
     room: float
-    unfollowed: float
+    estimation_error: float
 
 
 def damping_slots(frequencies: Array) -> int:
@@ -114,7 +114,7 @@ def values(sensor: SensorConstants | None, suffixes: Sequence[str]) -> dict[str,
     outputs = [
         f"    fSwayEstimated{of} : LREAL; (* m, of the {sensor.load}, by {words} *)\n"
         f"    fSwayUncertainty{of} : LREAL; (* m, that it may be off by; "
-        f"current gusts and stated errors add up to {sensor.unfollowed:.3g} m *)\n"
+        f"current gusts and stated errors add up to {sensor.estimation_error:.3g} m *)\n"
         f"    bSensorUsed{of} : BOOL;\n"
         f"    nSensorFault{of} : DINT; (* why it is not used *)\n"
         f"    fSensorScale{of} : LREAL := 1.0; (* what it shows of the axis's motions, by what is due *)"

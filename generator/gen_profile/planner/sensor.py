@@ -184,7 +184,7 @@ def _constants(
         gains=_law().tolist(),
         misread=MISREAD,
         room=damping_room(spec),
-        unfollowed=unfollowed_sway(spec),
+        estimation_error=estimation_error(spec),
     )
 
 
@@ -205,19 +205,22 @@ def largest_innovation(spec: Spec) -> float:
     return _gate(sensor, max(_disturbed(sensor, disturbance, one) for one in sensed))
 
 
-def unfollowed_sway(spec: Spec) -> float:
+def estimation_error(spec: Spec) -> float:
     """Find by how much, in m, an estimate of the end load's sway is off in gusts and with wrong frequencies.
 
     No acceleration within bounds moves it by more than the integral of the size of what an impulse leaves
     (Desoer and Vidyasagar 1975); wrong frequencies act as an acceleration on the stated swing and on what
-    the axes' own accelerations make of it.
+    the axes' own accelerations make of it. As in the filter's design, modes have `LIGHT` damping at least:
+    without any, gusts in time with a faster mode for minutes lead the estimate farther away.
     """
     points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
     own = 2.0 * max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
-    return max(_unfollowed(spec, _sensed(spec, point, one), own) for point in points for one in directions)
+    return max(
+        _estimation_error_at(spec, _sensed(spec, point, one), own) for point in points for one in directions
+    )
 
 
-def _unfollowed(spec: Spec, one: SensedModes, own: float) -> float:
+def _estimation_error_at(spec: Spec, one: SensedModes, own: float) -> float:
     assert spec.planner.sensor is not None
     state, measured, gain = _filter(spec.planner.sensor, one)
     estimated, pushed = np.zeros((2, len(state)))
@@ -227,17 +230,17 @@ def _unfollowed(spec: Spec, one: SensedModes, own: float) -> float:
     for _ in range(round(IMPULSE_PHASE / (step * float(one.frequencies[0])))):
         sizes.append(abs(float(estimated @ pushed)))
         pushed = transition @ pushed
-    return float(np.sum(sizes) * step * (_accelerations(spec, one) + _misjudged(spec) * own))
+    return float(np.sum(sizes) * step * (_unknown_acceleration(spec, one) + _stiffness_error(spec) * own))
 
 
-def _accelerations(spec: Spec, one: SensedModes) -> float:
+def _unknown_acceleration(spec: Spec, one: SensedModes) -> float:
     """Find what acts as an acceleration in m/s² and is not known: gusts, and wrong frequencies."""
     gust = spec.planner.disturbance.gust if spec.planner.disturbance else None
     restoring = float(one.frequencies[0]) ** 2 * one.swing / abs(float(one.push[0]))
-    return (gust.acceleration if gust else 0.0) + _misjudged(spec) * restoring
+    return (gust.acceleration if gust else 0.0) + _stiffness_error(spec) * restoring
 
 
-def _misjudged(spec: Spec) -> float:
+def _stiffness_error(spec: Spec) -> float:
     """By which share the slowest mode's stiffness may be wrong."""
     return 2.0 * float(frequency_errors(spec)[0])
 
@@ -355,7 +358,7 @@ def _others(spec: Spec, sensor: SensorSpec, one: SensedModes) -> float:
     energy = later.T @ solve_continuous_lyapunov(corrected.T, -measured.T @ measured) @ later
     noise = SURE_OTHERS * sensor.noise * np.sqrt(max(NOISE_TIME, spec.export.cycle_time))
     seen = (
-        peak * _accelerations(spec, one) * np.sqrt(0.5 * MEMORY * period)
+        peak * _unknown_acceleration(spec, one) * np.sqrt(0.5 * MEMORY * period)
         + np.sqrt(np.linalg.norm(energy, 2))
         + noise
     )

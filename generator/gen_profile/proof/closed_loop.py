@@ -20,7 +20,7 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.planner.sensor import unfollowed_sway
+from gen_profile.planner.sensor import estimation_error
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import SHIFT, SLOWEST, Histories, History
 from gen_profile.proof.judging import WatchedRun, judge_run
@@ -77,7 +77,7 @@ class ClosedLoop:
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
         self._machine = histories.machine
-        self._unfollowed = unfollowed_sway(spec) if spec.planner.sensor else 0.0
+        self._estimation_error = estimation_error(spec) if spec.planner.sensor else 0.0
         fmu = plant_fmu(self._machine)
         for _ in range(workers):
             self._followers.put(self._open.enter_context(BlockFollower(fmu)))
@@ -297,7 +297,7 @@ class ClosedLoop:
                 cycle=self.cycle,
                 period=period,
                 last=last,
-                unfollowed=self._unfollowed,
+                estimation_error=self._estimation_error,
                 resets=[one.time for one in history.changes if "bReset" in one.inputs],
             )
 

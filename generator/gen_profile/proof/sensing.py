@@ -258,7 +258,7 @@ def sensor_faults(
     cycle: float,
     period: float,
     last: float,
-    unfollowed: float,
+    estimation_error: float,
     resets: Sequence[float] = (),
 ) -> Iterator[str]:
     """Say what is wrong with how a block used its sensor, each in words that end a sentence.
@@ -272,8 +272,8 @@ def sensor_faults(
     outputs : sequence of str
     cycle, period, last : float
         s: a cycle, the slowest swing, and when the last command came, or an input last changed.
-    unfollowed : float
-        m, by which an estimate may be off beside what it states, from `unfollowed_sway`.
+    estimation_error : float
+        m, by which an estimate may be off beside what it states, from `estimation_error`.
     resets : sequence of float
         s, when bReset was set.
     """
@@ -284,7 +284,7 @@ def sensor_faults(
         axis, fault = axes[number], one.fault if place == one.failing else ""
         sway = run.trace[:, len(outputs) + direction.end_load]
         if not one.fault:
-            yield from _misestimated((axis, issued, sway), unfollowed, cycle)
+            yield from _misestimated((axis, issued, sway), estimation_error, cycle)
         if fault in SHOWS and disturbance.gust is not None:
             yield from _misread(disturbance.gust, one, fault, (axis, issued, sway), (cycle, period, resets))
         noticed = issued[axis.of("nSensorFault")]
@@ -317,12 +317,12 @@ def sensor_faults(
 
 
 def _misestimated(
-    given: tuple[BlockAxis, Mapping[str, Array], Array], unfollowed: float, cycle: float
+    given: tuple[BlockAxis, Mapping[str, Array], Array], estimation_error: float, cycle: float
 ) -> Iterator[str]:
     """Say whether the estimated sway is off by more than is stated."""
     axis, issued, sway = given
     uncertainty = axis.of("fSwayUncertainty")
-    off = np.abs(issued[axis.of("fSwayEstimated")] - sway) - issued[uncertainty] - unfollowed
+    off = np.abs(issued[axis.of("fSwayEstimated")] - sway) - issued[uncertainty] - estimation_error
     off *= issued[axis.of("bSensorUsed")] != 0.0
     at = int(np.argmax(off))
     if off[at] > 0.0:
