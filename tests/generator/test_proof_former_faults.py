@@ -59,6 +59,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (200, 2, 81),  # a stick 0.6 s late, as a pulse was cut before the axis stood
         (225, 3, 9),  # a stop 4.8 s late, as its stated ends left too little room for calming
         (100, 4, 57),  # 2.7 s late, as what half of a long plan leaves was calmed
+        (300, 140, 204),  # a setpoint that jumped by 3 mm, as a kernel in work was dropped for a stick
     ],
     "measured": [
         (2000, 1003, 112),  # an override that was not obeyed for 20 s, as the load was damped on the way
