@@ -332,7 +332,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cMost": MOST,
         "cHalf": MOST // 2,
         "cLongest": LONGEST,
-        "cLongestOnWay": 72,  # where the axis moves already
+        "cLongestOnWay": 72 if c.rates else 80,  # where the axis moves already
         "cKernelFirst": 18,
         "cMostSteps": KERNEL_SLOTS + 1,  # of a kernel, and of the pulses that a stick's plan declines by
         "cLongestKernel": _longest_kernel(c),
