@@ -53,7 +53,7 @@ def program(block):
 
 
 def test_a_block_in_place_of_a_motion_is_told_as_such(block):
-    with pytest.raises(ExportError, match=r"is a planner block, .*; name an exported motion\.$"):
+    with pytest.raises(ExportError, match=r"^this is a planner block, .*; name an exported motion\.$"):
         read_table(block.text, target_of(SPEC))
 
 

@@ -97,7 +97,7 @@ def block_text(profile: Profile, target: Target) -> str:
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
     if is_planner(text):
-        raise ExportError("The file is a planner block, which plans at run time; name an exported motion.")
+        raise ExportError("this is a planner block, which plans at run time; name an exported motion.")
     if buffers.TABLE in text and buffers.is_buffered(source := parse_function_block(text)):
         if buffers.is_library(source):
             raise ExportError(

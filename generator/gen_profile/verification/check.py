@@ -14,7 +14,7 @@ import numpy as np
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_motion
-from gen_profile.errors import CosimulationError, OutputError, SpecError
+from gen_profile.errors import CosimulationError, ExportError, OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
@@ -251,7 +251,10 @@ def replayed(path: Path, spec: Spec) -> SampledProfile:
         own, _ = spec_and_manifest(path, content, None)
     except OutputError:
         own = spec
-    setpoints = exporter.replay(content, target_of(own))
+    try:
+        setpoints = exporter.replay(content, target_of(own))
+    except ExportError as error:
+        raise ExportError(f"{path}: {error}") from error
     if setpoints.position.shape[1] != len(spec.machine().actuated):
         raise SpecError(
             f"{path} moves {setpoints.position.shape[1]} axes, and the spec's machine has others."
