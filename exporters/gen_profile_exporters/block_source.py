@@ -24,6 +24,7 @@ _VARIABLE = re.compile(
 )
 _ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.IGNORECASE)
 COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed takes the rest
+_PLANNER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
 
 
@@ -163,3 +164,8 @@ def _declared(variable: BlockVariable) -> str:
     initial = f" := {variable.initial}" if variable.initial else ""
     comment = f" (* {variable.comment} *)" if variable.comment else ""
     return f"{variable.name} : {variable.type}{initial};{comment}"
+
+
+def is_planner(text: str) -> bool:
+    """Whether a text is a planner block's, by the name that it has."""
+    return _PLANNER.search(text) is not None

@@ -16,7 +16,9 @@ built after the vendors' public manuals and not tried on their tools.
 
 import csv
 import io
+import tomllib
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import attrs
 
@@ -36,7 +38,7 @@ class CsvDialect:
     separator, decimal, line_end : str
     header : bool
         Whether the first line names the columns; otherwise each line is a pair.
-    opening, closing : tuple of str
+    opening, closing : sequence of str
         Lines before and after the points; ``{}`` stands for their number.
     mark : str
         Ends each line of a point.
@@ -48,26 +50,15 @@ class CsvDialect:
     decimal: str = "."
     line_end: str = "\r\n"
     header: bool = False
-    opening: tuple[str, ...] = ()
-    closing: tuple[str, ...] = ()
+    opening: Sequence[str] = ()
+    closing: Sequence[str] = ()
     mark: str = ""
     least: int = 2
     most: int = MAX_SAMPLES
 
 
-DIALECTS = {
-    "rfc4180": CsvDialect(separator=",", line_end="\n", header=True),
-    "excel-de": CsvDialect(separator=";", decimal=",", header=True, most=1_048_575),
-    "sew": CsvDialect(separator=";", opening=("{}",), most=16_383),
-    "kollmorgen": CsvDialect(
-        separator=";",
-        opening=("CYCLIC;NO;", "TABLE_BEGIN;;"),
-        closing=("TABLE_END;;",),
-        mark=";SPLINE",
-        least=5,
-    ),
-    "lenze": CsvDialect(separator="\t"),
-}
+_TEXT = Path(__file__).with_suffix(".toml").read_text("utf-8")
+DIALECTS = {name: CsvDialect(**row) for name, row in tomllib.loads(_TEXT).items()}
 
 
 def write(dialect: CsvDialect, header: Sequence[str], columns: Sequence[Sequence[str]]) -> str:

@@ -3,6 +3,7 @@
 The calls follow the vendors' public manuals; they were not tried on a controller.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 
 import attrs
@@ -10,6 +11,8 @@ import attrs
 from gen_profile_exporters.block_source import BlockVariable
 from gen_profile_exporters.text_parts import text_parts
 
+_INSTANCE = re.compile(r"(\w+) : (\w+);")
+_VARIABLE = re.compile(r"(\w+) (\S+) : (\w+);() \(\* (.*) \*\)")
 # What follows a vendor's statements: an axis that failed is commanded no more.
 LET_GO = """\
 IF bTaken{n} AND (nCause <> 0) THEN
@@ -77,67 +80,15 @@ def around(texts: Mapping[str, str], part: str, library: MotionLibrary) -> str:
     return texts[part].format(n="{n}", i="{i}", vendor=values[part], let_go=LET_GO, **values)
 
 
-HOMED = BlockVariable("VAR_INPUT", "bHomed{n}", "BOOL", comment="the axis's position is known")
-TWINCAT = MotionLibrary(
-    axis_type="AXIS_REF",
-    guide="MC_ExtSetPointGenEnable",
-    instances={
-        "fbEnable": "MC_ExtSetPointGenEnable",
-        "fbDisable": "MC_ExtSetPointGenDisable",
-        "bExternal": "BOOL",
-        "nDirection": "DINT",
-    },
-    power_instances={"fbPower": "MC_Power", "fbReset": "MC_Reset"},
-    setpoint="Axis{n}.NcToPlc.SetPos",
-    speed="Axis{n}.NcToPlc.SetVelo",
-    actual="Axis{n}.NcToPlc.ActPos",
-    homed="(Axis{n}.NcToPlc.StateDWord AND 16#00000002) <> 16#00000000",
-    **text_parts("libraries/twincat.st"),
-)
-CODESYS = MotionLibrary(
-    axis_type="AXIS_REF_SM3",
-    guide="SMC_FollowSetValues",
-    instances={"fbFollow": "SMC_FollowSetValues"},
-    power_instances={"fbPower": "MC_Power", "fbReset": "MC_Reset"},
-    setpoint="Axis{n}.fSetPosition",
-    speed="Axis{n}.fSetVelocity",
-    actual="Axis{n}.fActPosition",
-    homed="bHomed{n}",
-    variables=(HOMED,),
-    **text_parts("libraries/codesys.st"),
-)
-SIEMENS = MotionLibrary(
-    axis_type="TO_PositioningAxis",
-    guide="MC_MOTIONINPOSITION",
-    instances={"fbInPosition": "MC_MOTIONINPOSITION"},
-    power_instances={"fbPower": "MC_POWER", "fbReset": "MC_RESET"},
-    setpoint="Axis{n}.Position",
-    speed="Axis{n}.Velocity",
-    actual="Axis{n}.ActualPosition",
-    homed="Axis{n}.StatusWord.%X5",
-    **text_parts("libraries/siemens.st"),
-)
-# Velocity setpoints with a position control of our own; no library: the converter is inputs and outputs.
-VELOCITY = MotionLibrary(
-    axis_type="",
-    guide="the position control (fGain, fCorrection, fFollowingLimit > 0.0)",
-    instances={},
-    power_instances={},
-    setpoint="fActPosition{n}",
-    speed="fActVelocity{n}",
-    actual="fActPosition{n}",
-    homed="bHomed{n}",
-    variables=(
-        HOMED,
-        BlockVariable("VAR_INPUT", "bRunning{n}", "BOOL", comment="the converter is on and follows fSpeed"),
-        BlockVariable("VAR_INPUT", "bDriveError{n}", "BOOL", comment="it is in error"),
-        BlockVariable(
-            "VAR_INPUT", "fGain{n}", "LREAL", comment="1/s: velocity for each distance from the setpoint"
-        ),
-        BlockVariable("VAR_INPUT", "fCorrection{n}", "LREAL", comment="greatest velocity for it"),
-        BlockVariable("VAR_OUTPUT", "bRun{n}", "BOOL", comment="switches the converter on"),
-        BlockVariable("VAR_OUTPUT", "bResetDrive{n}", "BOOL", comment="acknowledges its error"),
-        BlockVariable("VAR_OUTPUT", "fSpeed{n}", "LREAL", comment="velocity setpoint"),
-    ),
-    **text_parts("libraries/velocity.st"),
-)
+def _library(name: str) -> MotionLibrary:
+    """Read a library's texts; what is declared there stands as in a controller's program."""
+    parts = text_parts(f"libraries/{name}.st")
+    instances = {
+        kind: dict(_INSTANCE.findall(parts.get(kind, ""))) for kind in ("instances", "power_instances")
+    }
+    variables = tuple(BlockVariable(*found) for found in _VARIABLE.findall(parts.get("variables", "")))
+    return MotionLibrary(**{"axis_type": "", **parts, **instances, "variables": variables})
+
+
+# The last one has velocity setpoints with a position control of our own; its converter is inputs and outputs.
+TWINCAT, CODESYS, SIEMENS, VELOCITY = map(_library, ("twincat", "codesys", "siemens", "velocity"))

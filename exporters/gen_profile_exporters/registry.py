@@ -24,17 +24,8 @@ if TYPE_CHECKING:
     from gen_profile_exporters.playback import structured_text
     from gen_profile_exporters.vendors import codesys, plcopen_xml, rockwell_l5x, siemens_scl, twincat
 
-    # Holds the project's own formats to the protocol wherever types are checked.
-    _CONFORMING: tuple[Exporter, ...] = (
-        can,
-        codesys,
-        csv_table,
-        plcopen_xml,
-        rockwell_l5x,
-        siemens_scl,
-        structured_text,
-        twincat,
-    )
+    # Hold the project's own formats to the protocols wherever types are checked.
+    _CONFORMING: tuple[Exporter, ...] = (can, csv_table, rockwell_l5x)
     _CONTAINERS: tuple[BlockContainer, ...] = (codesys, plcopen_xml, siemens_scl, structured_text, twincat)
 
 Proof = Literal["executed", "read back", "schema-checked", "parsed", "untested"]

@@ -41,34 +41,10 @@ FAULTS = (
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
 PART = 40  # lines beyond which a branch is a function: one of thousands compiles four times as slowly
-_NUMBERS = ("LREAL", "DINT")
-_PLAIN: dict[tuple[str, ...], str] = {  # C of an operator or a function, and the types that it takes
-    **{(o, t, t): f"{{}} {o} {{}}" for o in ("+", "-", "*", "/", "<", "<=", ">", ">=") for t in _NUMBERS},
-    **{("=", t, t): "{} == {}" for t in (*_NUMBERS, "BOOL")},
-    **{("<>", t, t): "{} != {}" for t in (*_NUMBERS, "BOOL")},
-    ("AND", "BOOL", "BOOL"): "{} && {}",
-    ("OR", "BOOL", "BOOL"): "({}) || ({})",
-    ("NOT", "BOOL"): "!{}",
-    **{(sign, t): sign + "{}" for sign in "+-" for t in _NUMBERS},
-    ("ABS", "LREAL"): "fabs({})",
-    ("ABS", "DINT"): "(int32_t)fabs({})",
-    ("SQRT", "LREAL"): "sqrt({})",
-    ("LREAL_TO_DINT", "LREAL"): "(int32_t)nearbyint({})",
-    ("DINT_TO_LREAL", "DINT"): "(double)({})",
-}
-_CHECKED = {  # macros in their place
-    ("+", "DINT", "DINT"): "SUM({}, {})",
-    ("-", "DINT", "DINT"): "DIFFERENCE({}, {})",
-    ("*", "DINT", "DINT"): "PRODUCT({}, {})",
-    ("/", "DINT", "DINT"): "QUOTIENT({}, {})",
-    ("/", "LREAL", "LREAL"): "RATIO({}, {})",
-    ("AND", "BOOL", "BOOL"): "BOTH({}, {})",
-    ("OR", "BOOL", "BOOL"): "EITHER({}, {})",
-    ("-", "DINT"): "DIFFERENCE(0, {})",
-    ("ABS", "DINT"): "ROUNDED(fabs({}))",
-    ("SQRT", "LREAL"): "ROOT({})",
-    ("LREAL_TO_DINT", "LREAL"): "ROUNDED({})",
-}
+# operator or function and the types that it takes | C | a macro in its place that checks
+_ROWS = [line.split(" | ") for line in (FOLDER / "c/operations.txt").read_text("ascii").splitlines()]
+_PLAIN = {tuple(taken.split()): code for taken, code, *_ in _ROWS}
+_CHECKED = {tuple(taken.split()): macro for taken, _, *macros in _ROWS for macro in macros}
 _GIVES = {"LREAL_TO_DINT": "DINT", "DINT_TO_LREAL": "LREAL"}  # others but comparisons what they take
 _SAME = ("+", "-", "*", "/", "ABS", "SQRT")
 

@@ -18,8 +18,13 @@ def text_parts(path: str) -> dict[str, Any]:
 
     The last line of a part has no end.
     """
-    _, *pieces = _PART.split((FOLDER / path).read_text("ascii"))
+    _, *pieces = _PART.split((FOLDER / path).read_text("utf-8"))
     return {name: text.removesuffix("\n") for name, text in zip(pieces[::2], pieces[1::2], strict=True)}
+
+
+def names_by_type(part: str) -> dict[str, tuple[str, ...]]:
+    """Read lines of a type and names of variables that have it."""
+    return {type_: tuple(names) for type_, *names in map(str.split, part.splitlines())}
 
 
 def filled(path: str, **values: object) -> str:

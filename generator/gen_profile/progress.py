@@ -2,6 +2,9 @@
 
 from typing import Protocol
 
+from gen_profile.errors import SpecError
+from gen_profile.suggestion import found
+
 
 class Progress(Protocol):
     """Told what is being done, as often as it likes."""
@@ -12,3 +15,9 @@ class Progress(Protocol):
 
 def no_progress(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
     """Report nothing."""
+
+
+def require_progress(progress: object) -> None:
+    """Refuse, by a `SpecError`, what takes no report."""
+    if not callable(progress):
+        raise SpecError(f"progress: must be a function, found {found(progress)}.")

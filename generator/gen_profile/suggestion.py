@@ -1,7 +1,8 @@
-"""What a person may have meant by a word that is not known, or by a text where a number is wanted."""
+"""What was given in words, and what a person may have meant by an unknown word or a text for a number."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from datetime import date, time
 from functools import cache
 from pathlib import Path
 
@@ -86,3 +87,29 @@ def number_meant(text: str) -> str:
     if re.fullmatch(r"[+-]?[0-9]+(\.[0-9]+)?", text):
         return "; write it without quotes"
     return ""
+
+
+def found(value: object, number: bool = True) -> str:
+    """Name a value in a sentence, never at length, and of a text how it might be a number."""
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return str(value).lower()
+        case int() if abs(value) >= 10**18:
+            return "a whole number of more than 18 digits"
+        case int() | float():
+            return repr(value)
+        case str():
+            hint = number_meant(value) if number else ""
+            return Phrase("text {text}{hint}", text=repr(value[:60]), hint=hint)
+        case Mapping():
+            return "a table"
+        case list() | tuple():
+            short = len(value) <= 3 and all(type(item) in {int, float} for item in value)
+            return str(list(value)) if short else "an array"
+        case date() | time():
+            return "a date or time"
+        case _:  # from Python
+            name = type(value).__name__
+            return f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"

@@ -298,6 +298,7 @@ def test_a_file_that_goes_with_a_motion_names_the_one_that_holds_it(folder):
         outcome = run_here("check", folder / name)
         words = f"Error: {folder / name}: it goes with paper.log, which holds the motion; name that."
         assert (outcome.code, outcome.errors) == (2, [words])
+    assert run_here("report", folder / "paper.asc").errors[-1].endswith("which holds the motion; name that.")
 
 
 def test_a_setpoint_that_no_machine_can_follow_is_named(folder):

@@ -71,6 +71,7 @@ def test_a_wrong_answer_is_asked_for_again(site):
     answers = ["bay-crane", "350", "six", "2000", "6.2±x", "6.2±0.1"]
     ended = commissioned(site, answers=answers)
     assert ended.returncode == 130, ended.stderr
+    assert ended.stderr.endswith("Error: Standard input ended before an answer; give it by an option.\n")
     assert "plant.m2: must be a number" in ended.stderr
     assert "write NAME=VALUE±UNCERTAINTY" in ended.stderr
     assert "L2, rope from hook to payload, in m (or as 6.2±0.1) [1.5]" in ended.stderr

@@ -22,8 +22,10 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.planner.axis_wrapper import LIBRARIES
 from gen_profile_exporters.planner.openplc import openplc_files
+from gen_profile_exporters.playback.structured_text import read_table
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
 
@@ -48,6 +50,11 @@ def block():
 @pytest.fixture(scope="module")
 def program(block):
     return translate(block.text)
+
+
+def test_a_block_in_place_of_a_motion_is_told_as_such(block):
+    with pytest.raises(ExportError, match=r"^this is a planner block, .*; name an exported motion\.$"):
+        read_table(block.text, target_of(SPEC))
 
 
 @pytest.mark.slow
@@ -213,6 +220,18 @@ class TestInPython:
         assert again.done[-1]
         assert again.position[-1] == 9.0
 
+    def test_it_follows_the_axis_while_it_is_disabled_and_goes_on_from_there(self):
+        planner = gp.Planner(SPEC)
+        left = planner.hold(8.0, target=5.0).position[-1]
+        disabled = planner.hold(0.1, enable=False)
+        assert not disabled.outputs["bEnabled"].any() and disabled.outputs["bCommandAborted"][0]
+        assert (disabled.position == left).all() and not disabled.velocity.any() and 0.0 < left < 5.0
+        assert planner.step(actual_position=2.0, actual_velocity=0.1).velocity == 0.1
+        there = {"actual_position": 1.0, "actual_velocity": 0.0}
+        again = planner.hold(9.0, enable=True, load_at_rest=True, **there)
+        assert (again.position == 1.0).all() and again.promise[-1]  # the command before is forgotten
+        assert planner.hold(20.0, target=3.0).position[-1] == 3.0
+
     def test_what_makes_no_sense_is_refused_in_a_sentence(self, tmp_path):
         planner = gp.Planner(SPEC)
         for given, words in (
@@ -220,6 +239,8 @@ class TestInPython:
             ({"live": {"L2": 1.0}}, "no live parameter 'L2' (known: L1)"),
             ({"live": [6.0]}, "live: give values by name, such as {'L1': 6.0}, found [6.0]"),
             ({"target": "far"}, "target: must be a number, found 'far'"),
+            ({"target": "3"}, "target: must be a number, found '3'"),
+            ({"stop": "no"}, "stop: must be true or false, found text 'no'"),
             ({"velocity": np.zeros(3)}, "velocity: must be a number or one for each of 250 cycles"),
         ):
             with pytest.raises(gp.SpecError, match=re.escape(words)):
@@ -279,6 +300,8 @@ def test_of_commands_at_the_same_time_the_last_one_is_obeyed(block, before):
     ("table", "words"),
     [
         ("time_s,code,value\n1,21,inf\n", "line 2: a time, a whole number and a value are wanted"),
+        ("time_s,code,value\n1e300,21,0\n", "line 2: a time, a whole number and a value are wanted"),
+        ("time_s,code,value\n1,1e300,0\n", "line 2: a time, a whole number and a value are wanted"),
         ("time_s,code,value,value\n1,21,0,1\n", "two columns are called 'value'"),
     ],
 )

@@ -92,11 +92,19 @@ def test_a_full_disk_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
     assert tree(tmp_path) == {"one.txt": b"old"}
 
 
-@pytest.mark.parametrize("out", ["file", "file/below", "made/" + 300 * "x", 300 * "x"])
-def test_a_folder_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, out):
+@pytest.mark.parametrize(
+    ("out", "why"),
+    [
+        ("file", "/file is a file"),
+        ("file/below", "/file is a file"),
+        ("made/" + 300 * "x", "File name too long"),
+        (300 * "x", "File name too long"),
+    ],
+)
+def test_a_folder_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, out, why):
     (tmp_path / "file").write_bytes(b"in the way")
     with (
-        pytest.raises(OutputError, match=r"^Cannot write to the folder .*; choose another one\.$"),
+        pytest.raises(OutputError, match=rf"^Cannot write to the folder .*: .*{why}; choose another one\.$"),
         staged(tmp_path / out),
     ):
         pytest.fail("there is no such folder")

@@ -168,11 +168,14 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             lambda spec: gp.linearize(spec.machine(), {**spec.plant.parameters, "L1": "5"}),
             "parameters: L1: must be a number, found text '5'",
         ),
-        (lambda _: gp.plot(None, "a.png"), "There is no picture of a NoneType"),
+        (lambda _: gp.plot(None, "a.png"), "There is no picture of nothing; give one of Spec, Plan,"),
         (lambda _: gp.parse_spec(b""), "a text is expected, found a bytes"),
-        (lambda spec: gp.compare(spec, own="mine.csv"), r"such as gp\.plan\(spec\)\.motion, found a str"),
+        (
+            lambda spec: gp.compare(spec, own="mine.csv"),
+            r"gp\.plan\(spec\)\.motion, found text 'mine.csv'",
+        ),
         (lambda spec: gp.compare(spec, own=[STANDING]), "A Profile .* found a SampledProfile"),
-        (lambda spec: gp.robustness(spec, "L1", own=3), "A Profile .* found a int"),
+        (lambda spec: gp.robustness(spec, "L1", own=3), "A Profile .* found 3"),
         (lambda spec: gp.evaluate(spec, STANDING), "A Profile .* found a SampledProfile"),
         (lambda _: gp.sample(STANDING, 0.01), "A Profile .* found a SampledProfile"),
         (lambda spec: gp.cosimulate(spec, straight(1, "mine")), r"such as gp\.sample.* found a Profile"),
@@ -233,7 +236,16 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             lambda spec: gp.run_sweep(spec, {"plant.L1": [1, 2]}, "plc", "unused", workers=1.5),
             "workers: must be a whole number of at least 1, found 1.5",
         ),
+        (
+            lambda spec: gp.run_sweep(spec, {"plant.L1": [1, 2]}, "plc", "unused", workers=True),
+            "workers: must be a whole number of at least 1, found true",
+        ),
+        (
+            lambda spec: gp.run_sweep(spec, {"plant.L1": [1, 2]}, "plc", "unused", scheduler=3),
+            "scheduler: an address is expected, found 3",
+        ),
         (lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(axis="cart"), "axis: .* found 'cart'"),
+        (lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(axis=False), "axis: .* found False"),
         (
             lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(blocked=(1.0, 2.0)),
             "blocked, a row: must be a list of numbers, found 1.0",
@@ -246,6 +258,16 @@ def test_slips_are_told_in_a_sentence(call, sentence):
     with pytest.raises(gp.SpecError, match=sentence):
         call(gp.preset_spec("paper"))
     assert not Path("unused").exists()
+
+
+@pytest.mark.parametrize("name", dir(gp))
+def test_progress_is_reported_to_functions_alone(name):
+    function = getattr(gp, name)
+    given = inspect.signature(function).parameters if inspect.isfunction(function) else {}
+    if "progress" in given:
+        values = {key: "unused" for key, one in given.items() if one.default is one.empty}
+        with pytest.raises(gp.SpecError, match="progress: must be a function, found 3"):
+            function(**values, progress=3)
 
 
 @pytest.mark.parametrize("cycle_time", [0.0, -1.0, np.nan, np.inf, 1e-12, "0.01"])

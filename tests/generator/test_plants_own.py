@@ -134,8 +134,8 @@ def test_a_spec_may_pin_its_machine(folder):
         ("PLANT = 1 +", "pendulum.py, line 1: SyntaxError"),
         ("import numpy\n1 / 0", "pendulum.py, line 2: ZeroDivisionError: division by zero"),
         ("raise SystemExit(3)", "pendulum.py, line 1: SystemExit: 3"),
-        ("PLANT = 3", "must define PLANT, a gen_profile.plants.plant.Plant, found int"),
-        ("", "must define PLANT, a gen_profile.plants.plant.Plant, found NoneType"),
+        ("PLANT = 3", "must define PLANT, a gen_profile.plants.plant.Plant, found 3"),
+        ("", "must define PLANT, a gen_profile.plants.plant.Plant, found nothing"),
         ("\0", "pendulum.py"),
         (
             PENDULUM.replace("M_uu=[[p.L]]", "M_uu=[p.L]"),

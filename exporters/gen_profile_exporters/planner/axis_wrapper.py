@@ -22,7 +22,7 @@ from gen_profile_exporters.motion_libraries import (
     each,
 )
 from gen_profile_exporters.playback.structured_text import literal
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.text_parts import names_by_type, text_parts
 
 TEXTS = text_parts("planner/axis_wrapper.st")
 INTERFACE = ("VAR_INPUT", "VAR_OUTPUT")
@@ -36,14 +36,7 @@ COMMENTS = {
     "bReset": "acknowledge errors, of the axes, too",
     "bEnabled": "the axes are guided",
 }
-OWN = {
-    "BOOL": (
-        *("bWanted", "bWantedBefore", "bOn", "bAcknowledge", "bResets", "bPowered", "bReady"),
-        *("bGuided", "bFeed"),
-    ),
-    "DINT": ("nWaited", "nFault", "nCause"),
-    "LREAL": ("fPosition", "fVelocity", "fAcceleration"),
-}
+OWN = names_by_type(TEXTS["variables"])
 SETPOINTS = OWN["LREAL"]  # outputs of the block that go to the axes
 PLACES = {"fActPosition": "fPlace{n}", "fActVelocity": "{speed} / cUnits{n}"}  # inputs that come from them
 PATIENCE = 10.0  # s, for power, and for the vendor's block

@@ -22,7 +22,7 @@ from gen_profile_exporters.block_source import BlockSource, BlockVariable, initi
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.playback.block import TEMPLATE
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.text_parts import names_by_type, text_parts
 
 OURS = "OfBuffer"  # behind names that the block has already
 _WORD = re.compile(r"\w+")
@@ -31,11 +31,7 @@ _SHARED = text_parts("playback/text/buffers.st")
 _FRACTION = re.compile(r" *\(\* A double as whole numbers.*?(?= *nCheckRow := nCheckRow \+ 1;)", re.DOTALL)
 _ROUND = "        nCheckRow := nCheckRow + 1;"
 _NUMBER = re.compile(r"c[A-Z]\w*")
-_MEMBERS = {
-    "DINT": (*buffers.VARIABLES["DINT"], "nCheck", "nCheckRow", "nHead", "nUpper", "nWord"),
-    "LREAL": (*buffers.VARIABLES["LREAL"], "fValue", "fMantissa", "fWord", "fSum"),
-    "BOOL": (*buffers.VARIABLES["BOOL"], "bChecked", "bIntact", "bForget", "bMayEnable"),
-}
+_MEMBERS = names_by_type(_SHARED["planner_variables"])
 _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 
 

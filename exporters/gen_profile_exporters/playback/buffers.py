@@ -33,7 +33,7 @@ from gen_profile_exporters.playback.block import fill, layout_of
 from gen_profile_exporters.playback.layouts import LAYOUTS
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.text_parts import names_by_type, text_parts
 
 INTERFACE = 2  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
@@ -64,24 +64,6 @@ STATE_HEAD = 14  # values of the state ahead of those of each axis
 AXIS_STATE = ("Position", "Velocity", "Acceleration", "Gain", "Shift")
 RESULTS = ("cAccepted", "cHeld", "cMoves", "cUnfit")
 TRIALS = ("cUntried", "cTried", "cPassed", "cRejected")
-VARIABLES = {
-    "LREAL": ("fHolder", "fCalls"),
-    "DINT": (
-        "nBase",
-        "nIdle",
-        "nMotion",
-        "nTable",
-        "nLength",
-        "nChecks",
-        "nPlace",
-        "nCount",
-        "nResult",
-        "nTrial",
-        "nQuiet",
-        "nRuns",
-    ),
-    "BOOL": ("bLoaded", "bLoad", "bAgain", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
-}
 SELECTION = (
     BlockVariable("VAR_INPUT", LIBRARY, "DINT", comment="which motion, from 0 on"),
     BlockVariable("VAR", "nSelected", "DINT", comment="it, once nothing moved"),
@@ -96,6 +78,7 @@ NOTE = """\
 DROPPED = ("nCheckRows", "nCheckColumn")  # of the block of constants
 
 _PARTS = text_parts("playback/text/buffers.st")
+VARIABLES = names_by_type(_PARTS["variables"])
 _STATE = Path(__file__).with_name("text").joinpath("state.st").read_text("ascii")
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(

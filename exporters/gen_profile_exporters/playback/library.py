@@ -29,6 +29,7 @@ from gen_profile_exporters.playback.structured_text import (
     table_checksum,
 )
 from gen_profile_exporters.playback.table import MOST_SAMPLES
+from gen_profile_exporters.text_parts import text_parts
 
 SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.SCALARS, buffers.PER_AXIS))
 *POWERS, SEGMENTS = (f"c{name}" for name in buffers.COLUMNS["segments"])
@@ -231,21 +232,9 @@ def _header(entries: Sequence[LibraryEntry], target: Target) -> str:
     use = use.replace("the peaks above and to the stop jerk", "the motion's own peaks and stop jerk")
     use = use.removesuffix("\n").removesuffix("*)")
     listed = [line for number, entry in enumerate(entries) for line in _listed(number, entry, target)]
-    lines = [
-        "(*",
-        f"    {plain(target.name)}: playback function block for {len(entries)} motions,",
-        "    IEC 61131-3 Structured Text, from gen-profile.",
-        "",
-        "    nProfile selects the motion; another one is taken over while none is played.",
-        "",
-        f"{start}{use}              6 nProfile counts no motion",
-        "",
-        "    nProfile  checksum  motion",
-        *listed,
-        "*)",
-        "",
-    ]
-    return "\n".join(lines)
+    values = {"name": plain(target.name), "count": len(entries), "use": f"{start}{use}"}
+    text = text_parts("playback/text/library.st")["header"].format(**values, listed="\n".join(listed))
+    return f"{text}\n"
 
 
 def _listed(number: int, entry: LibraryEntry, target: Target) -> list[str]:

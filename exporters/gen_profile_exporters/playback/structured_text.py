@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
-from gen_profile_exporters.block_source import BlockSource, initialiser, parse_function_block
+from gen_profile_exporters.block_source import BlockSource, initialiser, is_planner, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.playback import block as playback_block
@@ -96,6 +96,8 @@ def block_text(profile: Profile, target: Target) -> str:
 
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
+    if is_planner(text):
+        raise ExportError("this is a planner block, which plans at run time; name an exported motion.")
     if buffers.TABLE in text and buffers.is_buffered(source := parse_function_block(text)):
         if buffers.is_library(source):
             raise ExportError(

@@ -4,6 +4,7 @@ The same variables and statements as the Structured Text, each in its element. R
 again and reads that.
 """
 
+from html import escape
 from typing import Any
 
 import attrs
@@ -14,10 +15,10 @@ from gen_profile.motion.profile import Profile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_text, replays
+from gen_profile_exporters.text_parts import filled
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
 
 XHTML = "http://www.w3.org/1999/xhtml"
-EPOCH = "1970-01-01T00:00:00"  # the schema asks for a time, and equal motions give equal bytes
 ELEMENTARY = ("BOOL", "INT", "DINT", "LREAL", "DWORD")
 SECTIONS = {
     "VAR_IN_OUT": "inOutVars",
@@ -46,22 +47,10 @@ class XmlDialect:
     text: str
 
     def project(self, name: str, pous: list[etree._Element]) -> etree._Element:
-        """Build a project of program organisation units."""
-        root = etree.Element(self._tag("project"), nsmap=_default(self.namespace))
-        header = {
-            "companyName": "",
-            "productName": "gen-profile",
-            "productVersion": "1",
-            "creationDateTime": EPOCH,
-        }
-        self._append(root, "fileHeader", header)
-        coordinates = self._append(self._append(root, "contentHeader", {"name": name}), "coordinateInfo")
-        for language in ("fbd", "ld", "sfc"):
-            self._append(self._append(coordinates, language), "scaling", {"x": "1", "y": "1"})
-        types = self._append(root, "types")
-        self._append(types, "dataTypes")
-        self._append(types, "pous").extend(pous)
-        self._append(self._append(root, "instances"), "configurations")
+        """Build a project of program organisation units, always of the same time."""
+        values = {"namespace": self.namespace, "name": escape(name)}
+        root = parse_xml(filled("vendors/plcopen.xml", **values).encode("utf-8"))
+        child(root, "{*}types/{*}pous").extend(pous)
         return root
 
     def pou(self, source: BlockSource) -> etree._Element:

@@ -17,6 +17,7 @@ from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_name
 from gen_profile_exporters.setpoints import MAX_SAMPLES, axis_table, in_si, sampled
+from gen_profile_exporters.text_parts import filled, text_parts
 from gen_profile_exporters.vendors.cam_points import play_spline, spline_cycles, spline_error
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
 
@@ -40,19 +41,8 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     cycles = spline_cycles(motion, MOST_POINTS, POINT_ERROR, "rockwell-l5x, CAM", single=True)
     error = spline_error(motion, cycles, single=True)
     positions = axis_table(motion, target.axes).position[cycles]
-    root = etree.Element(
-        "RSLogix5000Content",
-        {
-            "SchemaRevision": "1.0",
-            "SoftwareRevision": "20.01",
-            "TargetName": _routine(target),
-            "TargetType": "Routine",
-            "TargetSubType": "ST",
-            "ContainsContext": "true",
-        },
-    )
-    controller = etree.SubElement(root, "Controller", {"Use": "Context", "Name": "Controller"})
-    tags = etree.SubElement(controller, "Tags", {"Use": "Context"})
+    root = parse_xml(filled("vendors/rockwell_l5x.xml", routine=_routine(target)).encode("ascii"))
+    tags = child(root, "Controller/Tags")
     for name, axis, column in zip(_tag_names(target), target.axes, positions.T, strict=True):
         _cam(
             tags, name, f"Axis {axis.name}: s, {axis.unit}; error {error:.2g} m", motion.times[cycles], column
@@ -60,11 +50,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         _tag(tags, f"{name}_Profile", "CAM_PROFILE", len(cycles))
         _tag(tags, f"{name}_Control", "MOTION_INSTRUCTION")
         _switch(tags, f"{name}_Calculate")
-    programs = etree.SubElement(controller, "Programs", {"Use": "Context"})
-    program = etree.SubElement(programs, "Program", {"Use": "Context", "Name": "MainProgram"})
-    routines = etree.SubElement(program, "Routines", {"Use": "Context"})
-    routine = etree.SubElement(routines, "Routine", {"Use": "Target", "Name": _routine(target), "Type": "ST"})
-    content = etree.SubElement(routine, "STContent")
+    content = child(root, "Controller/Programs/Program/Routines/Routine/STContent")
     for number, line in enumerate(_statements(_tag_names(target), len(cycles))):
         etree.SubElement(content, "Line", {"Number": str(number)}).text = etree.CDATA(line)
     return (File(f"{target.name}.L5X", write_xml(root)),)
@@ -183,17 +169,6 @@ def _routine(target: Target) -> str:
 
 
 def _statements(names: list[str], points: int) -> list[str]:
-    lines = [
-        "// Calculates the cam profiles once after an import, not while a MATC uses them (Status above 2).",
-        "// When .DN of the control tag is set (.ER: an error), start each axis with MATC: lock position 0,",
-        "// master reference the time in seconds, scaling 1.0. Watch MATC's own .ER and .IP, and the axis's",
-        "// faults. Not tried on a controller.",
-    ]
-    for name in names:
-        lines += [
-            f"IF {name}_Calculate AND ({name}_Profile[0].Status <= 2) THEN",
-            f"    MCCP({name}_Control, {name}[0], {points}, 0.0, 0.0, {name}_Profile[0]);",
-            f"    {name}_Calculate := 0;",
-            "END_IF;",
-        ]
-    return lines
+    texts = text_parts("vendors/rockwell_l5x.st")
+    cams = (texts["cam"].format(name=name, points=points) for name in names)
+    return "\n".join([texts["head"], *cams]).split("\n")

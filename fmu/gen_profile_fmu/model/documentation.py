@@ -2,14 +2,17 @@
 
 import inspect
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from html import escape
+from pathlib import Path
+from string import Template
 
 import numpy as np
 
 from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Coordinate, Plant
+from gen_profile_exporters.text_parts import text_parts
 from gen_profile_fmu.model.nominals import rounded_up, smooth_move
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 from gen_profile_fmu.model.variables import VariableTable
@@ -17,106 +20,43 @@ from gen_profile_fmu.model.variables import VariableTable
 _WIDTH, _HEIGHT, _SAMPLES = 640.0, 220.0, 321
 _FLAT = 1e-12  # what moves by less is drawn as a line
 _COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b")
-_INPUTS = {
-    InputKind.ACCELERATION: "The axes have the accelerations of the inputs at once. In co-simulation, "
-    "inputs may have time derivatives up to the third order (FMI 2).",
-    InputKind.VELOCITY: "Drives follow the inputs with a first-order lag, τ dv/dt = v_ref − v, or at once "
-    "where τ = 0. In co-simulation, inputs may have time derivatives up to the third order (FMI 2); a step "
-    "of the velocity strikes the loads as its impulse; in model exchange drives without lag hold a velocity "
-    "for interpolation_period.",
-    InputKind.SETPOINT: "Drives interpolate their setpoints linearly (CiA 402, object 60C2h), so that "
-    "velocity is constant between two setpoints, behind a first-order lag where τ &gt; 0. In co-simulation a "
-    "setpoint is reached at the end of the step; in model exchange drives take one every "
-    "interpolation_period.",
-}
-_ERROR = (
-    "<p>In co-simulation the loads are integrated by the classical Runge-Kutta method of fourth order, in "
-    "steps of at most max_step; a hundredth of the shortest period of oscillation leaves less than a "
-    "millionth of the swing a period. The axes' motion is exact.</p>"
-)
-_CALLS = (  # of a block
-    "In co-simulation the cycles that begin within a step are called with the inputs of the step's beginning."
-)
-_BEGINNING = (
-    "It begins at start_time or, with wait_for_trigger, as soon as trigger is true from then on. Before, it "
-    "rests; after its end it holds the target, or goes on at the final velocity."
-)
+_TEXTS = text_parts(str(Path(__file__).with_name("pages.html")))
 
 
 def plant_page(name: str, machine: PlantInstance, table: VariableTable, kind: InputKind) -> str:
     """Describe a plant with inputs, in HTML; its picture is the swing after a quick push."""
-    parts = (
-        f"<p>{_capital(machine.plant.summary)}.</p>",
-        _equations(machine.plant),
-        f"<h2>Drives</h2><p>{_INPUTS[kind]}</p>",
-        _ERROR,
-        "<h2>Sway after a move of one second</h2>",
-        _sway_plot(machine, _push(machine), 6.0),
-        _variables(table),
-    )
-    return _page(name, parts)
+    sway = _sway_plot(machine, _push(machine), 6.0)
+    return _page("plant", name, table, machine.plant, drives=_TEXTS[kind.value], sway=sway)
 
 
 def motion_page(name: str, axes: Sequence[Coordinate], profile: Profile, table: VariableTable) -> str:
     """Describe a motion, in HTML."""
-    parts = (
-        f"<p>The motion of the axes, as polynomials between knots: exact at any time. {_BEGINNING}</p>",
-        "<h2>Motion</h2>",
-        _motion_plots(axes, profile),
-        _variables(table),
-    )
-    return _page(name, parts)
+    return _page("motion", name, table, motion=_motion_plots(axes, profile))
 
 
 def system_page(name: str, machine: PlantInstance, command: Profile, table: VariableTable) -> str:
     """Describe a plant that follows a motion, in HTML."""
-    parts = (
-        f"<p>{_capital(machine.plant.summary)}, whose drives follow a motion, behind a first-order lag where "
-        f"τ &gt; 0. {_BEGINNING}</p>",
-        _equations(machine.plant),
-        _ERROR,
-        "<h2>Motion</h2>",
-        _motion_plots(machine.plant.actuated, command),
-        "<h2>Sway on ideal drives</h2>",
-        _sway_plot(machine, command, command.duration + 4.0),
-        _variables(table),
-    )
-    return _page(name, parts)
+    motion = _motion_plots(machine.plant.actuated, command)
+    sway = _sway_plot(machine, command, command.duration + 4.0)
+    return _page("system", name, table, machine.plant, motion=motion, sway=sway)
 
 
 def block_page(name: str, words: str, table: VariableTable) -> str:
     """Describe a planner block, in HTML, by its own words."""
-    text = f"<p>A planner block as a sampled controller: it is called once in every cycle. {_CALLS}</p>"
-    return _page(name, (text, f"<h2>The block</h2><pre>{escape(words)}</pre>", _variables(table)))
+    return _page("block", name, table, words=escape(words))
 
 
 def planned_system_page(name: str, machine: PlantInstance, words: str, table: VariableTable) -> str:
     """Describe a plant that a planner drives, in HTML."""
-    parts = (
-        f"<p>{_capital(machine.plant.summary)}, whose drives go from setpoint to setpoint of a planner "
-        f"block, which is called once in every cycle, behind a first-order lag where τ &gt; 0. {_CALLS}</p>",
-        _equations(machine.plant),
-        _ERROR,
-        f"<h2>The block</h2><pre>{escape(words)}</pre>",
-        _variables(table),
-    )
-    return _page(name, parts)
+    return _page("planned_system", name, table, machine.plant, words=escape(words))
 
 
-def _page(title: str, parts: Iterable[str]) -> str:
-    style = (
-        "body{font-family:sans-serif;max-width:60em;margin:2em auto} svg{display:block;margin:1em 0} "
-        "td,th{padding:0 1em 0 0;text-align:left;vertical-align:top}"
-    )
-    body = "\n".join(parts)
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{style}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{body}\n</body>\n</html>\n"
-    )
-
-
-def _capital(words: str) -> str:
-    return escape(words[:1].upper() + words[1:])
+def _page(kind: str, title: str, table: VariableTable, plant: Plant | None = None, **more: str) -> str:
+    if plant is not None:
+        summary = escape(plant.summary[:1].upper() + plant.summary[1:])
+        more |= {"summary": summary, "equations": _equations(plant)}
+    body = Template(_TEXTS[kind]).substitute(_TEXTS | more, variables=_variables(table))
+    return Template(f"{_TEXTS['page']}\n").substitute(title=escape(title), body=body)
 
 
 def _equations(plant: Plant) -> str:

@@ -15,7 +15,7 @@ from gen_profile_fmu.model.c_sources import equations_source, filled, model_sour
 from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model
 from gen_profile_fmu.model.dependencies import Structure, plant_structure
 from gen_profile_fmu.model.documentation import block_page, planned_system_page
-from gen_profile_fmu.model.plant_variables import PlantInstance, planned_system_variables, time_variable
+from gen_profile_fmu.model.plant_variables import PlantInstance, listed, planned_system_variables
 from gen_profile_fmu.model.variables import FmuVariable, Kind, Type, VariableTable, require_good_names
 
 # with which comments of declarations begin, beside those of live parameters
@@ -109,7 +109,7 @@ def planner_model(name: str, text: str, axes: Mapping[str, str], live: tuple[str
     """
     block = _PlacedBlock(text=text, axes=axes, live=live, inside=(CYCLE,))
     orders, issued = _orders(block), _issued(block)
-    table = VariableTable(blocks={**orders, **issued, "TIME": (time_variable(),)})
+    table = VariableTable(blocks={**orders, **issued, "TIME": listed("time")})
     require_good_names("Planner", [*axes.values(), *live], table)
     at = _references(block, table)
     return Model(

@@ -1,8 +1,10 @@
 """The variables of FMUs that hold a plant, a motion, or both."""
 
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -23,6 +25,7 @@ TAU = "tau"
 MAX_STEP = "max_step"
 PERIOD = "interpolation_period"
 _STANDING = 1e-9  # m or rad, less than which a motion leads nowhere
+_VARIABLES = tomllib.loads(Path(__file__).with_name("variables.toml").read_text("utf-8"))
 Blocks = dict[str, tuple[FmuVariable, ...]]
 
 
@@ -83,7 +86,7 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
             "INPUTS": _inputs(machine, kind),
             "PERIOD": _period(machine.period, kind),
             **_states_and_outputs(machine),
-            "TIME": (time_variable(),),
+            "TIME": listed("time"),
         }
     )
     _check_names(machine.plant, table)
@@ -93,7 +96,7 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
 def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTable:
     """List the variables of a motion alone; raises as `plant_variables` does."""
     table = VariableTable(
-        blocks={**_way(axes, motion), **_trigger(), **_command(axes), "TIME": (time_variable(),)}
+        blocks={**_way(axes, motion), **_trigger(), **_command(axes), "TIME": listed("time")}
     )
     require_good_names("Profile", [axis.name for axis in axes], table)
     return table
@@ -108,7 +111,7 @@ def system_variables(machine: PlantInstance, motion: Profile) -> VariableTable:
             **_trigger(),
             **_states_and_outputs(machine),
             **_command(machine.plant.actuated),
-            "TIME": (time_variable(),),
+            "TIME": listed("time"),
         }
     )
     _check_names(machine.plant, table)
@@ -142,7 +145,7 @@ def planned_system_variables(
             ),
             **_states_and_outputs(machine),
             **issued,
-            "TIME": (time_variable(),),
+            "TIME": listed("time"),
         }
     )
     _check_names(machine.plant, table)
@@ -162,26 +165,14 @@ def _parameters(machine: PlantInstance, kind: InputKind) -> Blocks:
         )
         for parameter in machine.plant.parameters
     )
-    # fixed: position + tau * velocity is the interpolated setpoint only while tau stays as it is
-    tau = FmuVariable(
-        name=TAU,
-        description="time constant of the drives' first-order lag; 0: ideal drives",
-        unit="s",
-        kind=Kind.FIXED_PARAMETER,
-        start=machine.tau,
-        lower=0.0,
-    )
-    longest_step = FmuVariable(
-        name=MAX_STEP,
-        description="longest integration step in co-simulation (Runge-Kutta, fourth order)",
-        unit="s",
-        kind=Kind.TUNABLE_PARAMETER,
-        start=1e-3,
-        lower=1e-6,
-        upper=1.0,
-    )
-    lag = () if kind is InputKind.ACCELERATION else (tau,)
-    return {"P": parameters, "TAU": lag, "MAX_STEP": (longest_step,)}
+    lag = () if kind is InputKind.ACCELERATION else listed(TAU, start=machine.tau)
+    return {"P": parameters, "TAU": lag, "MAX_STEP": listed(MAX_STEP)}
+
+
+def listed(name: str, **values: Any) -> tuple[FmuVariable, ...]:
+    """List one of the variables that ``variables.toml`` describes."""
+    row = {"name": name, "type": "REAL", **_VARIABLES[name], **values}
+    return (FmuVariable(**{**row, "kind": Kind[row["kind"]], "type": Type[row["type"]]}),)
 
 
 def _period(period: float, kind: InputKind) -> tuple[FmuVariable, ...]:
@@ -191,15 +182,8 @@ def _period(period: float, kind: InputKind) -> tuple[FmuVariable, ...]:
     }
     if kind not in words:
         return ()
-    period_variable = FmuVariable(
-        name=PERIOD,
-        description=f"time {words[kind]}, in model exchange; in co-simulation, the step",
-        unit="s",
-        kind=Kind.FIXED_PARAMETER,
-        start=period,
-        lower=1e-6,
-    )
-    return (period_variable,)
+    words_of_kind = f"time {words[kind]}, in model exchange; in co-simulation, the step"
+    return listed(PERIOD, description=words_of_kind, start=period)
 
 
 def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
@@ -304,28 +288,12 @@ def _of_bodies(plant: Plant) -> Blocks:
             ("z", "where the load is, above the suspension point"),
         )
     )
-    words = "mechanical energy of all loads: kinetic, of springs, and of weight, from the suspension point on"
-    energy = FmuVariable(name="energy", description=words, unit="J", kind=Kind.OUTPUT)
-    return {"PLACE": places, "ENERGY": (energy,) if plant.bodies else ()}
+    return {"PLACE": places, "ENERGY": listed("energy") if plant.bodies else ()}
 
 
 def _trigger() -> Blocks:
-    def boolean(name: str, description: str, kind: Kind) -> tuple[FmuVariable, ...]:
-        return (FmuVariable(name=name, description=description, unit="", kind=kind, type=Type.BOOLEAN),)
-
-    start = FmuVariable(
-        name="start_time",
-        description="time before which the motion does not begin",
-        unit="s",
-        kind=Kind.FIXED_PARAMETER,
-    )
-    return {
-        "START_TIME": (start,),
-        "WAIT": boolean("wait_for_trigger", "whether the motion waits for the trigger", Kind.FIXED_PARAMETER),
-        "TRIGGER": boolean("trigger", "begin the motion, once", Kind.DISCRETE_INPUT),
-        "MOVING": boolean("moving", "the motion has begun and not ended", Kind.DISCRETE_OUTPUT),
-        "DONE": boolean("done", "the target is reached", Kind.DISCRETE_OUTPUT),
-    }
+    names = {"WAIT": "wait_for_trigger", "TRIGGER": "trigger", "MOVING": "moving", "DONE": "done"}
+    return {"START_TIME": listed("start_time"), **{block: listed(name) for block, name in names.items()}}
 
 
 def _command(axes: Sequence[Coordinate]) -> Blocks:
@@ -337,11 +305,6 @@ def _command(axes: Sequence[Coordinate]) -> Blocks:
             for variable in _each(axes, f"{{}}.{suffix}", "of the motion", order, Kind.OUTPUT)
         )
     }
-
-
-def time_variable() -> FmuVariable:
-    """Declare the simulation time."""
-    return FmuVariable(name="time", description="simulation time", unit="s", kind=Kind.INDEPENDENT)
 
 
 def _check_names(plant: Plant, table: VariableTable) -> None:

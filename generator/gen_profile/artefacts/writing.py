@@ -86,9 +86,15 @@ def staged(destination: Path) -> Iterator[StagingFolder]:
         finally:
             _remove_empty(made)
     except OSError as error:
-        raise OutputError(
-            f"Cannot write to the folder {destination}: {error.strerror or error}; choose another one."
-        ) from error
+        raise unwritable(destination, error) from error
+
+
+def unwritable(folder: Path, error: Exception) -> OutputError:
+    """Say why nothing can be written to a folder."""
+    reason = getattr(error, "strerror", None) or error
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        reason = f"{next(place for place in (folder, *folder.parents) if place.exists())} is a file"
+    return OutputError(f"Cannot write to the folder {folder}: {reason}; choose another one.")
 
 
 def deliver(path: Path, content: bytes) -> None:

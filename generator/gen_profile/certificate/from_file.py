@@ -22,6 +22,7 @@ from gen_profile.certificate.sway_limits import ProvedSway, SwayBounds, limits_o
 from gen_profile.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import SampledProfile
+from gen_profile.progress import require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path
 from gen_profile.verification.check import spec_and_manifest
@@ -80,6 +81,7 @@ def certify_artefact(
     >>> gp.certify_artefact("deploy/paper.csv").proved  # what gp.design wrote
     True
     """
+    require_progress(progress)
     artefact = _read(as_path(path), spec)
     if write:
         require_place(certificate_path(artefact.path))  # before there is a proof to lose
@@ -122,6 +124,7 @@ def check_certificate(
     >>> gp.check_certificate("deploy/paper.csv", "deploy/paper.csv.certificate.json").proved
     True
     """
+    require_progress(progress)
     artefact = _read(as_path(path), spec)
     claimed = parse(read_artefact(as_path(certificate)))
     theorem = _require_about(claimed, artefact)

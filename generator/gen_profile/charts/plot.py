@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import get_args
 
 import attrs
 import numpy as np
@@ -25,6 +26,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.solvers.plan import Plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path
+from gen_profile.suggestion import found
 from gen_profile.verification.check import Judgement
 from gen_profile.verification.verdict import Check
 
@@ -113,7 +115,8 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
             names = ", ".join(result.estimate.values)
             return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"
         case _:
-            raise SpecError(f"There is no picture of a {type(result).__name__}.")
+            drawn = ", ".join(kind.__name__ for kind in get_args(Drawn))
+            raise SpecError(f"There is no picture of {found(result)}; give one of {drawn}.")
 
 
 def _check_figure(check: Check) -> Figure:

@@ -134,10 +134,14 @@ def _given(name: str | None) -> bool:
 
 
 def _is_artefact(path: Path) -> bool:
-    """Tell specs from exported files by their suffix."""
+    """Tell specs from exported files by their suffix; refuse those that only go with one."""
+    from gen_profile.artefacts.reading import read_motion
     from gen_profile_exporters.registry import formats
 
-    return path.is_file() and any(path.name.endswith(known.suffix) for known in formats().values())
+    if not path.is_file() or path.suffix.lower() == ".toml":
+        return False
+    read_motion(path)
+    return any(path.name.endswith(known.suffix) for known in formats().values())
 
 
 def _holds_block(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
@@ -40,19 +41,9 @@ COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
 RESTS = 0.5  # of a half-range, from which on 1 % of another parameter is worth a word
 
+_TABLES = tomllib.loads((Path(__file__).parents[1] / "lists" / "figures.toml").read_text("utf-8"))
 # head → unit, figure, how many of the unit make one of the figure's
-COLUMNS = {
-    "time": ("s", "duration_s", 1.0),
-    "a max": ("m/s²", "acceleration_max_m_per_s2", 1.0),
-    "a rms": ("m/s²", "acceleration_rms_m_per_s2", 1.0),
-    "jerk max": ("m/s³", "jerk_max_m_per_s3", 1.0),
-    "jerk rms": ("m/s³", "jerk_rms_m_per_s3", 1.0),
-    "sway max": ("mm", "sway_transient_peak_m", 1e3),
-    "sway rms": ("mm", "sway_transient_rms_m", 1e3),
-    "residual": ("mm", "sway_residual_peak_m", 1e3),
-    "perturbed": ("mm", "sway_residual_peak_perturbed_m", 1e3),
-    "worst": ("mm", "sway_residual_worst_m", 1e3),
-}
+COLUMNS: dict[str, tuple[str, str, float]] = _TABLES["terminal"]
 # what the names of a comparison are
 METHODS = (
     "optimal-betaN: the optimal motion with cost.sway_weight = N; -orderN, -range: with another robustness.\n"

@@ -12,7 +12,7 @@ from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate,
 from gen_profile.evaluation.phrases import mm, number
 from gen_profile.motion.profile import Profile
 from gen_profile.phrase import Phrase, joined
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.summary import Drawable, Tabled
@@ -250,6 +250,7 @@ def compare(
     >>> gp.compare(gp.preset_spec("paper"))
     <Comparison name: paper, methods: nzv, zv, ... fastest: optimal-beta0, gentlest: optimal-beta50>
     """
+    require_progress(progress)
     spec = as_spec(spec)
     rows: list[ComparedMethod] = []
     left_out: dict[str, str] = {}

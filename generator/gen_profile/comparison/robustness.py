@@ -17,7 +17,7 @@ from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
 from gen_profile.problem.linearization import linearize
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_number, as_spec
 from gen_profile.spec.values import require_whole
@@ -195,6 +195,7 @@ def robustness(
     >>> gp.robustness(gp.preset_spec("paper"), "L1", methods=["zv", "optimal-beta50"], points=5)
     <Robustness name: paper, errors: L1 -30 to +30 %, zv: 17.72 mm at worst, optimal-beta50: 4.781 mm ...>
     """
+    require_progress(progress)
     spec, parameters, methods, own = as_spec(spec), as_names(parameters), as_names(methods), as_motions(own)
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}

@@ -17,7 +17,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.solvers.plan import Plan, plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
@@ -162,6 +162,7 @@ def design(
     >>> gp.design(gp.preset_spec("paper"), "csv", "deploy").passed
     True
     """
+    require_progress(progress)
     spec, folder = as_spec(spec), as_path(folder)
     verify = partial(_check, by_fmpy=by_fmpy, progress=progress) if check else None
     return _designed(

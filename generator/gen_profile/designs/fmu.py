@@ -15,7 +15,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.linearization import linearize
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.solvers.plan import plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
@@ -111,6 +111,7 @@ def export_fmu(
     >>> gp.export_fmu(gp.preset_spec("paper"), "plant", "crane.fmu").path.name
     'crane.fmu'
     """
+    require_progress(progress)
     spec = as_spec(spec)
     if kind not in KINDS:
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")

@@ -16,11 +16,11 @@ from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_program
 from gen_profile.planner.full_speed import slow_axes
 from gen_profile.planner.margins import Margins, sensor_margins
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec, as_text
 from gen_profile.spec.values import require_whole
 from gen_profile.summary import Drawable
 
@@ -124,7 +124,10 @@ def deploy_planner(
     >>> gp.deploy_planner(gp.preset_spec("bay-crane"), "plc", "block", histories=10).proof.passed
     True
     """
+    require_progress(progress)
     spec = as_spec(spec)
+    if scheduler is not None:
+        as_text(scheduler, "scheduler: an address")
     require_whole(histories, 1, "histories")
     folder = as_path(folder)
     progress("finding the modes over the live ranges")

@@ -28,7 +28,7 @@ from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.one_thread import one_thread
 from gen_profile.phrase import AND, Phrase, joined
 from gen_profile.plants.plant import Plant
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_number, as_numbers, as_path, as_spec, as_text
 from gen_profile.suggestion import suggestion
@@ -247,6 +247,7 @@ def identify(
     >>> gp.identify(gp.preset_spec("bay-crane"), [timed], "L1")
     <Identification name: bay-crane, L1: 4.68921>
     """
+    require_progress(progress)
     spec = as_spec(spec)
     plant = spec.machine()
     measurements = tuple(measurements) if isinstance(measurements, Iterable) else (measurements,)

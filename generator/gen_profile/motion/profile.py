@@ -15,6 +15,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.suggestion import found
 from gen_profile.summary import Drawable, Sampled, Summarised, Tabled
 
 Array = NDArray[np.float64]
@@ -125,7 +126,7 @@ class Profile(Drawable):
         if not (hasattr(spline, "x") and hasattr(spline, "c")):
             raise GenProfileError(
                 "A spline with breakpoints x and coefficients c is expected, such as SciPy's PPoly, which "
-                f"PPoly.from_spline makes of others, found a {type(spline).__name__}."
+                f"PPoly.from_spline makes of others, found {found(spline)}."
             )
         knots, c = np.asarray(spline.x, dtype=np.float64), np.asarray(spline.c, dtype=np.float64)
         coefficients = np.moveaxis(c.reshape(*c.shape[:2], -1)[::-1], 0, 1)
@@ -372,18 +373,14 @@ def sample(profile: Profile, cycle_time: float) -> SampledProfile:
 def require_motion(value: object) -> None:
     """Refuse, by a `SpecError`, what is no profile: most often a plan, which holds one."""
     if not isinstance(value, Profile):
-        raise SpecError(
-            f"A Profile is expected, such as gp.plan(spec).motion, found a {type(value).__name__}."
-        )
+        raise SpecError(f"A Profile is expected, such as gp.plan(spec).motion, found {found(value)}.")
 
 
 def require_samples(value: object, axes: int) -> None:
     """Refuse, by a `SpecError`, what is no sampled profile, most often not sampled yet, or of other axes."""
     if not isinstance(value, SampledProfile):
         known = "gp.sample(motion, cycle_time=0.01)"
-        raise SpecError(
-            f"A SampledProfile is expected, such as {known} gives, found a {type(value).__name__}."
-        )
+        raise SpecError(f"A SampledProfile is expected, such as {known} gives, found {found(value)}.")
     if value.position.shape[1] != axes:
         raise SpecError(f"The setpoints are for {value.position.shape[1]} axes, and the machine has {axes}.")
 

@@ -11,6 +11,7 @@ from gen_profile.planner.sensor_log import read_rows
 from gen_profile.suggestion import number_meant
 
 KEPT = 16
+MOST = 1e9  # s, and of a code: no block's counts so far
 NO_ERROR = 50  # the code of nErrorId 0; those of the others follow
 COLUMNS = ("time_s", "code", "value")
 _LINES = (Path(__file__).parents[1] / "lists" / "events.txt").read_text("utf-8").splitlines()
@@ -89,7 +90,8 @@ def read_events(text: str) -> list[Event]:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
         except ValueError:
             time, code, value = math.nan, math.nan, math.nan
-        if None in row or not (math.isfinite(time + value) and code.is_integer()):
+        sound = max(abs(time), abs(code)) < MOST and code.is_integer() and math.isfinite(value)
+        if None in row or not sound:
             hint = next((hint for text in cells if "point" in (hint := number_meant(text))), "")
             raise SpecError(
                 f"events, line {line}: a time, a whole number and a value are wanted, "

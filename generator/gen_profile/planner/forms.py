@@ -13,7 +13,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
 from gen_profile.suggestion import suggestion
-from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.block_source import is_planner, parse_function_block
 from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.planner.axis_wrapper import planner_wrappers
 from gen_profile_exporters.planner.c_source import c_files
@@ -25,10 +25,7 @@ from gen_profile_exporters.registry import container_of, containers, find_contai
 
 PORTABLE, WHAT = "plc", "the block "
 PROGRAMS = {"c": c_files, "linux": linux_files, "openplc": openplc_files}
-_PLANNER, _WRAPPER = (
-    re.compile(rf"^\s*FUNCTION_BLOCK\s+\w+_planner{end}\s*$", re.MULTILINE | re.IGNORECASE)
-    for end in ("", "_(Axis|Velocity)")
-)
+_WRAPPER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner_(Axis|Velocity)\s*$", re.MULTILINE | re.IGNORECASE)
 
 
 def require_forms(formats: Iterable[str]) -> None:
@@ -114,11 +111,6 @@ def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
     if format_ == PORTABLE and given is source:  # with its comments
         files[0] = File(filename=block.filename, content=block.text.encode("ascii"))
     return tuple(files)
-
-
-def is_planner(text: str) -> bool:
-    """Whether a text is a planner block's, by the name that it has."""
-    return _PLANNER.search(text) is not None
 
 
 def read_block(path: Path) -> str:

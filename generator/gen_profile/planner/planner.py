@@ -17,9 +17,10 @@ from gen_profile.planner.forms import read_block
 from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs, sensed_axes
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_numbers, as_spec, as_values
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import found, suggestion
 from gen_profile.summary import Sampled, Summarised
 
+PLACE = "fActPosition"
 OWN = {  # of each axis
     "position": "fPosition",
     "velocity": "fVelocity",
@@ -28,11 +29,13 @@ OWN = {  # of each axis
 }
 COMMON = {"busy": "bBusy", "done": "bDone", "promise": "bPromise", "error_id": "nErrorId"}
 OF_AXES: dict[
-    Literal["target", "velocity", "velocity_limit"], str
+    Literal["target", "velocity", "velocity_limit", "actual_position", "actual_velocity"], str
 ] = {  # inputs of each, by what a caller gives
     "target": "fTarget",
     "velocity": "fVelocityCommand",
     "velocity_limit": "fVelocityLimit",
+    "actual_position": PLACE,
+    "actual_velocity": "fActVelocity",
 }
 MOST_CYCLES = 2_000_000  # in one go: each takes some hundred bytes
 IDLE = dict.fromkeys(("bExecute", "bVelocity", "bStop", "bQuickStop"), 0.0)  # no command
@@ -102,6 +105,11 @@ class Orders(TypedDict, total=False):
         Whether to acknowledge an error that stopped a command.
     load_at_rest : bool
         Whether the load was seen to hang still, as some time after a quick stop: the promise holds again.
+    enable : bool
+        Whether the block commands the axis; it does from the start. Where it is not to, it stops commanding
+        in the same cycle, forgets its command, and follows the axis; it takes it over when enabled again.
+    actual_position, actual_velocity : float or (axes,) array
+        m and m/s, of the axis while the block is disabled: by default where the block left it, at rest.
     live : mapping of str to float or (cycles,) array
         Live parameters that change, by name, in their SI units; an array changes on the way.
     override : float
@@ -119,6 +127,9 @@ class Orders(TypedDict, total=False):
     quick_stop: bool
     reset: bool
     load_at_rest: bool
+    enable: bool
+    actual_position: ArrayLike | None
+    actual_velocity: ArrayLike | None
     live: Mapping[str, ArrayLike] | None
     override: float | None
     velocity_limit: ArrayLike | None
@@ -164,13 +175,13 @@ class Planner(Summarised):
         self._axes = self._block.axes
         self._inputs = self._block.inputs  # as they are in the next cycle
         self._live = live_inputs(self._inputs, self._axes)
-        stands = [self._inputs[axis.of("fActPosition")] for axis in self._axes]
+        stands = [self._inputs[axis.of(PLACE)] for axis in self._axes]
         self.restart(position if position is not None else stands if len(stands) > 1 else stands[0])
 
     def summary(self) -> Mapping[str, object]:
         """Name what it is for, and where it stands."""
-        stands = {axis.name or "axis": self._inputs[axis.of("fActPosition")] for axis in self._axes}
-        return {"cycle": f"{1e3 * self.cycle_time:g} ms", "live": self.live, "enabled at": stands}
+        stands = {axis.name or "axis": self._inputs[axis.of(PLACE)] for axis in self._axes}
+        return {"cycle": f"{1e3 * self.cycle_time:g} ms", "live": self.live, "stands at": stands}
 
     @property
     def cycle_time(self) -> float:
@@ -195,7 +206,7 @@ class Planner(Summarised):
         position : float or (axes,) array
             m (or rad).
         """
-        stands = _columns_of("fActPosition", "position", position, self._axes, 1)
+        stands = _columns_of(PLACE, "position", position, self._axes, 1)
         self._block = BlockInstance(self._text)
         self._inputs |= {
             "bEnable": 1.0,
@@ -229,7 +240,7 @@ class Planner(Summarised):
         SpecError
             The block has no zones (``planner.zones``), or not so many, or no such axis.
         """
-        if axis not in range(len(self._axes)):
+        if isinstance(axis, bool) or axis not in range(len(self._axes)):
             last = len(self._axes) - 1
             raise SpecError(f"axis: must be a place in `axes`, from 0 to {last}, found {axis!r}.")
         columns: dict[str, list[float]] = {}
@@ -316,11 +327,18 @@ class Planner(Summarised):
         for name, column in columns.items():
             rows[:, list(self._inputs).index(name)] = column
         self._inputs |= {name: float(column[-1]) for name, column in columns.items()}
-        if not self._is_enabled:  # a cycle without a command, with the live parameters of the first one
+        enabled = bool(self._inputs["bEnable"])
+        if (
+            enabled and not self._is_enabled
+        ):  # a cycle without a command, with live parameters of the first one
             first = dict(zip(self._inputs, rows[0], strict=True))
             self._block.call(np.array([list((first | IDLE).values())]))
             self._is_enabled = True
         issued = self._block.call(rows).T
+        if enabled:  # where the axes stand if they are not commanded from now on
+            last = dict(zip(self._block.outputs, issued[:, -1].tolist(), strict=True))
+            for axis in self._axes:
+                self._inputs |= {axis.of(PLACE): last[axis.of("fPosition")], axis.of("fActVelocity"): 0.0}
         return {
             name: column.astype(KINDS.get(name[0], np.float64))
             for name, column in zip(self._block.outputs, issued, strict=True)
@@ -335,6 +353,9 @@ class Planner(Summarised):
         if sum(_commands(orders).values()) > 1:
             raise SpecError("Planner: give one of target, velocity, stop and quick_stop, not several.")
         columns: dict[str, Array] = {}
+        for switch in ("stop", "quick_stop", "reset", "load_at_rest", "enable"):
+            if not isinstance(given := orders.get(switch, False), bool | np.bool_):
+                raise SpecError(f"{switch}: must be true or false, found {found(given)}.")
         for what, name in OF_AXES.items():
             if (value := orders.get(what)) is not None:
                 columns |= _columns_of(name, what, value, self._axes, cycles)
@@ -362,7 +383,8 @@ class Planner(Summarised):
     def _command(self, orders: Orders, columns: dict[str, Array]) -> None:
         """Let another command take the place of the one that holds; one that was stopped is given anew."""
         reset, commands = orders.get("reset", False), _commands(orders)
-        levels = {"bReset": reset, "bLoadAtRest": orders.get("load_at_rest", False)}
+        enable = orders.get("enable", bool(self._inputs["bEnable"]))
+        levels = {"bReset": reset, "bLoadAtRest": orders.get("load_at_rest", False), "bEnable": enable}
         if reset:
             self._target = None
         if commands.pop("bExecute"):
@@ -370,7 +392,7 @@ class Planner(Summarised):
             self._is_due = self._is_due or target != self._target
             self._target = target
             levels |= commands
-        elif any(commands.values()):
+        elif any(commands.values()) or not enable:
             self._is_due, self._target = False, None
             levels |= commands
         columns |= {name: np.full(1, float(is_so)) for name, is_so in levels.items() if name in self._inputs}
@@ -417,7 +439,10 @@ def _columns_of(
 
 def _column(what: str, value: ArrayLike, cycles: int) -> Array:
     try:
-        column = np.asarray(value, dtype=np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind in "USbc":  # NumPy would make numbers of them
+            raise TypeError
+        column = given.astype(np.float64)
     except (TypeError, ValueError):
         raise SpecError(f"{what}: must be a number, found {value!r}.") from None
     if column.shape not in ((), (cycles,)):

@@ -15,6 +15,7 @@ from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.soundness import faults_of
+from gen_profile.suggestion import found
 
 
 @attrs.frozen(kw_only=True)
@@ -83,7 +84,7 @@ def plant_of_file(file: MachineFile) -> Plant:
     if not isinstance(plant, Plant):
         raise SpecError(
             f"plant.file: {file.name} must define PLANT, a gen_profile.plants.plant.Plant, found "
-            f"{type(plant).__name__}."
+            f"{found(plant)}."
         )
     faults = faults_of(plant)
     if faults:

@@ -15,6 +15,7 @@ from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_rows
 from gen_profile.problem.symbolic import Function
 from gen_profile.spec.reading import as_number, as_numbers, as_values
+from gen_profile.suggestion import found
 
 SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
 
@@ -93,8 +94,7 @@ def linearize(
     array([3.64, 9.02])
     """
     if not isinstance(plant, Plant):
-        kind = type(plant).__name__
-        raise SpecError(f"A machine is expected, such as spec.machine() gives, found a {kind}.")
+        raise SpecError(f"A machine is expected, such as spec.machine() gives, found {found(plant)}.")
     parameters = as_values(parameters, "parameters")
     for name in (parameter.name for parameter in plant.parameters):
         if not math.isfinite(as_number(parameters.get(name, math.nan), f"parameters: {name}")):

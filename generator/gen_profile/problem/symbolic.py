@@ -101,22 +101,15 @@ _OPERATIONS: Mapping[str, Callable[..., Array]] = {
     "INV": np.reciprocal,
     "SQ": np.square,
     "TWICE": lambda x: x + x,
-    "SQRT": np.sqrt,
     "POW": np.power,
     "CONSTPOW": np.power,
-    "EXP": np.exp,
-    "LOG": np.log,
-    "SIN": np.sin,
-    "COS": np.cos,
-    "TAN": np.tan,
-    "SINH": np.sinh,
-    "COSH": np.cosh,
-    "TANH": np.tanh,
     "ATAN": np.arctan,
     "ATAN2": np.arctan2,
     "FABS": np.abs,
-    "FMIN": np.fmin,
-    "FMAX": np.fmax,
+    **{
+        name.upper(): getattr(np, name)
+        for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fmin", "fmax")
+    },
 }
 
 

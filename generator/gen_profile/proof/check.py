@@ -11,7 +11,7 @@ from gen_profile.artefacts.manifest import PLANNER, Manifest
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import planner_block
-from gen_profile.planner.forms import block_in, is_planner, refuse_program, refuse_wrapper
+from gen_profile.planner.forms import block_in, refuse_program, refuse_wrapper
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
@@ -20,7 +20,7 @@ from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path
 from gen_profile.verification.check import alterations, provenance, spec_and_manifest
-from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.block_source import is_planner, parse_function_block
 from gen_profile_exporters.registry import container_of
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from math import inf
+from pathlib import Path
 
 import numpy as np
 
@@ -38,50 +39,8 @@ BACK = 0.03  # likewise, at which an axis may go back (0.013)
 LATER = {kind: f"{kind}, on average" for kind in ON_AVERAGE}  # what is measured but not judged by one
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
-WORDS = {
-    POSITION: "a target is reached later than allowed by {over:.3g} s",
-    VELOCITY: "a stick's velocity is reached later than allowed by {over:.3g} s",
-    STOP: "a stop ends later than allowed by {over:.3g} s",
-    "left": "a target is left again by {needed:.3g} m",
-    "unasked": "an axis moves that was not commanded to by {needed:.3g} m/s",
-    "back": "an axis goes back on its way from rest by {needed:.3g} m/s",
-    "beyond": "a velocity is above the stick's by {over:.3g} m/s",
-    "against": "an axis moves against its command longer than allowed by {over:.3g} s",
-    "idle": "the axis stands though it is commanded to move, longer than allowed by {over:.3g} s",
-    "given up": "the block gives a command up (error 9), as any motion might leave more sway than allowed",
-    "reaction": "a command is obeyed later than stated by {over:.3g} s",
-    "ends": "a stop leaves its stated ends by {over:.3g} m",
-    "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",
-    "outside": "an axis leaves the range of its targets by {needed:.3g} m",
-    "fast": "a velocity is above override or velocity limit by {over:.3g} m/s",
-    "done": "bDone is set away from the target or before the axis stands",
-    "not done": "bDone is set later than the axis stands at its target by {needed:.3g} s",
-    "busy": "bBusy is not set while the axis moves",
-    "not busy": "bBusy is reset later than the motion ends by {needed:.3g} s",
-    "vanished": "none of bBusy, bDone, bCommandAborted and bError tells of a command",
-    "in velocity": "bInVelocity is set without the velocity of the command",
-    "not in velocity": "bInVelocity is not set at the velocity of the command",
-    "aborted": "bCommandAborted does not tell what became of the command",
-    "error": "bError and nErrorId contradict each other",
-    "wrong error": "nErrorId does not tell the error that there is, or one without a cause",
-    "disabled": "bEnabled is not what bEnable asks for",
-    "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
-    "no way": "a target is kept behind a blocked interval",
-    "zone": "nZone is not the number of the blocked interval",
-    "taken over": "a setpoint is not where the axis is taken over by {needed:.3g} m",
-    QUICK_STOP: "a quick stop ends later than allowed by {over:.3g} s",
-    "jump": "a position is not the integral of the velocity in a quick stop by {needed:.3g} m",
-    "distance": "fDistanceToGo is wrong by {needed:.3g} m",
-    "time": "fTimeToGo is wrong by {needed:.3g} s",
-    "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
-    "swings": "a motion leaves the machine as given swinging by {needed:.3g} m",
-    "sway left": "fSwayLeft is wrong by {needed:.3g} m",
-    "understated": "errors leave more than fSwayLeft states by {needed:.3g} m",
-    "event": "the events that are kept are not those that happened",
-    "promise": "bPromise and nPromise contradict each other",
-    "lost": "nPromise tells a reason that is none",
-    "kept": "bPromise is set though it cannot be known",
-}
+_LINES = (Path(__file__).parents[1] / "lists" / "obedience.txt").read_text("utf-8").splitlines()
+WORDS = {what: words for what, _, words in (line.partition(": ") for line in _LINES)}
 LATE = POSITION, VELOCITY, STOP, "idle", "reaction"  # of these: what a plan that takes many cycles makes
 
 

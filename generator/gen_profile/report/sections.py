@@ -1,7 +1,9 @@
 """The sections of a report, from the values that were found."""
 
+import tomllib
 from collections.abc import Iterator, Mapping
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -37,16 +39,9 @@ MOST_CURVES = 4  # parameters that have a curve each
 MAPPED = 4  # methods that have a map each
 MOST_LISTED = 40  # scenarios; the worst of them say enough
 GROUPED = ("how many", "median (mm)", "99 % (mm)", "worst (mm)", "verdict")
+_TABLES = tomllib.loads((Path(__file__).parents[1] / "lists" / "figures.toml").read_text("utf-8"))
 # head → figure, and how many of the head's unit make one of the figure's
-COMPARED = {
-    "time (s)": ("duration_s", 1.0),
-    "a max ({}/s²)": ("acceleration_max_m_per_s2", 1.0),
-    "a RMS ({}/s²)": ("acceleration_rms_m_per_s2", 1.0),
-    "jerk max ({}/s³)": ("jerk_max_m_per_s3", 1.0),
-    "sway on the way (mm)": ("sway_transient_peak_m", 1e3),
-    "residual, nominal (mm)": ("sway_residual_peak_m", 1e3),
-    "residual, worst (mm)": ("sway_residual_worst_m", 1e3),
-}
+COMPARED: dict[str, tuple[str, float]] = _TABLES["report"]
 
 
 def verdict(check: Check) -> Verdict:

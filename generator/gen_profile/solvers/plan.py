@@ -7,7 +7,7 @@ import attrs
 from gen_profile.errors import LimitViolation
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Profile
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.draft import Draft, solved
 from gen_profile.solvers.shortest import shortest
@@ -81,6 +81,7 @@ def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
     >>> plan.motion.duration
     3.0
     """
+    require_progress(progress)
     spec = as_spec(spec)
     try:
         with budget(*choice.ANSWER):

@@ -15,8 +15,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.spec.tables import Table, structure
-from gen_profile.spec.values import found
-from gen_profile.suggestion import listed, meant, number_meant, suggestion
+from gen_profile.suggestion import found, listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
 Given = TypeVar("Given")
@@ -26,7 +25,6 @@ LONG_KEY = re.compile(
     r"(?<![\w-])(?:(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
     rf"{{{MOST_PARTS}}}"
 )
-NO_SPEC = "; a spec is a .toml file, and gen-profile check takes what was exported, before a spec"
 SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
@@ -129,6 +127,7 @@ def read_text(path: Path) -> str:
             cure = f"; a preset is called so: --preset {path}, or gp.preset_spec({str(path)!r})."
         raise OutputError(f"Cannot read the spec {path}: {error.strerror}{cure}") from error
     except UnicodeDecodeError as error:
+        _refuse_other(str(path))
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
 
 
@@ -292,8 +291,17 @@ def _document(text: str, source: str) -> Table:
         last = text.split("\n")
         end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
         problem = re.sub(r"[(]at end of document[)]", end, str(error))
-        hint = _slip(text, problem) if Path(source).suffix in {".toml", ""} else NO_SPEC
-        raise SpecError(f"{source}: not valid TOML: {problem}{hint}.") from error
+        _refuse_other(source)
+        raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
+
+
+def _refuse_other(source: str) -> None:
+    """Refuse a file that cannot be read as TOML, and is not even named so."""
+    if (kind := Path(source).suffix) not in {".toml", ""}:
+        raise SpecError(
+            f"{source}: a {kind} file is no spec, which ends in .toml; "
+            "gen-profile check and report take what was exported."
+        )
 
 
 def parse_toml(text: str) -> Table:

@@ -14,8 +14,8 @@ import attrs
 
 from gen_profile.errors import SpecError
 from gen_profile.phrase import Phrase, placed
-from gen_profile.spec.values import NONE, Named, Words, found
-from gen_profile.suggestion import suggestion
+from gen_profile.spec.values import NONE, Named, Words
+from gen_profile.suggestion import found, suggestion
 
 Kind = Any  # an annotation
 MISFIT: Any = object()  # in place of a value that does not fit

@@ -19,8 +19,8 @@ from gen_profile.spec.external_fmu import external_fmu
 from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
 from gen_profile.spec.rules import broken_rules
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, place
-from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, between, found
-from gen_profile.suggestion import listed, meant, suggestion
+from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, between
+from gen_profile.suggestion import found, listed, meant, suggestion
 
 Table = dict[str, Any]
 

@@ -6,7 +6,6 @@ A field's annotation says what it may hold; `gen_profile.spec.structure` holds e
 import math
 import re
 from collections.abc import Mapping, Sequence
-from datetime import date, time
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
@@ -14,7 +13,7 @@ import attrs
 
 from gen_profile.errors import SpecError
 from gen_profile.phrase import Phrase
-from gen_profile.suggestion import number_meant
+from gen_profile.suggestion import found
 
 NONE: Mapping[str, Any] = MappingProxyType({})  # a default
 
@@ -99,34 +98,9 @@ def between(limits: Mapping[str, float], unit: str = "") -> str:
     return stated[0] if len(stated) == 1 else Phrase("{low} and {high}", low=stated[0], high=stated[1])
 
 
-def found(value: object, number: bool = True) -> str:
-    """Name a value in a sentence, never at length, and of a text how it might be a number."""
-    match value:
-        case None:
-            return "nothing"
-        case bool():
-            return str(value).lower()
-        case int() if abs(value) >= 10**18:
-            return "a whole number of more than 18 digits"
-        case int() | float():
-            return repr(value)
-        case str():
-            hint = number_meant(value) if number else ""
-            return Phrase("text {text}{hint}", text=repr(value[:60]), hint=hint)
-        case Mapping():
-            return "a table"
-        case list() | tuple():
-            short = len(value) <= 3 and all(type(item) in {int, float} for item in value)
-            return str(list(value)) if short else "an array"
-        case date() | time():
-            return "a date or time"
-        case _:  # from Python
-            return f"a {type(value).__name__}"
-
-
 def require_whole(value: object, least: int, place: str) -> None:
     """Refuse, by a `SpecError`, what is no whole number, or less."""
-    if not isinstance(value, int) or value < least:
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
         raise SpecError(f"{place}: must be a whole number of at least {least}, found {found(value)}.")
 
 

@@ -11,7 +11,7 @@ from gen_profile.artefacts.manifest import FILENAME, SEAL, parse_manifest, seal_
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.reading import as_path
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.store import case_files, case_folder, case_spec, grid_of, swept_table
@@ -83,6 +83,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
     >>> gp.write_library("ropes", "crane.st").block  # of what gp.run_sweep wrote
     'FB_crane'
     """
+    require_progress(progress)
     folder, path = as_path(folder), as_path(path)
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]

@@ -11,7 +11,7 @@ from pyarrow import compute
 
 from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.evaluation.phrases import named
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path, as_values
 from gen_profile.suggestion import number_meant, suggestion
@@ -129,6 +129,7 @@ def lookup(
     >>> gp.lookup("ropes", {"plant.L1": 0.49}).used  # of what gp.run_sweep wrote
     {'plant.L1': 0.5}
     """
+    require_progress(progress)
     folder, out = as_path(folder), None if out is None else as_path(out)
     grid = grid_of(folder)
     wanted = _wanted(grid, {key: str(value) for key, value in as_values(asked, "asked").items()})

@@ -22,7 +22,7 @@ from gen_profile.cluster import client_of, processes, unable
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.spec.reading import as_names, as_path, as_spec, as_text
 from gen_profile.spec.values import require_whole
 from gen_profile.summary import Summarised
 from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
@@ -285,6 +285,8 @@ def run_sweep(
     spec = as_spec(spec)
     if not isinstance(vary, Mapping):
         raise SpecError(f"vary: give values by key, such as {{'plant.L1': [0.45, 0.5]}}, found {vary!r}.")
+    if scheduler is not None:
+        as_text(scheduler, "scheduler: an address")
     if workers is not None:
         require_whole(workers, 1, "workers")
     for key, values in vary.items():

@@ -25,7 +25,7 @@ from pyarrow import compute
 
 from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
 from gen_profile.artefacts.reading import read_artefact
-from gen_profile.artefacts.writing import deliver, deliver_all
+from gen_profile.artefacts.writing import deliver, deliver_all, unwritable
 from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.spec.model import Spec
@@ -229,10 +229,7 @@ def _locked(folder: Path) -> Iterator[None]:
     except Timeout as error:
         raise OutputError(f"Another sweep is at work in {folder}; wait for its end.") from error
     except (OSError, NotImplementedError) as error:  # the latter of file systems without locks
-        raise OutputError(
-            f"Cannot write to the folder {folder}: {getattr(error, 'strerror', '') or error}; "
-            "choose another one."
-        ) from error
+        raise unwritable(folder, error) from error
     with held:
         yield
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_motion
-from gen_profile.errors import CosimulationError, OutputError, SpecError
+from gen_profile.errors import CosimulationError, ExportError, OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
-from gen_profile.progress import Progress, no_progress
+from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec, spec_from_dict
 from gen_profile.spec.values import require_whole
@@ -188,6 +188,7 @@ def check_artefact(
     >>> gp.check_artefact("deploy/paper.csv").passed  # what gp.design wrote
     True
     """
+    require_progress(progress)
     path = as_path(path)
     content, format_ = read_motion(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
@@ -250,7 +251,10 @@ def replayed(path: Path, spec: Spec) -> SampledProfile:
         own, _ = spec_and_manifest(path, content, None)
     except OutputError:
         own = spec
-    setpoints = exporter.replay(content, target_of(own))
+    try:
+        setpoints = exporter.replay(content, target_of(own))
+    except ExportError as error:
+        raise ExportError(f"{path}: {error}") from error
     if setpoints.position.shape[1] != len(spec.machine().actuated):
         raise SpecError(
             f"{path} moves {setpoints.position.shape[1]} axes, and the spec's machine has others."

@@ -1,5 +1,7 @@
 """A playback block that is watched: each setpoint against the table that was proved."""
 
+from pathlib import Path
+
 import numpy as np
 
 from gen_profile.deployment.block_state import ABORTED, DONE, FAILED, MOVING, MotionState
@@ -10,15 +12,8 @@ from gen_profile.motion.profile import Array
 from gen_profile_exporters.playback.table import quantities
 
 LAST_DIGITS = 1e-12  # of the greatest setpoint: what a compiler that fuses operations changes
-REFUSALS = {
-    1: "fCycleTime is not the table's",
-    2: "the axis does not stand where the motion begins",
-    3: "fScale does not lie between 0 and 1",
-    4: "bAbort is set",
-    5: "the checksum is wrong",
-    7: "the machine does not allow this fScale, bMirror or fStartOffset",
-    8: "no way is left to continue",
-}
+_LINES = (Path(__file__).parents[2] / "lists" / "refusals.txt").read_text("utf-8").splitlines()
+REFUSALS = {int(number): words for number, _, words in (line.partition(" ") for line in _LINES)}
 
 
 class MotionJudge(Judge[MotionState]):
