@@ -272,7 +272,7 @@ def test_an_axis_that_has_left_much_moves_on_beside_another():
     stick(0.51814, -0.79457, 0.2234, 0.34)
     block.hold(367, bVelocity=0.0, bStop=1.0, rOverride=0.4019)
     go(38.597, 13.188, 0.6043)
-    go(3.6911, 1.97157, 19.55, limits=(0.5715, 0.47625))
+    go(3.6911, 1.97157, 15.0, limits=(0.5715, 0.47625))
     go(3.6911, 1.97157, 1.1153, limits=(0.5715, 0.47625))
     go(12.9037, 20.0, 0.3287, limits=(0.36218, 0.3018))
     stick(-1.2, -0.4264, 4.629, limits=(1.09, 0.9086))

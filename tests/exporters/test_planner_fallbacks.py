@@ -17,7 +17,7 @@ def text():
     return planner_block(preset_spec("bay-crane")).text
 
 
-FOUND = "bGood := bMet AND ((fPlanWay > 1.0E-9) OR (nJob = cJobStop));"
+FOUND = "bGood := bMet AND ((fPlanWay > 1.0E-9) OR bWay OR (nJob = cJobStop));"
 
 
 @pytest.fixture(scope="module")

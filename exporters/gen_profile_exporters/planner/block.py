@@ -414,7 +414,7 @@ def _cycle_work(c: PlannerConstants) -> int:
     following = 110 + 4 * c.modes * (4 * c.modes + 17)
     sensed = of_sensor.cycle_work(c.sensor, c.modes)
     axes = (120 + sensed + (following if c.rates else 0) + (23 * ZONES if c.zones else 0)) * len(c.axes)
-    return axes - 35 + 15 * len(c.live) + of_errors.cycle_work(_watched(c))
+    return axes - 24 + 15 * len(c.live) + of_errors.cycle_work(_watched(c))
 
 
 def _longest_kernel(c: PlannerConstants) -> int:
