@@ -1,5 +1,6 @@
 """For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache; options."""
 
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,8 @@ from hypothesis import settings
 
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
+
+gc.disable()  # of what is loaded nothing becomes garbage: looking for it takes an eighth of the time
 
 # in the background of a script this process ignores interruptions, and so would those that tests interrupt
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -44,6 +47,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         kept = set(first.values())
         config.hook.pytest_deselected(items=[item for item in items if item not in kept])
         items[:] = [item for item in items if item in kept]
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
+    gc.enable()
 
 
 @pytest.fixture
