@@ -64,9 +64,13 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep out of the user's cache, and compile each FMU once, in all of pytest-xdist's processes."""
+    """Keep out of the user's cache, and compile each FMU once, in all of pytest-xdist's processes.
+
+    TESTS_CACHE is a folder that several runs share, one after the other.
+    """
     base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
+    own = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
+    folder = Path(os.environ.get("TESTS_CACHE", own))
     folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("GEN_PROFILE_CACHE", str(folder))
