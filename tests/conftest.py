@@ -1,5 +1,6 @@
 """For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache; options."""
 
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,8 @@ from hypothesis import settings
 
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
+
+gc.disable()  # of what is loaded nothing becomes garbage: looking for it takes an eighth of the time
 
 # in the background of a script this process ignores interruptions, and so would those that tests interrupt
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -46,6 +49,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item in kept]
 
 
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
+    gc.enable()
+
+
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Halve the intervals of limited motions: what is refused, named and found to work is so on any mesh."""
@@ -55,9 +64,13 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep out of the user's cache, and compile each FMU once, in all of pytest-xdist's processes."""
+    """Keep out of the user's cache, and compile each FMU once, in all of pytest-xdist's processes.
+
+    TESTS_CACHE is a folder that several runs share, one after the other.
+    """
     base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
+    own = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
+    folder = Path(os.environ.get("TESTS_CACHE", own))
     folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("GEN_PROFILE_CACHE", str(folder))

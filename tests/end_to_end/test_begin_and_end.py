@@ -31,6 +31,7 @@ def test_the_check_begins_and_ends_as_the_spec_says(tmp_path, changes, duration)
         assert other["residual_peak_m"] == pytest.approx(one["residual_peak_m"], abs=2e-6)
 
 
+@pytest.mark.slow
 def test_a_motion_that_knows_nothing_of_the_swing_fails(tmp_path):
     """The file of a start at rest, judged by a spec that begins with a swing."""
     run_here("--out", tmp_path)

@@ -78,6 +78,7 @@ def test_a_wrong_answer_is_asked_for_again(site):
     assert sorted(one.name for one in site.iterdir()) == ["run.csv"]
 
 
+@pytest.mark.slow
 def test_answers_are_kept_where_the_log_is_not_there(site):
     answers = ["bay-crane", "", "", "6.2±0.1", *[""] * 8, "nun.csv"]
     ended = commissioned(site, answers=answers)

@@ -42,6 +42,7 @@ def plc(tables):
         yield controller, ("--to", url, "--security", "none")
 
 
+@pytest.mark.slow
 def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     old, new = files / "old" / "FB_paper.TcPOU", files / "new" / "FB_paper.TcPOU"
     controller, where = plc

@@ -265,6 +265,7 @@ def test_what_is_right_passes(right):
     assert run_here("check", right).code == 0
 
 
+@pytest.mark.slow
 def test_a_shaper_for_another_rope_fails_on_its_sway(tmp_path):
     limit = ("--set", "robustness={}", "--set", "check.residual_sway=5e-4")
     for rope, code in ((0.47, 0), (0.6, 4)):

@@ -23,6 +23,7 @@ def test_the_shortest_duration_ends_on_a_cycle_and_stands_in_the_manifest(tmp_pa
     assert run_here("check", tmp_path / "paper.csv").code == 0
 
 
+@pytest.mark.slow
 def test_a_range_leaves_less_at_worst_and_more_in_the_middle(tmp_path):
     usual = run_here(*BOUND, "--no-check", "--out", tmp_path, "--json").document
     ranged = run_here(*RANGE, *BOUND, "--out", tmp_path, "--json").document
@@ -34,6 +35,7 @@ def test_a_range_leaves_less_at_worst_and_more_in_the_middle(tmp_path):
     assert usual["solver"]["worst_case_bound_m"] is None
 
 
+@pytest.mark.slow
 def test_second_order_is_flatter(tmp_path):
     longer = ("--set", "move.duration=5", "--set", "cost.sway_weight=0", "--out", tmp_path, "--json")
     first = run_here(*longer).document["figures"]
@@ -42,6 +44,7 @@ def test_second_order_is_flatter(tmp_path):
     assert second["sway_residual_peak_m"] < 1e-6
 
 
+@pytest.mark.slow
 def test_both_methods_write_nearly_the_same(tmp_path):
     documents = [
         run_here("--method", name, "--out", tmp_path, "--json").document for name in ("direct", "indirect")

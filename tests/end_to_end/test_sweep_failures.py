@@ -153,6 +153,7 @@ def test_a_scheduler_that_nobody_runs_is_named(tmp_path, monkeypatch):
         workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler="tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_processes_of_this_computer_that_do_not_start_are_a_sentence(tmp_path, monkeypatch):
     """They have minutes, as on a busy computer; they had 30 s, and were called a scheduler, None."""
     monkeypatch.setattr(cluster, "START_TIME", "1us")

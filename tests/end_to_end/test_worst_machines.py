@@ -222,6 +222,7 @@ def test_no_machine_of_a_dense_grid_is_worse_than_what_the_search_found(seed):
     assert expected.max() <= 1.01 * worst + 1e-6
 
 
+@pytest.mark.slow
 def test_a_maximum_on_an_edge_of_four_ranges_is_found():
     """Three parameters at their ends, the lower rope between: half a per cent less was found, just inside."""
     shares = {"L1": 0.4, "L2": 0.3, "m1": 0.3, "m2": 0.5}

@@ -90,6 +90,7 @@ def test_a_library_refuses_to_start_with_any_altered_constant_of_the_motion_that
             assert refuses(fb, begin), (name, index, value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "profile"), [("segments", ONE), ("samples", TWO), ("counts", ONE)], ids=LAYOUTS
 )

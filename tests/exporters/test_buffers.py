@@ -248,6 +248,7 @@ def test_half_a_request_and_places_beyond_the_buffer_do_nothing():
 NUMBERS = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:E[+-]\d+)?|\d+|TRUE|FALSE)(?!\w)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("library", [False, True])
 def test_replay_refuses_altered_numbers_and_statements(library):
     text, goal = library_of(ONE, OTHER) if library else text_of(ONE), goal_of(ONE)

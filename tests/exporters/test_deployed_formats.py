@@ -43,6 +43,7 @@ def test_the_layout_is_chosen_on_the_command_line(tmp_path, layout):
     assert ("cPower5" in (tmp_path / "paper.st").read_text("ascii")) == (layout == "segments")
 
 
+@pytest.mark.slow
 def test_velocities_alone_pass_their_check(tmp_path):
     assert run_here("--csv-columns", "velocity", "--out", tmp_path).code == 0
     table = np.loadtxt(tmp_path / "paper.csv", delimiter=",", skiprows=1)

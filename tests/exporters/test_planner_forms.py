@@ -167,6 +167,7 @@ def test_c_plus_plus_takes_the_header(block, tmp_path):
 
 
 class TestInPython:
+    @pytest.mark.slow
     def test_a_history_is_that_of_the_played_block(self, block):
         """Steps, stretches and columns are the same inputs; both enable the block in a cycle of its own.
 

@@ -55,6 +55,7 @@ def test_blocks_that_differ_in_numbers_only_take_each_others(sources):
 NUMBERS = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:E[+-]\d+)?(?!\w)")
 
 
+@pytest.mark.slow
 def test_altered_numbers_and_statements_are_refused(sources):
     text = buffered_planner(sources[0]).text()
     program = re.sub(r"\(\*.*?\*\)", lambda found: " " * len(found[0]), text, flags=re.DOTALL)

@@ -383,6 +383,7 @@ GANTRY = [
 ]
 
 
+@pytest.mark.slow
 def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails():
     compiled = compile_counting(planner_block(preset_spec("gantry-crane", GANTRY)).text)
     gantry, random = MeasuredGantry(CountedBlock(compiled), 3.0, swing=(0.45, -0.3), cycle=0.02), np.random

@@ -79,8 +79,8 @@ def quiet(row):
     return not row["bbusy"]
 
 
+@pytest.mark.slow
 class TestOneAxis:
-    @pytest.mark.slow
     def test_it_is_powered_then_taken_over_where_it_stands_then_guided(self, bench):
         bench.cycle()
         assert bench.cycle()["nstage"] == BLOCK_OFF
@@ -171,7 +171,6 @@ class TestOneAxis:
         for _ in range(10):
             assert not bench.cycle(**left)["berror"]
 
-    @pytest.mark.slow
     def test_a_disable_with_a_quick_stop_takes_less_time_and_one_taken_back_goes_on(self, bench):
         under_way(bench)
         for _ in range(50):
@@ -289,8 +288,8 @@ class TestOneAxis:
         assert (outputs["nerrorid"], len(bench.commanded) > 2400) == (number, True)
 
 
+@pytest.mark.slow
 class TestTwoAxes:
-    @pytest.mark.slow
     @pytest.mark.parametrize("number", [0, 1])
     def test_one_that_trips_is_let_go_and_the_other_brakes_at_once(self, two, number):
         under_way(two, fTarget_x=12.0, fTarget_y=8.0)
@@ -320,6 +319,7 @@ class TestTwoAxes:
         assert (outputs["nerrorid"], outputs["nstage"]) == (ASTRAY, BLOCK_OFF)
 
 
+@pytest.mark.slow
 class TestVelocity:
     def test_the_axis_arrives_although_the_drive_slips(self, bay):
         axis = Converter(bay)

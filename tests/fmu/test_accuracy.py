@@ -126,6 +126,7 @@ def test_a_lagging_drive_comes_to_rest_at_the_target(cosimulation, crane, quinti
     np.testing.assert_allclose(response.position[-1], 0.3, rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", [0.0, 0.05])
 def test_two_axes_of_a_users_own_plant(tau):
     """A trolley that travels while its winch hoists, against the load's angular momentum h = l² φ̇."""

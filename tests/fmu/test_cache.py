@@ -83,6 +83,7 @@ def works(crane):
 
 
 class TestPlantFmu:
+    @pytest.mark.slow
     def test_is_compiled_once(self, new_cache, builds):
         first = builds.get()
         assert (builds.count, builds.get(), builds.count) == (1, first, 1)
@@ -122,6 +123,7 @@ class TestPlantFmu:
         assert path.read_bytes() == content
         assert works(crane)
 
+    @pytest.mark.slow
     @pytest.mark.usefixtures("compiled_once")
     @pytest.mark.parametrize("listing", ["[]", "{}", '"text"', "3", '{"gone": "00"}', "\udcff"])
     def test_is_mended_when_its_listing_is_something_else(self, new_cache, builds, listing):

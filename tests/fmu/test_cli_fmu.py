@@ -77,6 +77,7 @@ def test_is_named_after_the_spec(tmp_path, monkeypatch):
     assert "cart.setpoint_acceleration" in names
 
 
+@pytest.mark.slow
 def test_same_spec_same_archive(tmp_path):
     for name in ("a.fmu", "b.fmu"):
         assert run_here("fmu", "system", *FAST, "--out", tmp_path / name).code == 0

@@ -88,6 +88,7 @@ def test_zig_is_the_default():
     assert compiler.identity.startswith("ziglang\n")
 
 
+@pytest.mark.slow
 def test_a_system_compiler_can_be_named(crane, quintic, monkeypatch, tmp_path):
     system = program("cc", "gcc")
     with PlantCosimulation(crane) as zig:

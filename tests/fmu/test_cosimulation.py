@@ -196,6 +196,7 @@ def test_an_instance_is_kept_for_the_next_of_its_fmu_and_begins_anew(crane, setp
     np.testing.assert_array_equal(found[2], found[0])
 
 
+@pytest.mark.slow
 def test_tells_before_it_compiles(crane, tmp_path, cache, monkeypatch):
     share_zig(cache, tmp_path)
     monkeypatch.setenv("GEN_PROFILE_CACHE", str(tmp_path))

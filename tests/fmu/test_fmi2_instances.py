@@ -79,6 +79,7 @@ class TestStates:
         assert status_of(slave.fmi2SerializeFMUstate, *arguments) == fmi2.fmi2Error
         slave.freeFMUState(state)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["profile", "system"])
     def test_damaged_bytes_are_refused(self, crane, kind, tmp_path):
         """Under the sanitizers of addresses and of undefined behaviour."""

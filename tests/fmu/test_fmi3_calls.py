@@ -274,6 +274,7 @@ def test_on_the_way_inputs_are_set_and_outputs_read_and_nothing_else(fmu, asked,
     instance.freeInstance()
 
 
+@pytest.mark.slow
 def test_who_follows_setpoints_takes_no_updates():
     """A setpoint is for the whole of a step."""
     instance = load(cached_fmu(model_of("plant-setpoint", CRANE), Version.FMI3), FMU3Slave)

@@ -88,6 +88,7 @@ if tuple(map(int, casadi.__version__.split(".")[:2])) >= (3, 8):  # older ones r
         assert len(builder.y()) >= 4
 
 
+@pytest.mark.slow
 def test_ecos_runs_a_profile_into_a_plant(ecos, version):
     """Connected by name: what a co-simulation master does with the two FMUs."""
     profile = cached_fmu(model_of("profile", CRANE), version)
@@ -129,6 +130,7 @@ def test_ecos_runs_every_version(ecos, kind, version):
     assert found == pytest.approx(exact, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_default_tolerances_of_model_exchange_do():
     """CVode weighs errors by the nominal values of the states, which are some hundredths of a radian."""
     plant = find_plant("tower-crane")
@@ -209,6 +211,7 @@ def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_pa
         assert len(result) >= 11
 
 
+@pytest.mark.slow
 def test_two_source_fmus_link_into_one_program(version, tmp_path):
     """Statically, as real-time targets do: both run in it, and no name of one clashes with the other's."""
     system, objects, facts = program("cc", "gcc"), [], [f"-DFMI={version.value}"]
@@ -249,6 +252,7 @@ def test_pictures_have_one_unit_each_and_round_ticks():
         assert f"{step[0]:.0e}"[0] in "125"
 
 
+@pytest.mark.slow
 def test_fmus_are_complete_and_reproducible(version):
     model = model_of("system", CRANE)
     first, again = (build_fmu(model_of("system", CRANE), version, ("linux-x86_64",)) for _ in range(2))

@@ -96,6 +96,7 @@ class TestModelExchange:
         np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
         np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-8)
 
+    @pytest.mark.slow
     def test_of_velocities_holds_one_each_period_where_drives_are_ideal(self, open_instance):
         instance = open_instance("plant-velocity", exchange=True)
         positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2

@@ -276,6 +276,7 @@ def test_an_unknown_unit_stays_without_base_units(version):
     assert units["stone"] is None
 
 
+@pytest.mark.slow
 def test_a_plant_may_have_unbounded_parameters_and_constant_outputs(version):
     parameter = attrs.evolve(WINCH.parameters[0], lower=-math.inf, upper=math.inf)
     flat = attrs.evolve(

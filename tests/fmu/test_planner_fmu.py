@@ -16,6 +16,8 @@ from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.planner import planned_system_model
 from gen_profile_fmu.model.plant_variables import PlantInstance
 
+pytestmark = pytest.mark.slow  # planners are compiled
+
 CYCLE = PLANNED.export.cycle_time
 START = 2.0
 ORDERS = [  # cycles, the block's inputs that change from there on
@@ -83,7 +85,6 @@ def issued(instance, advance):
     return np.array(rows)
 
 
-@pytest.mark.slow
 def test_each_step_of_a_cycle_issues_the_blocks_setpoint(instance):
     due = expected()
     assert shown(instance) == [-0.1, 0.0, 0.0, 0.0, 0, 0]  # where the axis stands
@@ -99,7 +100,6 @@ def test_each_step_of_a_cycle_issues_the_blocks_setpoint(instance):
     assert np.ptp(due[:, 0]) > 0.1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("instance", [True], indirect=True)
 def test_each_cycle_is_an_event_of_model_exchange(instance):
     following = [START]
@@ -157,7 +157,6 @@ def swings(version):
     return np.array(rows)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("joined", [False], indirect=True)
 def test_the_plant_follows_the_planner_in_one_fmu(joined, version):
     """Setpoints are the block's, bit for bit; the loads sway as those of a plant that is led by them."""
@@ -199,7 +198,6 @@ def test_the_plant_follows_the_planner_in_model_exchange(joined, version):
     np.testing.assert_allclose(sways, swings(version)[:-1], atol=1e-6)
 
 
-@pytest.mark.slow
 def test_two_axes_are_planned_and_drive_their_plant():
     spec = parse_spec(GANTRY)
     machine = PlantInstance(plant=spec.machine(), parameters=spec.plant.parameters)

@@ -19,6 +19,7 @@ SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", SOLVED)
 def test_what_is_found_keeps_its_limits_and_costs_least(index):
     spec = spec_from_dict(random_spec(f"now-{index}"))

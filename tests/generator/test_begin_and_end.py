@@ -80,6 +80,7 @@ def test_a_load_hangs_still_while_its_crane_goes_on(solver, tau):
     assert 1e-5 < np.abs(sways(motion, longer, {})).max() < 3e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("initial", "velocity"), [(SWUNG, 0.0), ({}, 0.12), (SWUNG, -0.05)], ids=["swing", "speed", "both"]
 )

@@ -124,6 +124,7 @@ def joint(tau):
     return attempt(spec, setpoints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("find", "tau"), [(crane, 0.0), (partial(joint, 0.03), 0.03)], ids=["crane", "lag"])
 def test_the_axes_are_as_near_to_the_smooth_motion_as_is_said(find, tau):
     theorem = find().theorem
@@ -218,6 +219,7 @@ def test_no_machine_of_a_dense_grid_sways_more_and_the_worst_nearly_as_much(find
     assert (greatest(found) <= CLOSE * worst).all()
 
 
+@pytest.mark.slow
 def test_a_load_that_swings_in_two_directions_is_bounded_on_the_way_by_the_length_of_its_sway():
     spec, setpoints = planned("gantry-crane", "export.cycle_time=0.02", "limits.sway=1")
     found = attempt(spec, setpoints)
@@ -229,6 +231,7 @@ def test_a_load_that_swings_in_two_directions_is_bounded_on_the_way_by_the_lengt
     assert worst <= greatest(found)[2] <= CLOSE * worst
 
 
+@pytest.mark.slow
 def test_several_parameters_make_one_box_together():
     spec, setpoints = planned(
         "single-pendulum-crane", "robustness.uncertain={L0=0.04, c=0.5}", "export.cycle_time=0.01"
@@ -243,6 +246,7 @@ def test_several_parameters_make_one_box_together():
     assert found.fraction == 1.0 and worst <= greatest(found)[0] <= nearly
 
 
+@pytest.mark.slow
 def test_how_many_processors_there_are_changes_nothing(monkeypatch):
     monkeypatch.setattr(theorem, "BATCH", 1)
     spec, setpoints = planned(
@@ -257,6 +261,7 @@ def test_how_many_processors_there_are_changes_nothing(monkeypatch):
     assert len(found[0][0]) > 1 and found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_what_interpolation_misses_over_a_wide_box_is_what_is_not_linear():
     """Bounds are close though the machines of the box differ by radians, where all counted they were not."""
     spec, setpoints = planned("double-pendulum-crane", "robustness.uncertain={L1=0.2, m2=0.25}")
@@ -266,6 +271,7 @@ def test_what_interpolation_misses_over_a_wide_box_is_what_is_not_linear():
     assert (met <= proof.bound).all() and (proof.bound <= 1.03 * met).all()
 
 
+@pytest.mark.slow
 def test_a_loose_limit_leaves_the_smooth_motion_near_to_the_axes():
     """With 1 m, 3 micrometres off, boxes of heavy loads had no bound and were halved for twenty minutes."""
     allowed = ("robustness.uncertain={L1=0.4, m2=0.5}", "check.residual_sway=1")
@@ -300,6 +306,7 @@ def test_three_parameters_of_two_pendulums_are_proved_together():
     assert (worst <= greatest(found)).all() and (greatest(found) <= CLOSE * worst + 5e-3 * limits).all()
 
 
+@pytest.mark.slow
 def test_a_limit_that_only_a_machine_between_breaks_is_never_proved():
     overrides = ("plant.L0=2", "plant.c=0", "move.start=[0,0]", "move.target=[3,0]", "move.duration=10")
     more = (

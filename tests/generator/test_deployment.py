@@ -324,6 +324,7 @@ def test_a_planner_that_is_built_otherwise_is_refused(planners, tmp_path):
         require_fit(table, status)
 
 
+@pytest.mark.slow
 def test_libraries_and_single_motions_are_told_apart(tables, libraries, block):
     with pytest.raises(ExportError, match=r"moves\.st is a library, and .* takes a single motion"):
         deploy(libraries["new"], box_of(DirectLink(block)))

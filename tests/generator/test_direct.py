@@ -94,6 +94,7 @@ def test_auto_takes_the_indirect_method_where_no_limit_binds():
     assert choice.attempt(limited(), "direct").method == direct.METHOD
 
 
+@pytest.mark.slow
 def test_an_infeasible_problem_says_what_would_do():
     solution = suggestions.solve(preset_spec("paper", ["limits={acceleration=0.2, velocity=0.2}"]))
     assert solution.status is Status.INFEASIBLE
@@ -147,6 +148,7 @@ def test_the_cost_within_a_limit_is_what_another_program_finds():
     assert found.cost - 3.0 * 50.0 == pytest.approx(cost, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("machine", "task", "loss"),
     [

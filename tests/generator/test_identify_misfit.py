@@ -69,6 +69,7 @@ def test_swings_that_are_not_small_are_fitted_as_such_where_small_ones_mislead()
     assert inside(found, spec.plant.parameters) and found.half_range["L2"] < 0.1
 
 
+@pytest.mark.slow
 def test_a_damping_that_is_wrong_is_named():
     exact = swing(HOIST.nominal() | {"c": 1500.0}, TIMES, [0.15, 0.0])
     with pytest.raises(InfeasibleProblem, match=r"with another c than the spec's .*; free c, too"):

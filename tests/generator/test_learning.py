@@ -83,6 +83,7 @@ def test_a_log_narrows_the_range_to_the_true_rope():
     assert again.checked_ranges()["L0"] == pytest.approx((low, high), abs=3e-3)  # `LEAST` is left
 
 
+@pytest.mark.slow
 def test_a_load_that_swung_before_the_motion_does_not_mislead():
     """By a seventh of a metre, from when the log begins."""
     times = np.arange(0.0, BEGIN + LASTS + 12.0, 0.02)

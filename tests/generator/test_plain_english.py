@@ -43,6 +43,7 @@ def test_prose_is_plain():
     assert found == []
 
 
+@pytest.mark.slow
 def test_names_say_what_they_hold():
     found = {
         (str(file.relative_to(ROOT)), token.string)

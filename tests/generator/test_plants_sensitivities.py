@@ -49,6 +49,7 @@ def places(plant, *names):
     return [list(one.rows) for one in found]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", MACHINES)
 def test_every_sensitivity_is_a_finite_difference(type_):
     plant = find_plant(type_)
@@ -71,6 +72,7 @@ def test_every_sensitivity_is_a_finite_difference(type_):
             assert np.abs(others).max(initial=0.0) < 1e-6  # left out because they are zero
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", MACHINES)
 def test_mixed_sensitivities_are_finite_differences_too(type_):
     plant = find_plant(type_)
@@ -89,6 +91,7 @@ def test_mixed_sensitivities_are_finite_differences_too(type_):
         assert np.abs(np.delete(expected, rows)).max(initial=0.0) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", MACHINES)
 def test_without_damping_sensitivities_are_numbers(type_):
     """Roots of a viscosity, for one, have no slope at zero."""

@@ -48,6 +48,7 @@ def as_scipy(profile):
     return PPoly(np.moveaxis(profile.coefficients, 1, 0)[::-1], profile.knots)
 
 
+@pytest.mark.slow
 @given(profiles(), st.integers(0, 8), st.lists(st.floats(0.0, 1.0, exclude_max=True), min_size=1))
 def test_every_derivative_agrees_with_scipy(profile, order, shares):
     times = np.append(np.array(shares) * profile.duration, profile.knots[:-1])
@@ -57,6 +58,7 @@ def test_every_derivative_agrees_with_scipy(profile, order, shares):
     )
 
 
+@pytest.mark.slow
 @given(profiles(), st.floats(0.0, 100.0), st.floats(1e-6, 100.0))
 def test_it_stands_at_both_ends(profile, after, before):
     motion = profile(np.array([profile.duration + after, -before]))
@@ -65,6 +67,7 @@ def test_it_stands_at_both_ends(profile, after, before):
         np.testing.assert_array_equal(derivative, np.zeros((2, profile.axes)))
 
 
+@pytest.mark.slow
 @given(profiles(), st.integers(0, 4))
 def test_segments_are_seen_from_within(profile, order):
     times, values = profile.within_segments(3, order)

@@ -27,6 +27,7 @@ from gen_profile.proof.prove import prove, replay
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
+COUNT = 25  # histories, the fewest that have one of each group
 LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 
 
@@ -55,7 +56,7 @@ def designed(block):
 
 @pytest.fixture(scope="module")
 def proof(spec, text):
-    return prove(spec, text, histories=40)
+    return prove(spec, text, histories=COUNT)
 
 
 @pytest.mark.slow
@@ -96,7 +97,7 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
 def test_a_sound_block_is_proved(spec, proof):
     assert proof.passed
     assert {one.group for one in proof.judged} == {CORNERS, DRAWS, SEARCH, RHYTHMS}
-    assert [one.number for one in proof.judged] == list(range(40))
+    assert [one.number for one in proof.judged] == list(range(COUNT))
     assert 0.0 < proof.fraction(proof.worst) < 1.0
     assert proof.apart < 1e-12
     slowed = [
@@ -149,21 +150,21 @@ def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatc
 @pytest.mark.slow
 def test_every_history_can_be_had_again_by_its_number(spec, text, proof):
     numbering = Numbering.of(Histories.of(spec), proof.count, proof.seed, proof.parents)
-    for number in (0, 20, 39):
+    for number in (0, COUNT // 2, COUNT - 1):
         (again,) = replay(spec, text, numbering, number).judged
         assert again.to_dict() == proof.judged[number].to_dict()
 
 
 @pytest.mark.slow
 def test_what_is_found_does_not_depend_on_the_number_of_workers(spec, text, proof):
-    other = prove(spec, text, histories=40, workers=3)
+    other = prove(spec, text, histories=COUNT, workers=3)
     assert other.to_dict() == proof.to_dict()
 
 
 @pytest.mark.slow
 def test_workers_of_a_scheduler_find_the_same(spec, text, proof):
     with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **LOOPBACK) as cluster:
-        other = prove(spec, text, histories=40, scheduler=cluster.scheduler_address)
+        other = prove(spec, text, histories=COUNT, scheduler=cluster.scheduler_address)
     assert other.to_dict() == proof.to_dict()
 
 
@@ -228,7 +229,7 @@ def test_a_block_with_altered_constants_fails(spec, text):
     row = (text.split("cModel :")[1].split(";")[0].count(",") + 1) // 4  # of two sums for each mode
     altered = scaled(text, "cModel", 1.1**2, slice(0, row))
     altered = scaled(altered, "cModel", 1.1**4, slice(row, 2 * row))
-    proof = prove(spec, scaled(altered, "cVelocity", 1.01), histories=20)
+    proof = prove(spec, scaled(altered, "cVelocity", 1.01), histories=COUNT)
     sway, *others = proof.reasons()
     assert "sways by" in sway
     assert "are allowed (check.residual_sway)" in sway
@@ -255,7 +256,7 @@ def test_a_block_that_gives_commands_up_fails_and_one_that_stands_for_ever_too()
 def test_other_machines_are_proved(written, live):
     """Also one whose rope the hoist tells, and whose errors are none."""
     spec = parse_spec(written)
-    proof = prove(spec, planner_block(spec).text, histories=30)
+    proof = prove(spec, planner_block(spec).text, histories=COUNT)
     assert proof.reasons() == ()
     live_values = {one.history.live[live] for one in proof.judged}
     assert (min(live_values), max(live_values)) == spec.planner.live[live]
@@ -267,7 +268,7 @@ def test_other_machines_are_proved(written, live):
 def test_several_axes_are_proved_while_they_move_at_once():
     spec = parse_spec(GANTRY)
     text = planner_block(spec).text
-    proof = prove(spec, text, histories=20)
+    proof = prove(spec, text, histories=COUNT)
     assert proof.reasons() == ()
     document = proof.to_dict()
     names = [f"{axis}_{name}" for axis in "xy" for name in ("velocity", "acceleration", "jerk")]

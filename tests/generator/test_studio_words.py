@@ -71,6 +71,7 @@ def fields(template):
     return sorted(part[1] for part in PART.finditer(template) if part[1])
 
 
+@pytest.mark.slow
 def test_every_template_has_a_translation_with_the_same_fields():
     found = set(templates())
     assert len(found) > 100

@@ -189,6 +189,7 @@ def test_a_controller_that_stops_is_told(table):
     assert isinstance(found.fault, DeploymentError) and "is no longer called" in str(found.fault)
 
 
+@pytest.mark.slow
 def test_a_controller_that_was_started_anew_is_told(table, other):
     for after in (table, other):
         script = [(1.5, lambda machine, after=after: setattr(machine, "block", SimulatedBlock(after)))]

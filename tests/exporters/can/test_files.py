@@ -155,6 +155,7 @@ class TestVelocities:
 class TestOthersDecode:
     """Random configurations, decoded by cantools with our DBC and by canopen with our mappings."""
 
+    @pytest.mark.slow
     @given(
         st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=4),
         st.sampled_from([{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE, BOTH]),

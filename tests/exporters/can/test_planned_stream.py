@@ -274,6 +274,7 @@ def terminal(monkeypatch):
             os.close(end)
 
 
+@pytest.mark.slow
 def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     ours, theirs = terminal
     before = termios.tcgetattr(theirs)

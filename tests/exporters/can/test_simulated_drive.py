@@ -295,6 +295,7 @@ class TestRealTime:
         assert cure in refused[0]
         assert "ulimit -l" in refused[1]
 
+    @pytest.mark.slow
     def test_what_is_granted_is_given_back(self, monkeypatch):
         asked = []
         monkeypatch.setattr("os.sched_setscheduler", lambda _, policy, __: asked.append(policy))
@@ -302,6 +303,7 @@ class TestRealTime:
             assert asked == [os.SCHED_FIFO]
         assert asked == [os.SCHED_FIFO, os.SCHED_OTHER]
 
+    @pytest.mark.slow
     def test_collection_of_garbage_is_as_before(self):
         gc.disable()
         try:
