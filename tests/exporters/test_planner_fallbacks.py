@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from driven_block import CYCLE, Driver, frequencies, residual
+from exporters.counted_block import CountedBlock, compile_counting
 from generator.planned_machines import HOIST
 
 from gen_profile.planner.design import planner_block
@@ -142,3 +143,21 @@ def test_a_stick_that_was_let_go_of_leads_nowhere_beyond_the_ends_stated_then(te
     assert (low[acted] - 1e-9 <= lowest[acted]).all()
     assert (highest[acted] <= high[acted] + 1e-9).all()
     assert np.abs(place - before).max() > 0.1
+
+
+def test_an_axis_beyond_its_travel_comes_back_though_there_is_no_room_to_damp():
+    """The load was swung by the hand that moved the axis there: it stood for 33 s, or for ever."""
+    changes = ["planner.live_rate={L1=0.2}", "check.residual_sway=0.02"]
+    block = CountedBlock(
+        compile_counting(planner_block(preset_spec("bay-crane", changes)).text),
+        **{"fActPosition": 41.0, "fL1": 6.0, "fm2": 100.0},
+    )
+    block.hold(500)
+    block.hold(1, bEnable=0.0)
+    speeds = 0.2 * np.sin(np.linspace(0.0, np.pi, 251))
+    places = 41.0 + CYCLE * np.cumsum(0.5 * (speeds[1:] + speeds[:-1]))
+    for place, speed in zip(places, speeds[1:], strict=True):
+        block.hold(1, fActPosition=place, fActVelocity=speed)
+    block.hold(10, bEnable=1.0, fActVelocity=0.0)
+    moved = block.hold(2500, bExecute=1.0, fTarget=20.0)["fPosition"]
+    assert moved[-1] < places[-1] - 0.5
