@@ -221,6 +221,12 @@ class TestInPython:
         assert again.done[-1]
         assert again.position[-1] == 9.0
 
+    def test_a_place_that_is_no_number_is_an_error_and_takes_the_axis_over_nowhere(self):
+        planner = gp.Planner(SPEC, position=2.0)
+        assert planner.step(actual_position=math.nan).error_id == 4
+        assert planner.step().error_id == 4
+        assert planner.hold(0.1, actual_position=2.0).position[-1] == 2.0
+
     def test_it_follows_the_axis_while_it_is_disabled_and_goes_on_from_there(self):
         planner = gp.Planner(SPEC)
         left = planner.hold(8.0, target=5.0).position[-1]

@@ -31,7 +31,10 @@ _SHARED = text_parts("playback/text/buffers.st")
 _FRACTION = re.compile(r" *\(\* A double as whole numbers.*?(?= *nCheckRow := nCheckRow \+ 1;)", re.DOTALL)
 _ROUND = "        nCheckRow := nCheckRow + 1;"
 _NUMBER = re.compile(r"c[A-Z]\w*")
-_MEMBERS = names_by_type(_SHARED["planner_variables"])
+_MEMBERS = {
+    type_: (*buffers.VARIABLES[type_], *more)
+    for type_, more in names_by_type(_SHARED["planner_variables"]).items()
+}
 _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 
 

@@ -327,16 +327,14 @@ class Planner(Summarised):
         for name, column in columns.items():
             rows[:, list(self._inputs).index(name)] = column
         self._inputs |= {name: float(column[-1]) for name, column in columns.items()}
-        enabled = bool(self._inputs["bEnable"])
-        if (
-            enabled and not self._is_enabled
-        ):  # a cycle without a command, with live parameters of the first one
+        if self._inputs["bEnable"] and not self._is_enabled:
+            # a cycle without a command, with the live parameters of the first one
             first = dict(zip(self._inputs, rows[0], strict=True))
             self._block.call(np.array([list((first | IDLE).values())]))
             self._is_enabled = True
         issued = self._block.call(rows).T
-        if enabled:  # where the axes stand if they are not commanded from now on
-            last = dict(zip(self._block.outputs, issued[:, -1].tolist(), strict=True))
+        last = dict(zip(self._block.outputs, issued[:, -1].tolist(), strict=True))
+        if last["bEnabled"]:  # where the axes stand if they are not commanded from now on
             for axis in self._axes:
                 self._inputs |= {axis.of(PLACE): last[axis.of("fPosition")], axis.of("fActVelocity"): 0.0}
         return {

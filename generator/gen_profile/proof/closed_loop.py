@@ -357,7 +357,8 @@ class ClosedLoop:
         spans = [
             (first, first + max(1, round(min(change.lasts / self.cycle, LONGEST))), change)
             for change in history.changes
-            for first in [round(change.time / self.cycle)]
+            # only what is there from the start is there in the first cycle
+            for first in [max(round(change.time / self.cycle), int(change.time > 0.0))]
         ]
         edges = {edge for begin, end, _ in spans for edge in (begin, end) if edge < LONGEST}
         cycles = sorted({*start_cycles, *edges})
