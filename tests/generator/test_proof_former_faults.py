@@ -40,6 +40,7 @@ FORMER = {  # machine: how many are drawn, seed, number
         (400, 13, 12),  # moved by a tap that was given before the machine was known
         (300, 31, 97),  # fTimeToGo 8 s too short where an axis turned round, as that of the stop was stated
         (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
+        (300, 143, 44),  # fTimeToGo 8 s too short in a stop's last two slots, before the axis turned round
     ],
     "wide": [
         (400, 10, 87),  # 4 s against a stick of two axes, one of which was too fast for a plan
