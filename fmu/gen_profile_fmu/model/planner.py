@@ -8,6 +8,8 @@ import attrs
 
 from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
+from gen_profile_exporters.planner.axis_declarations import GIVEN, PLACE, TAKEN
+from gen_profile_exporters.planner.sensor_constants import INPUTS, OUTPUTS
 from gen_profile_exporters.st_to_c import Translation, translate
 from gen_profile_exporters.st_variables import StVariable
 from gen_profile_exporters.text_parts import indented
@@ -22,16 +24,9 @@ from gen_profile_fmu.model.variables import FmuVariable, Kind, Type, VariableTab
 UNITS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "s")
 TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
-STANDS = "fActPosition"
 MOVES = "fActVelocity"
-OWN = (  # inputs and outputs of each axis
-    *("fTarget", "fVelocityCommand", "fVelocityLimit", "fFollowingLimit", STANDS, MOVES),
-    *("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance", "fStopLow", "fStopHigh"),
-)
-SENSED = (  # likewise of each of several
-    *("fSensor", "bSensorValid", "fSensorAge", "bSensorUsed", "nSensorFault", "fSensorScale"),
-    *("fSwayEstimated", "fSwayUncertainty"),
-)
+OWN = (*TAKEN.values(), *GIVEN.values())  # inputs and outputs of each axis
+SENSED = (*INPUTS.values(), *OUTPUTS)  # likewise of each of several
 SETPOINTS = {
     "fPosition": "setpoint",
     "fVelocity": "setpoint_velocity",
@@ -149,7 +144,7 @@ def planned_system_model(
         The plant's names cannot be those of an FMU's variables.
     """
     plant, equations = machine.plant, dynamics(machine.plant)
-    stands = tuple(f"{STANDS}{suffix}" for suffix in axes)
+    stands = tuple(f"{PLACE}{suffix}" for suffix in axes)
     moves = tuple(f"{MOVES}{suffix}" for suffix in axes)
     # the axes stand where they were led to
     block = _PlacedBlock(text=text, axes=axes, live=live, inside=(CYCLE, *stands, *moves))
