@@ -1,5 +1,6 @@
 """What was given in words, and what a person may have meant by an unknown word or a text for a number."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from datetime import date, time
@@ -69,6 +70,15 @@ def _misspelt(word: str, names: Iterable[str]) -> list[str]:
 
     best = max(names, key=likeness, default="")
     return [best] if best and likeness(best) >= MIN_SIMILARITY else []
+
+
+def finite_number(text: str) -> float:
+    """Read a number; NaN where a text is none, or is infinite."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def number_meant(text: str) -> str:

@@ -10,7 +10,7 @@ import pytest
 from command_line import run_here
 from end_to_end.simulated_controllers import BARE, free_port, serving
 
-from gen_profile.deployment.ads import AdsAccess, AdsLink
+from gen_profile.deployment.ads import AdsLink
 from gen_profile.deployment.ads_sim import SimulatedAdsController
 from gen_profile.deployment.block_state import MotionState, read_state
 from gen_profile.deployment.deploy import deploy, verify
@@ -105,8 +105,8 @@ class Bench(SimulatedAdsController):
         self.turn(60)
 
     def link(self, net_id="127.0.0.1.1.1"):
-        access = {"host": f"127.0.0.1:{self.port}", "net_id": net_id, "port": 851}
-        return FaultyLink(AdsAccess(url="ads://127.0.0.1.1.1:851", **access), self.tables["new"], self)
+        place = (net_id, 851, f"127.0.0.1:{self.port}")
+        return FaultyLink(("ads://127.0.0.1.1.1:851", place, "", self.tables["new"]), self)
 
     def used(self):
         """Tell which table is used in the end, by a connection without faults."""
@@ -126,9 +126,9 @@ class Bench(SimulatedAdsController):
 class FaultyLink(AdsLink):
     """One to which something happens from one telegram on, for so many of them."""
 
-    def __init__(self, access, table, bench):
+    def __init__(self, what, bench):
         self.bench, self.count, self.span, self.fault = bench, 0, range(0), {}
-        super().__init__(access, table)
+        super().__init__(*what)
 
     def write(self, request):
         self.send(lambda: super(FaultyLink, self).write(self.altered(request.copy())))

@@ -13,7 +13,7 @@ from snap7.error import S7ConnectionError, S7TimeoutError
 from gen_profile.deployment.block_state import MotionState, read_state
 from gen_profile.deployment.deploy import deploy, verify
 from gen_profile.deployment.mailbox import RIGHT, Mailbox
-from gen_profile.deployment.s7 import S7Access, S7Link
+from gen_profile.deployment.s7 import S7Link
 from gen_profile.deployment.s7_sim import SimulatedS7Controller
 from gen_profile.deployment.table import BlockTable, read_table
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError
@@ -104,8 +104,8 @@ class Bench:
         self.controller.turn(cycles)
 
     def link(self, pdu=480):
-        access = {"host": "127.0.0.1", "port": self.controller.port, "rack": 0, "slot": 1, "block": NUMBER}
-        link = BenchLink(S7Access(url="s7://127.0.0.1/0/1", **access), self.tables["new"], self)
+        processor = ("127.0.0.1", 0, 1, self.controller.port)
+        link = BenchLink(("s7://127.0.0.1/0/1", processor, NUMBER, self.tables["new"]), self)
         link._client.pdu_length = pdu
         return link
 
@@ -127,9 +127,9 @@ class Bench:
 
 
 class BenchLink(S7Link):
-    def __init__(self, access, table, bench):
+    def __init__(self, what, bench):
         self.bench = bench
-        super().__init__(access, table)
+        super().__init__(*what)
 
     def read(self):
         self.bench.turn()

@@ -53,29 +53,21 @@ def plant_fmu(plant: Plant, progress: Progress = no_progress) -> PlantFmu:
     CosimulationError
         When there is no compiler, it fails, or no cache folder can be written.
     """
-    compiler = find_compiler()
-    return _cached(*_plant_sources(plant, compiler), compiler, progress)
+    return cached_fmu(_followed(plant), Version.FMI2, progress)
 
 
 @cache
-def _plant_sources(plant: Plant, compiler: Compiler) -> tuple[Sources, str]:
-    """Write the texts of a plant's FMU, and name its binary."""
-    machine = PlantInstance(plant=plant, parameters=plant.nominal())
-    made = sources(plant_model(machine, InputKind.SETPOINT), Version.FMI2)
-    return made, sources_key(made, compiler)
+def _followed(plant: Plant) -> Model:
+    return plant_model(PlantInstance(plant=plant, parameters=plant.nominal()), InputKind.SETPOINT)
 
 
-def cached_fmu(model: Model, version: Version) -> PlantFmu:
+def cached_fmu(model: Model, version: Version, progress: Progress = no_progress) -> PlantFmu:
     """Build a model's FMU for this computer, without documentation, or find it in the cache.
 
     Raises as `plant_fmu` does.
     """
-    made, compiler = sources(model, version), find_compiler()
-    return _cached(made, sources_key(made, compiler), compiler)
-
-
-def _cached(made: Sources, key: str, compiler: Compiler, progress: Progress = no_progress) -> PlantFmu:
-    model, version = made.model, made.version
+    compiler = find_compiler()
+    made, key = _keyed(model, version, compiler)
     library = model.identifier + fmpy.sharedLibraryExtension
     platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
 
@@ -94,3 +86,10 @@ def _cached(made: Sources, key: str, compiler: Compiler, progress: Progress = no
         model_identifier=model.identifier,
         variables=model.variables,
     )
+
+
+@cache
+def _keyed(model: Model, version: Version, compiler: Compiler) -> tuple[Sources, str]:
+    """Write the texts of an FMU, and name its binary."""
+    made = sources(model, version)
+    return made, sources_key(made, compiler)

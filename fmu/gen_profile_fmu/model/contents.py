@@ -7,7 +7,7 @@ import attrs
 
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate
-from gen_profile.problem.dynamics import dynamics
+from gen_profile.problem.dynamics import Dynamics, dynamics
 from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.model.c_sources import equations_source, model_sources, motion_table, variables_header
 from gen_profile_fmu.model.dependencies import Structure, plant_structure, profile_structure
@@ -91,25 +91,30 @@ def plant_model(machine: PlantInstance, kind: InputKind, name: str | None = None
     """
     plant, table = machine.plant, plant_variables(machine, kind)
     equations = dynamics(plant)
-    origins = {axis: {reference} for axis, reference in enumerate(table.references("START"))}
     name = name or plant.type
     return Model(
         name=name,
         summary=plant.summary,
         variables=table,
-        structure=plant_structure(equations, table, _drives(table, kind), origins),
+        structure=plant_structure(equations, table, _drives(table, kind)),
         interpolates_inputs=kind is not InputKind.SETPOINT,
-        code={
-            **model_sources(*PLANT_FILES, "plant_model.c"),
-            "variables.h": variables_header(
-                table, len(plant.actuated), len(plant.unactuated), _constants(kind, len(plant.actuated))
-            ),
-            "equations.c": equations_source(equations),
-        },
+        code=plant_code(equations, table, _constants(kind, len(plant.actuated)), "plant_model.c"),
         order=("equations.c", "driven_plant.c", "plant_model.c"),
         page=partial(plant_page, name, machine, table, kind),
         stop_time=10.0,
     )
+
+
+def plant_code(
+    equations: Dynamics, table: VariableTable, constants: Mapping[str, str], *files: str
+) -> dict[str, str]:
+    """List the sources of a content with a plant: hand-written files, and what is written for the machine."""
+    axes, swings = equations.q_a.shape[0], equations.q_u.shape[0]
+    return {
+        **model_sources(*PLANT_FILES, *files),
+        "variables.h": variables_header(table, axes, swings, constants),
+        "equations.c": equations_source(equations),
+    }
 
 
 def _drives(table: VariableTable, kind: InputKind) -> dict[int, set[int]]:
@@ -179,18 +184,15 @@ def system_model(name: str, machine: PlantInstance, command: Profile) -> Model:
     trigger, distance = table.references("START_TIME", "WAIT", "TRIGGER"), table.references("DISTANCE")
     axes = range(len(plant.actuated))
     drives = {axis: {velocity[axis], *tau, *time, *trigger, distance[axis]} for axis in axes}
-    origins = {axis: {start} for axis, start in enumerate(table.references("START"))}
     constants = {"N_ORDERS": "N_POWERS - 1", **PLAIN}
     return Model(
         name=name,
         summary=f"{plant.summary}, following a motion",
         variables=table,
-        structure=plant_structure(equations, table, drives, origins),
+        structure=plant_structure(equations, table, drives),
         code={
-            **model_sources(*PLANT_FILES, *MOTION_FILES, "system_model.c"),
-            "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
+            **plant_code(equations, table, constants, *MOTION_FILES, "system_model.c"),
             "motion_table.h": motion_table(command),
-            "equations.c": equations_source(equations),
         },
         order=("equations.c", "motion.c", "driven_plant.c", "system_model.c"),
         page=partial(system_page, name, machine, command, table),

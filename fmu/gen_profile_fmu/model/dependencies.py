@@ -29,9 +29,7 @@ class Structure:
     starting: Dependencies
 
 
-def plant_structure(
-    equations: Dynamics, table: VariableTable, drives: Mapping[int, set[int]], origins: Mapping[int, set[int]]
-) -> Structure:
+def plant_structure(equations: Dynamics, table: VariableTable, drives: Mapping[int, set[int]]) -> Structure:
     """Find the dependencies of an FMU with a plant.
 
     Parameters
@@ -40,8 +38,6 @@ def plant_structure(
     table : VariableTable
     drives : mapping of int to set of int
         Per axis, by number, what its acceleration follows from: states, inputs, parameters and time.
-    origins : mapping of int to set of int
-        Per axis, what its position at the start follows from.
     """
     states = table.states
     known: dict[int, set[int]] = {reference: {reference} for reference in states}
@@ -49,8 +45,8 @@ def plant_structure(
     known |= _derivatives(equations, table, drives)
     if "DISTANCE" in table.blocks:
         known |= _motion(table)
-    start = dict(zip(table.references("Q_A"), (origins[axis] for axis in sorted(origins)), strict=True))
-    start |= {reference: set() for reference in table.references("DQ_A")}
+    start: dict[int, set[int]] = {reference: set() for reference in table.references("DQ_A")}
+    start |= {place: {at} for place, at in zip(*map(table.references, ("Q_A", "START")), strict=True)}
     running = {*table.references_of(Kind.INPUT), *states, *table.references("TIME")}
     given = table.references_of(*(kind for kind in Kind if kind.has_start))
     starting = {*given, *table.references("TIME")}

@@ -8,11 +8,13 @@ import attrs
 
 from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
+from gen_profile_exporters.planner.axis_declarations import GIVEN, PLACE, TAKEN
+from gen_profile_exporters.planner.sensor_constants import INPUTS, OUTPUTS
 from gen_profile_exporters.st_to_c import Translation, translate
 from gen_profile_exporters.st_variables import StVariable
 from gen_profile_exporters.text_parts import indented
-from gen_profile_fmu.model.c_sources import equations_source, filled, model_sources, variables_header
-from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model
+from gen_profile_fmu.model.c_sources import filled, model_sources, variables_header
+from gen_profile_fmu.model.contents import PLAIN, Model, plant_code
 from gen_profile_fmu.model.dependencies import Structure, plant_structure
 from gen_profile_fmu.model.documentation import block_page, planned_system_page
 from gen_profile_fmu.model.plant_variables import PlantInstance, listed, planned_system_variables
@@ -22,16 +24,9 @@ from gen_profile_fmu.model.variables import FmuVariable, Kind, Type, VariableTab
 UNITS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "s")
 TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
-STANDS = "fActPosition"
 MOVES = "fActVelocity"
-OWN = (  # inputs and outputs of each axis
-    *("fTarget", "fVelocityCommand", "fVelocityLimit", "fFollowingLimit", STANDS, MOVES),
-    *("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance", "fStopLow", "fStopHigh"),
-)
-SENSED = (  # likewise of each of several
-    *("fSensor", "bSensorValid", "fSensorAge", "bSensorUsed", "nSensorFault", "fSensorScale"),
-    *("fSwayEstimated", "fSwayUncertainty"),
-)
+OWN = (*TAKEN.values(), *GIVEN.values())  # inputs and outputs of each axis
+SENSED = (*INPUTS.values(), *OUTPUTS)  # likewise of each of several
 SETPOINTS = {
     "fPosition": "setpoint",
     "fVelocity": "setpoint_velocity",
@@ -149,7 +144,7 @@ def planned_system_model(
         The plant's names cannot be those of an FMU's variables.
     """
     plant, equations = machine.plant, dynamics(machine.plant)
-    stands = tuple(f"{STANDS}{suffix}" for suffix in axes)
+    stands = tuple(f"{PLACE}{suffix}" for suffix in axes)
     moves = tuple(f"{MOVES}{suffix}" for suffix in axes)
     # the axes stand where they were led to
     block = _PlacedBlock(text=text, axes=axes, live=live, inside=(CYCLE, *stands, *moves))
@@ -160,7 +155,7 @@ def planned_system_model(
     at = _references(block, table) | dict(zip(stands, led, strict=True))
     tau, velocity, start = (table.references(of) for of in ("TAU", "DQ_A", "START"))
     drives = {axis: {rate, *tau} for axis, rate in enumerate(velocity)}
-    of_plant = plant_structure(equations, table, drives, {axis: {place} for axis, place in enumerate(start)})
+    of_plant = plant_structure(equations, table, drives)
     start_values = dict(zip(stands, (start[number] for number in planned), strict=True))
     of_block = _structure(block, table, at | start_values)
     asked = [led[planned.index(k)] if k in planned else None for k in range(len(names))]
@@ -175,9 +170,7 @@ def planned_system_model(
             running=of_plant.running | of_block.running, starting=of_plant.starting | of_block.starting
         ),
         code={
-            **model_sources(*PLANT_FILES, "planned_system_model.c"),
-            "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
-            "equations.c": equations_source(equations),
+            **plant_code(equations, table, constants, "planned_system_model.c"),
             **block.files,
             "planner_block.c": _block_source(block, at) + _axes_source(planned, places),
         },

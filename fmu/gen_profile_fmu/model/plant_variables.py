@@ -79,18 +79,12 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
     CosimulationError
         When two variables would share a name, or a name is none that importers take.
     """
-    table = VariableTable(
-        blocks={
-            **_parameters(machine, kind),
-            "START": _start(machine),
-            "INPUTS": _inputs(machine, kind),
-            "PERIOD": _period(machine.period, kind),
-            **_states_and_outputs(machine),
-            "TIME": listed("time"),
-        }
-    )
-    _check_names(machine.plant, table)
-    return table
+    given = {
+        "START": _start(machine),
+        "INPUTS": _inputs(machine, kind),
+        "PERIOD": _period(machine.period, kind),
+    }
+    return _with_plant(machine, kind, given)
 
 
 def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTable:
@@ -104,18 +98,9 @@ def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTa
 
 def system_variables(machine: PlantInstance, motion: Profile) -> VariableTable:
     """List the variables of a plant that follows a motion; raises as `plant_variables` does."""
-    table = VariableTable(
-        blocks={
-            **_parameters(machine, InputKind.SETPOINT),
-            **_way(machine.plant.actuated, motion),
-            **_trigger(),
-            **_states_and_outputs(machine),
-            **_command(machine.plant.actuated),
-            "TIME": listed("time"),
-        }
-    )
-    _check_names(machine.plant, table)
-    return table
+    axes = machine.plant.actuated
+    given = {**_way(axes, motion), **_trigger()}
+    return _with_plant(machine, InputKind.SETPOINT, given, _command(axes))
 
 
 def planned_system_variables(
@@ -135,20 +120,21 @@ def planned_system_variables(
     words = "position to reach in a cycle, of an axis that the block does not plan"
     left = [number for number in range(len(axes)) if number not in planned]
     places = [machine.position[number] for number in left]
-    table = VariableTable(
-        blocks={
-            **_parameters(machine, InputKind.SETPOINT),
-            "START": _start(machine),
-            **orders,
-            "OTHERS": _each(
-                [axes[number] for number in left], "{}.setpoint", words, 0, Kind.INPUT, start=places
-            ),
-            **_states_and_outputs(machine),
-            **issued,
-            "TIME": listed("time"),
-        }
-    )
-    _check_names(machine.plant, table)
+    others = _each([axes[number] for number in left], "{}.setpoint", words, 0, Kind.INPUT, start=places)
+    given = {"START": _start(machine), **orders, "OTHERS": others}
+    return _with_plant(machine, InputKind.SETPOINT, given, issued)
+
+
+def _with_plant(
+    machine: PlantInstance, kind: InputKind, given: Blocks, issued: Blocks | None = None
+) -> VariableTable:
+    """Put a plant's own variables around those that it is given and those that are issued beside it."""
+    plant, own = machine.plant, _parameters(machine, kind)
+    seen = _states_and_outputs(machine)
+    table = VariableTable(blocks={**own, **given, **seen, **(issued or {}), "TIME": listed("time")})
+    coordinates = (q.name for q in (*plant.actuated, *plant.unactuated))
+    names = [*(p.name for p in plant.parameters), *coordinates, *plant.loads, *plant.bodies]
+    require_good_names(f"Plant {plant.type}", names, table)
     return table
 
 
@@ -305,9 +291,3 @@ def _command(axes: Sequence[Coordinate]) -> Blocks:
             for variable in _each(axes, f"{{}}.{suffix}", "of the motion", order, Kind.OUTPUT)
         )
     }
-
-
-def _check_names(plant: Plant, table: VariableTable) -> None:
-    coordinates = (q.name for q in (*plant.actuated, *plant.unactuated))
-    names = [*(p.name for p in plant.parameters), *coordinates, *plant.loads, *plant.bodies]
-    require_good_names(f"Plant {plant.type}", names, table)

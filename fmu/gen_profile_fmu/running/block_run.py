@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
-from gen_profile_fmu.running.instances import CalledFmu, compiled_loops, doubles, instance, unsigned
+from gen_profile_fmu.running.instances import compiled_loops, doubles, instance, unsigned
 
 NO_NUMBER = -1  # a block's fault: a setpoint is none, or beyond all that a machine can follow
 
@@ -253,7 +253,6 @@ class BlockFollower(AbstractContextManager["BlockFollower"]):
         self._variables = fmu.variables
         self._loads = [v.name for v in fmu.variables.blocks["SWAY"]]
         self._setpoints = [v.name for v in fmu.variables.blocks["INPUTS"]]
-        self._loop = _loop()
         self._instance = instance(fmu)
         self._messages = self._instance.messages
 
@@ -311,7 +310,7 @@ class BlockFollower(AbstractContextManager["BlockFollower"]):
         )
         axes, inputs = len(block.axes), script.inputs.shape[1]
         room = np.empty(2 * outputs + loads + axes + inputs + len(self._setpoints))
-        self._loop(
+        compiled_loops().block_run(
             byref(self._instance.called),
             byref(_called(block, script)),
             byref(self._history(script, values, led, hoists, marks=marks, shown=shown)),
@@ -413,10 +412,3 @@ def _called(block: CalledBlock, script: Script) -> _Block:
         enabled=enabled,
         size=ctypes.sizeof(block.memory),
     )
-
-
-def _loop() -> Any:
-    function = compiled_loops().block_run
-    function.argtypes = [*(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Outcome))]
-    function.restype = None
-    return function

@@ -45,7 +45,6 @@ def certify_artefact(
     path: Path | str,
     spec: Spec | Path | str | None = None,
     *,
-    write: bool = True,
     progress: Progress = lambda _, __: None,
 ) -> Certificate:
     """Prove that no machine of a spec's ranges sways more than a bound after a file's motion.
@@ -59,8 +58,6 @@ def certify_artefact(
         Any artefact of a motion.
     spec : Spec, or the path of one, optional
         Taken from ``manifest.json`` beside the file when not given.
-    write : bool
-        Whether to write it.
     progress : callable
         Told how many boxes of machines are done, and of how many so far.
 
@@ -83,11 +80,10 @@ def certify_artefact(
     """
     require_progress(progress)
     artefact = _read(as_path(path), spec)
-    if write:
-        require_place(certificate_path(artefact.path))  # before there is a proof to lose
+    require_place(certificate_path(artefact.path))  # before there is a proof to lose
     asked = asked_of_axes(artefact.spec, artefact.setpoints)
     certificate = _certificate(artefact, asked, attempt(artefact.spec, artefact.setpoints, progress))
-    if write and certificate.proved:
+    if certificate.proved:
         deliver(certificate_path(artefact.path), encode(certificate))
     return certificate
 

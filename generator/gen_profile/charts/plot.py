@@ -23,7 +23,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.phrases import number
 from gen_profile.identification.identify import Identification
 from gen_profile.motion.profile import Profile
-from gen_profile.solvers.plan import Plan
+from gen_profile.solvers.draft import Plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path
 from gen_profile.suggestion import found

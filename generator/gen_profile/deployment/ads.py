@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TypeVar
 
-import attrs
 import numpy as np
 import pyads
 from pyads.constants import ADSIGRP_SYM_VALBYHND
@@ -28,37 +27,18 @@ DEVICE_ERRORS = range(0x700, 0x740)  # what the controller has decided; all othe
 Given = TypeVar("Given")
 
 
-@attrs.frozen(kw_only=True)
-class AdsAccess:
-    """How a controller is reached.
-
-    Attributes
-    ----------
-    url : str
-        As it was asked for.
-    host : str
-        Its address, with ``:PORT`` if that is not the protocol's.
-    net_id : str
-        Its AMS NetId, six numbers.
-    port : int
-        AMS port of the PLC's runtime, 851 for the first one.
-    instance : str
-        Path of the block's instance, such as ``MAIN.fbMotion``; empty to find it.
-    """
-
-    url: str
-    host: str
-    net_id: str
-    port: int
-    instance: str = ""
-
-
 class AdsLink:
     """A connection to one instance of a block.
 
     Parameters
     ----------
-    access : AdsAccess
+    url : str
+        As it was asked for.
+    place : (str, int, str)
+        AMS NetId, six numbers; AMS port of the PLC's runtime, 851 for the first one; and its address, with
+        ``:PORT`` if that is not the protocol's.
+    instance : str
+        Path of the block's instance, such as ``MAIN.fbMotion``; empty to find it.
     table : BlockTable
         What is to be in the controller.
 
@@ -68,15 +48,15 @@ class AdsLink:
         The controller cannot be reached, or refuses, or shows no block, or several.
     """
 
-    def __init__(self, access: AdsAccess, table: BlockTable) -> None:
-        self._access, self._handles = access, dict[str, int]()
+    def __init__(self, url: str, place: tuple[str, int, str], instance: str, table: BlockTable) -> None:
+        self._url, self._handles = url, dict[str, int]()
         self._lengths = {REQUEST: LENGTH, REPLY: LENGTH, STATE: state_length(table.constant("cAxes"))}
-        self._connection = pyads.Connection(access.net_id, access.port, access.host)
-        self.server = {"url": access.url}
+        self._connection = pyads.Connection(*place)
+        self.server = {"url": url}
         look_at = "the address and the NetId, whether the controller has a route to this computer, and at the"
-        with first_connected(self, access.url, f"{look_at} network"):
+        with first_connected(self, url, f"{look_at} network"):
             self._connect()
-            self._instance = self._found()
+            self._instance = self._found(instance)
             self._take_handles()
         self.server |= {"instance": self._instance, **UNSECURED}
 
@@ -115,9 +95,8 @@ class AdsLink:
                 raise LinkLostError(f"{self._instance}.{name} is not there any more")
             self._handles[name] = handle
 
-    def _found(self) -> str:
+    def _found(self, asked: str) -> str:
         """Find the one instance that was named, or that there is."""
-        asked = self._access.instance
         named = [asked] if asked else self._run(self._structures)
         fitting = [
             path
@@ -129,10 +108,10 @@ class AdsLink:
             return fitting[0]
         if fitting:
             raise DeploymentError(
-                f"{self._access.url} shows several ({', '.join(fitting)}); name one as the instance."
+                f"{self._url} shows several ({', '.join(fitting)}); name one as the instance."
             )
         raise DeploymentError(
-            f"{self._access.url} shows no block with {REQUEST} and {REPLY}"
+            f"{self._url} shows no block with {REQUEST} and {REPLY}"
             + (f" as {asked}" if asked else "")
             + ': load one that was exported with export.plc_tables = "variables", and name its instance, '
             "such as MAIN.fbCrane.fbMotion, if it lies in other blocks."

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
 
-import attrs
 import numpy as np
 from snap7.client import Client
 from snap7.error import S7Error, S7PacketLostError, S7ProtocolError, S7StalePacketError
@@ -33,36 +32,17 @@ Given = TypeVar("Given")
 logging.getLogger("snap7").addHandler(logging.NullHandler())  # else its warnings go to stderr
 
 
-@attrs.frozen(kw_only=True)
-class S7Access:
-    """How a controller is reached.
-
-    Attributes
-    ----------
-    url : str
-        As it was asked for.
-    host : str
-    port : int
-    rack, slot : int
-        Of the processor.
-    block : int
-        Number of the data block with the three arrays.
-    """
-
-    url: str
-    host: str
-    port: int = TCP_PORT
-    rack: int
-    slot: int
-    block: int
-
-
 class S7Link:
     """A connection to the data block of one playback block.
 
     Parameters
     ----------
-    access : S7Access
+    url : str
+        As it was asked for.
+    place : (str, int, int, int)
+        Host, rack and slot of the processor, and TCP port.
+    block : int
+        Number of the data block with the three arrays.
     table : BlockTable
         What is to be in the controller. Nothing is written to a data block that shows no block of its kind.
 
@@ -72,12 +52,12 @@ class S7Link:
         The controller cannot be reached, or refuses, or the data block is another one.
     """
 
-    def __init__(self, access: S7Access, table: BlockTable) -> None:
-        self._access, self._client = access, Client()
+    def __init__(self, url: str, place: tuple[str, int, int, int], block: int, table: BlockTable) -> None:
+        self._url, self._place, self._block, self._client = url, place, block, Client()
         self._axes, self._kind, self._name = table.constant("cAxes"), table.constant("cKind"), table.path.name
         self._state = table.state
-        self.server = {"url": access.url, "instance": f"DB{access.block}", **UNSECURED}
-        with first_connected(self, access.url, "the address, rack and slot, and the network"):
+        self.server = {"url": url, "instance": f"DB{block}", **UNSECURED}
+        with first_connected(self, url, "the address, rack and slot, and the network"):
             self._connect()
 
     def close(self) -> None:
@@ -88,7 +68,7 @@ class S7Link:
     def write(self, request: Array) -> None:
         """Write the whole request, from its beginning."""
         content = bytearray(request.astype(DOUBLE).tobytes())
-        self._run(lambda: self._client.db_write(self._access.block, 0, content))
+        self._run(lambda: self._client.db_write(self._block, 0, content))
 
     def read(self) -> Array:
         """Read the whole reply."""
@@ -104,8 +84,7 @@ class S7Link:
         self._connect()
 
     def _connect(self) -> None:
-        access = self._access
-        self._run(lambda: self._client.connect(access.host, access.rack, access.slot, access.port))
+        self._run(lambda: self._client.connect(*self._place))
         self._require_block()
 
     def _require_block(self) -> None:
@@ -115,14 +94,14 @@ class S7Link:
                 break
         if state is None or state.kind != self._kind:
             raise DeploymentError(
-                f"DB{self._access.block} of {self._access.url} is not of a running block that takes "
+                f"DB{self._block} of {self._url} is not of a running block that takes "
                 f"{self._name}: name the data block that was exported with such a block, and look whether it "
                 "is wired to the block and the block is called."
             )
 
     def _doubles(self, at: int, count: int) -> Array:
         size = count * DOUBLE.itemsize
-        content = bytes(self._run(lambda: self._client.db_read(self._access.block, at, size)))
+        content = bytes(self._run(lambda: self._client.db_read(self._block, at, size)))
         if len(content) != size:
             raise DeploymentError(
                 f"The controller gives {len(content)} bytes in place of {size}; run this again."
@@ -136,7 +115,7 @@ class S7Link:
             raise LinkLostError(str(error)) from error
         except S7ProtocolError as error:
             raise DeploymentError(
-                f"The controller refuses DB{self._access.block} ({error}); look whether the data block is "
+                f"The controller refuses DB{self._block} ({error}); look whether the data block is "
                 "there, its access is not optimised, and PUT/GET is permitted."
             ) from error
         except (S7Error, OSError) as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,8 @@ from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress, require_progress
-from gen_profile.solvers.plan import Plan, plan
+from gen_profile.solvers.draft import Plan
+from gen_profile.solvers.plan import plan
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.summary import Drawable
@@ -131,7 +132,6 @@ def design(
     *,
     check: bool = True,
     keep_failed: bool = False,
-    by_fmpy: bool = True,
     progress: Progress = no_progress,
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
@@ -147,8 +147,6 @@ def design(
         Without it the manifest says ``"unverified"``.
     keep_failed : bool
         Deliver even what failed, marked so in the manifest.
-    by_fmpy : bool
-        Whether FMPy drives the nominal machine, too, and must find the same.
     progress : callable
         Told what is being done.
 
@@ -164,22 +162,17 @@ def design(
     """
     require_progress(progress)
     spec, folder = as_spec(spec), as_path(folder)
-    verify = partial(_check, by_fmpy=by_fmpy, progress=progress) if check else None
-    return _designed(
-        spec,
-        as_names(formats),
-        folder,
-        staged(folder),
-        verify=verify,
-        keep_failed=keep_failed,
-        progress=progress,
-    )
+    formats, place = as_names(formats), staged(folder)
+    return _designed(spec, formats, folder, place, check=check, keep_failed=keep_failed, progress=progress)
 
 
 def design_in_memory(spec: Spec, formats: Sequence[str], *, by_fmpy: bool) -> tuple[Design, dict[str, bytes]]:
-    """Do what `design` does, but hand over the files that pass, by name, for others to write."""
-    kept, verify = Kept(), partial(_check, by_fmpy=by_fmpy, progress=no_progress)
-    made = _designed(spec, formats, Path(), nullcontext(kept), verify=verify)
+    """Do what `design` does, but hand over the files that pass, by name, for others to write.
+
+    Without `by_fmpy` FMPy does not drive the nominal machine, too.
+    """
+    kept = Kept()
+    made = _designed(spec, formats, Path(), nullcontext(kept), by_fmpy=by_fmpy)
     return made, dict(sorted(kept.delivered.items()))
 
 
@@ -189,7 +182,8 @@ def _designed(
     folder: Path,
     place: AbstractContextManager[Staging],
     *,
-    verify: Callable[[Plan, Sequence[SampledProfile]], Check] | None,
+    check: bool = True,
+    by_fmpy: bool = True,
     keep_failed: bool = False,
     progress: Progress = no_progress,
 ) -> Design:
@@ -202,7 +196,7 @@ def _designed(
     with place as staging:
         progress("exporting")
         artefacts, replayed = _export(spec, command, exporters, staging)
-        worst = None if verify is None else verify(planned, replayed)
+        worst = _check(planned, replayed, by_fmpy=by_fmpy, progress=progress) if check else None
         digest = command.payload_hash()
         kept = deliver_judged(staging, spec, artefacts, worst, profile_sha256=digest, keep_failed=keep_failed)
     return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)

@@ -31,7 +31,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_number, as_numbers, as_path, as_spec, as_text
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import finite_number, suggestion
 from gen_profile.summary import Drawable
 from gen_profile.units import units_of
 
@@ -204,11 +204,8 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
     fitting = units_of(si_unit)
     if name not in fitting:
         raise SpecError(f"unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
-    try:
-        step = float(size or 1.0)
-    except ValueError:
-        step = 0.0
-    if step <= 0.0:
+    step = finite_number(size or "1")
+    if not step > 0.0:
         raise SpecError(f"unit: {unit!r} shall begin with the size of a count, as in 0.0879 {name}.")
     return fitting[name] / step
 

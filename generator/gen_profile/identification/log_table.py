@@ -18,7 +18,7 @@ from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import Phrase
-from gen_profile.suggestion import number_meant, suggestion
+from gen_profile.suggestion import finite_number, number_meant, suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
 MOST_BYTES = 1 << 25
@@ -71,11 +71,7 @@ class LogTable:
     def number(self, row: int, place: int) -> float:
         """Value of a cell; NaN where it holds no finite number."""
         text = self.cell(row, place)
-        try:
-            value = float(text.replace(",", ".") if self.decimal_comma else text)
-        except ValueError:
-            return math.nan
-        return value if math.isfinite(value) else math.nan
+        return finite_number(text.replace(",", ".") if self.decimal_comma else text)
 
     def seconds(self, row: int, place: int) -> float:
         """Time of a cell: a number, a date (ISO 8601, or day first) or a time of day, in s; else NaN."""

@@ -1,7 +1,5 @@
 """Figures of arrays: peaks, root mean squares, and what swings on after a move."""
 
-from functools import cache
-
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
@@ -38,19 +36,13 @@ def overshoot(profile: Profile) -> float:
 def root_mean_square(profile: Profile, order: int) -> float:
     """Root mean square of the leading axis' derivative over the move, by an exact quadrature."""
     size = profile.coefficients.shape[1]
-    nodes, weights = _quadrature(size)
+    nodes, weights = legendre.leggauss(size)
     lengths = np.diff(profile.knots)
     coefficients = polynomial.polyder(profile.coefficients[:, :, profile.leading].T, order)
     local = lengths[:, None] * (nodes + 1.0) / 2.0
     values = np.asarray(polynomial.polyval(local, coefficients[:, :, None], tensor=False))
     mean = (values**2 @ weights / 2.0) @ lengths / profile.duration
     return float(np.sqrt(mean))
-
-
-@cache
-def _quadrature(points: int) -> tuple[Array, Array]:
-    """Nodes and weights of Gauss's quadrature on [-1, 1]."""
-    return legendre.leggauss(points)
 
 
 def length(components: Array) -> Array:

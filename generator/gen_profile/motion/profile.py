@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import attrs
 import numpy as np
+from attrs.converters import optional
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
@@ -31,8 +32,8 @@ def read_only(values: object) -> Array:
     return array
 
 
-def _finite(_: object, attribute: attrs.Attribute[Array], value: Array) -> None:
-    if not np.isfinite(value).all():
+def _finite(_: object, attribute: attrs.Attribute[Any], value: Array | None) -> None:
+    if value is not None and not np.isfinite(value).all():
         raise GenProfileError(f"{attribute.name} of a motion must be finite numbers, found NaN or infinity.")
 
 
@@ -281,21 +282,9 @@ class SampledProfile(Summarised, Tabled):
 
     cycle_time: float
     position: Array = attrs.field(converter=read_only, validator=_finite)
-    velocity: Array | None = attrs.field(
-        default=None,
-        converter=attrs.converters.optional(read_only),
-        validator=attrs.validators.optional(_finite),
-    )
-    acceleration: Array | None = attrs.field(
-        default=None,
-        converter=attrs.converters.optional(read_only),
-        validator=attrs.validators.optional(_finite),
-    )
-    jerk: Array | None = attrs.field(
-        default=None,
-        converter=attrs.converters.optional(read_only),
-        validator=attrs.validators.optional(_finite),
-    )
+    velocity: Array | None = attrs.field(default=None, converter=optional(read_only), validator=_finite)
+    acceleration: Array | None = attrs.field(default=None, converter=optional(read_only), validator=_finite)
+    jerk: Array | None = attrs.field(default=None, converter=optional(read_only), validator=_finite)
     resolution: Array = attrs.field(converter=read_only, validator=_finite)
 
     @resolution.default

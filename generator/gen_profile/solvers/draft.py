@@ -19,6 +19,7 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.shape import shaped_motion
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
+from gen_profile.summary import Drawable
 
 ROOM = 2.0  # times a shaper's delay, which leaves the base move as much time
 # fraction of the limits of residual sway, which leaves room for the setpoints' errors; with 0.9 the shortest
@@ -26,31 +27,54 @@ ROOM = 2.0  # times a shaper's delay, which leaves the base move as much time
 WITHIN = 0.99
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Draft:
-    """A motion that was tried on no machine, or none.
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Plan(Drawable):
+    """A motion for a spec, of which nothing is written yet, or none.
 
     Attributes
     ----------
     spec : Spec
-        With a duration.
+        With a duration, found where the shortest was asked for.
     solution : Solution or None
         What the solver found, or why it found nothing; None where a shaper made the motion.
-    motion : Profile or None
-        Of the axes.
+    found : Profile or None
+        Motion of the axes, there in what `gen_profile.plan` gives.
     solver_time : float
         s.
     """
 
     spec: Spec
     solution: Solution | None
-    motion: Profile | None
+    found: Profile | None
     solver_time: float = 0.0
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            "motion": f"{self.motion.method}, {self.motion.duration:g} s",
+            "residual sway": f"{1e3 * self.figures['sway_residual_worst_m']:.4g} mm at worst",
+        }
+
+    @property
+    def motion(self) -> Profile:
+        """Of the axes, which must be there."""
+        assert self.found is not None
+        return self.found
+
+    @property
+    def command(self) -> Profile:
+        """Setpoints of the drives, which is the motion itself where they are ideal."""
+        return self.evaluation.command
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Of the motion on all machines."""
+        return self.evaluation.figures
 
     @cached_property
     def evaluation(self) -> MotionEvaluation:
-        """Of the motion, which must be there, on all machines."""
-        assert self.motion is not None
+        """Of the motion on all machines."""
         return evaluate(self.spec, self.motion)
 
     @cached_property
@@ -66,7 +90,7 @@ class Draft:
 
         Also where the motion sways more on the way than it may, or no machine can follow it.
         """
-        if self.motion is None:
+        if self.found is None:
             return math.inf
         try:
             evaluation, limit = self.evaluation, self.spec.limits.sway
@@ -78,15 +102,15 @@ class Draft:
         return math.log(taken / WITHIN) if taken > 0.0 else -math.inf
 
 
-def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Draft:
+def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Plan:
     """Take the motion of a solution, if it has one."""
     motion = None if solution.optimum is None else optimal_profile(solution)
-    return Draft(spec=spec, solution=solution, motion=motion, solver_time=solver_time)
+    return Plan(spec=spec, solution=solution, found=motion, solver_time=solver_time)
 
 
 def solved(
     spec: Spec, progress: Progress = no_progress, spread: float = 1.0, near: Relaxed | None = None
-) -> Draft:
+) -> Plan:
     """Solve a spec with a duration, or shape a move for it; `near` as in `transient_sway.attempt`."""
     if spec.solver.shaper is not None:
         return _shaped(spec, spec.solver.shaper)
@@ -95,10 +119,10 @@ def solved(
     return drafted(spec, solution, time.perf_counter() - began)
 
 
-def _shaped(spec: Spec, shaper: str) -> Draft:
+def _shaped(spec: Spec, shaper: str) -> Plan:
     """Shape a move; where that takes longer than the spec allows, try a duration that is long enough."""
     try:
-        return Draft(spec=spec, solution=None, motion=shaped_motion(spec, shaper))
+        return Plan(spec=spec, solution=None, found=shaped_motion(spec, shaper))
     except InfeasibleProblem as error:
         least = error.least_duration
         if least is not None:
@@ -116,7 +140,7 @@ def _longer_shaped(spec: Spec, shaper: str) -> tuple[Suggestion, ...]:
         return error.suggestions
 
 
-def suggested(values: Mapping[str, Any], drafted: Draft) -> Suggestion:
+def suggested(values: Mapping[str, Any], drafted: Plan) -> Suggestion:
     """Suggest values with which a motion was found."""
     fraction = share_of_residual_sway(drafted.spec, drafted.evaluation)
     return Suggestion(values=values, spec=drafted.spec, fraction=fraction, passes=drafted.excess_sway <= 0.0)

@@ -2,65 +2,18 @@
 
 from pathlib import Path
 
-import attrs
-
 from gen_profile.errors import LimitViolation
-from gen_profile.evaluation.motion_evaluation import MotionEvaluation
-from gen_profile.motion.profile import Profile
 from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.draft import Draft, solved
+from gen_profile.solvers.draft import Plan, solved
 from gen_profile.solvers.shortest import shortest
-from gen_profile.solvers.solution import SIMPLER, Solution, Status, no_motion
+from gen_profile.solvers.solution import SIMPLER, Status, no_motion
 from gen_profile.solvers.suggestions import explained, remedy
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
-from gen_profile.summary import Drawable
 from gen_profile.work import OutOfWork, budget
 
 EXPLAINING = "looking for what would do"
-
-
-@attrs.frozen(kw_only=True, eq=False, repr=False)
-class Plan(Drawable):
-    """A design that is not yet written.
-
-    Attributes
-    ----------
-    spec : Spec
-        What was planned, its duration found where the shortest was asked for.
-    solution : Solution or None
-        What the solver found; None where a shaper made the motion.
-    solver_time : float
-        s.
-    evaluation : MotionEvaluation
-        Of the motion.
-    figures : dict of str to float
-    """
-
-    spec: Spec
-    solution: Solution | None
-    solver_time: float
-    evaluation: MotionEvaluation
-    figures: dict[str, float]
-
-    def summary(self) -> dict[str, object]:
-        """Tell what a reader looks for first."""
-        return {
-            "name": self.spec.name,
-            "motion": f"{self.motion.method}, {self.motion.duration:g} s",
-            "residual sway": f"{1e3 * self.figures['sway_residual_worst_m']:.4g} mm at worst",
-        }
-
-    @property
-    def motion(self) -> Profile:
-        """Of the axes."""
-        return self.evaluation.motion
-
-    @property
-    def command(self) -> Profile:
-        """Setpoints of the drives, which is the motion itself where they are ideal."""
-        return self.evaluation.command
 
 
 def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
@@ -90,8 +43,8 @@ def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
         raise no_motion(Status.GIVEN_UP, SIMPLER) from error
 
 
-def draft(spec: Spec, progress: Progress = no_progress) -> Draft:
-    """Solve a spec, or shape a move for it, and look no further.
+def draft(spec: Spec, progress: Progress = no_progress) -> Plan:
+    """Solve a spec, or shape a move for it, and look no further: nothing holds the motion to the limits.
 
     Raises
     ------
@@ -106,7 +59,7 @@ def draft(spec: Spec, progress: Progress = no_progress) -> Draft:
     return solved(spec, progress)
 
 
-def judged(drafted: Draft, progress: Progress = no_progress) -> Plan:
+def judged(drafted: Plan, progress: Progress = no_progress) -> Plan:
     """Try a drafted motion on all machines; say what would help where there is none within the limits.
 
     Raises
@@ -116,7 +69,7 @@ def judged(drafted: Draft, progress: Progress = no_progress) -> Plan:
         Nothing is left of a budget.
     """
     spec = drafted.spec
-    if drafted.motion is None:
+    if drafted.found is None:
         assert drafted.solution is not None  # a shaper has a motion, or raises
         progress(EXPLAINING)
         explained(spec, drafted.solution).raise_for_status()
@@ -129,10 +82,4 @@ def judged(drafted: Draft, progress: Progress = no_progress) -> Plan:
             reasons=[one.reason() for one in drafted.broken],
             suggestions=better.suggestions,
         )
-    return Plan(
-        spec=spec,
-        solution=drafted.solution,
-        solver_time=drafted.solver_time,
-        evaluation=drafted.evaluation,
-        figures=drafted.evaluation.figures,
-    )
+    return drafted

@@ -12,7 +12,7 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed, refined
-from gen_profile.solvers.draft import Draft, drafted, in_cycles, lasting, solved
+from gen_profile.solvers.draft import Plan, drafted, in_cycles, lasting, solved
 from gen_profile.solvers.search import Search, least, slope_of
 from gen_profile.solvers.shape import shaped_motion
 from gen_profile.solvers.suggestions import beside, remedy, sufficient_duration
@@ -44,7 +44,7 @@ def timed(spec: Spec, progress: Progress = no_progress) -> Spec:
     return shortest(spec, progress).spec if spec.move.shortest else spec
 
 
-def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
+def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
     """Find the shortest motion that ends on a cycle of the controller.
 
     An optimal one takes longer than its limits make it where it would otherwise leave more sway than the
@@ -59,7 +59,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
     """
     if spec.solver.shaper is not None:
         motion = shaped_motion(spec, spec.solver.shaper)
-        return Draft(spec=lasting(spec, motion.duration), solution=None, motion=motion)
+        return Plan(spec=lasting(spec, motion.duration), solution=None, found=motion)
     problem = problem_of(spec)
     try:
         with budget(SEARCHING):
@@ -134,7 +134,7 @@ def _require_short(duration: float) -> None:
         )
 
 
-def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress: Progress) -> Draft | None:
+def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress: Progress) -> Plan | None:
     """Find the shortest motion of least cost with little sway, no shorter than the one within the limits.
 
     Motions on few intervals lead near to it; where the work ends before one on many is found, one of those is
@@ -149,7 +149,7 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
     most, start = LONGEST * shortest_kept.duration, first.spec.move.duration
     # an axis without limits may fling a load about
     near = shortest_kept if first.excess_sway < math.inf else None
-    rough, exact = {start: first}, dict[float, Draft]()
+    rough, exact = {start: first}, dict[float, Plan]()
 
     def roughly(duration: float) -> float:
         if duration != start:
@@ -178,7 +178,7 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
     return None if duration is None else exact[duration]
 
 
-def _drafted(spec: Spec, relaxed: Relaxed) -> Draft:
+def _drafted(spec: Spec, relaxed: Relaxed) -> Plan:
     """Take a shortest motion within limits, its duration rounded up to a cycle."""
     return drafted(lasting(spec, in_cycles(spec, relaxed.duration)), relaxed.solution)
 

@@ -19,7 +19,7 @@ from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers import transient_sway
 from gen_profile.solvers.direct.relaxation import Relaxation, least_duration, time_dependent_limits
-from gen_profile.solvers.draft import Draft, drafted, suggested
+from gen_profile.solvers.draft import Plan, drafted, suggested
 from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import LONGER, Solution, Status
@@ -238,7 +238,7 @@ def least_change(
     coarsely, finely = options.search, attrs.evolve(options.search, close=math.inf)
 
     @cache
-    def solved(factor: float, *, coarse: bool) -> Draft:
+    def solved(factor: float, *, coarse: bool) -> Plan:
         changed = spec.changed(change(factor))
         solution = afford(partial(tried, changed, coarse=coarse, options=options), fraction * left())
         return drafted(changed, solution or choice.given_up(problem_of(changed)))
@@ -276,10 +276,10 @@ def least_change(
     return suggested(change(factor), solved(factor, coarse=False)) if factor else None
 
 
-def _stands(draft: Draft) -> bool:
+def _stands(draft: Plan) -> bool:
     """Whether the motion, if there is one, would be judged to keep all limits."""
     try:
-        return draft.motion is not None and not draft.broken
+        return draft.found is not None and not draft.broken
     except (CosimulationError, InfeasibleProblem):
         return False
 

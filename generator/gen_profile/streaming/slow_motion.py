@@ -15,7 +15,7 @@ from gen_profile.progress import Progress
 from gen_profile.spec.model import Spec
 from gen_profile.streaming.outcome import Source
 from gen_profile.streaming.stream import actual_positions, designed
-from gen_profile.suggestion import number_meant, suggestion
+from gen_profile.suggestion import finite_number, number_meant, suggestion
 from gen_profile_exporters.can.following_window import LEAST_USEFUL
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.streaming.approach import CREEP, FRACTION
@@ -125,11 +125,8 @@ def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float
         name, _, number = text.partition("=")
         if name not in axes:
             raise SpecError(f"jog {text}: unknown axis{suggestion(name, axes)}")
-        try:
-            distances[name] = float(number)
-        except ValueError:
-            distances[name] = math.nan
-        if not math.isfinite(distances[name]):
+        distances[name] = finite_number(number)
+        if math.isnan(distances[name]):
             hint = number_meant(number)
             wanted = "state the distance as a number of metres (or rad)"
             raise SpecError(f"jog {text}: {wanted}, as {name}=0.05{hint}.")

@@ -149,7 +149,7 @@ def _edits(identified: Identification) -> Mapping[str, Any]:
 def _move(asked: LogQuestion, spec: Spec, read: MeasuredLog) -> Part:
     """Hold a move against the plan."""
     drafted = draft(spec)
-    if drafted.motion is None:
+    if drafted.found is None:
         raise InfeasibleProblem("There is no such motion, so nothing to hold the log against.")
     evaluation = sketch(drafted.spec, drafted.motion)
     measured = compare_measured(drafted.spec, evaluation, read, evaluation.motion.duration)

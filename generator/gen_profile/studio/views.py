@@ -21,8 +21,9 @@ from gen_profile.motion.metrics import extremes, peak
 from gen_profile.phrase import PLACED, Phrase
 from gen_profile.problem.limits import ROUNDING
 from gen_profile.report.animation import animation
+from gen_profile.solvers.draft import Plan
 from gen_profile.solvers.method_selection import ANSWER
-from gen_profile.solvers.plan import Plan, draft, judged
+from gen_profile.solvers.plan import draft, judged
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import plausibility_warnings
@@ -51,7 +52,7 @@ def picture(question: Question) -> Iterator[Part]:
         spec = question.spec()
         with budget(*ANSWER):
             drafted = draft(spec)
-            if drafted.motion is None:
+            if drafted.found is None:
                 yield failure("none", [SEARCHING])
             else:
                 yield from _shown(drafted.spec, sketch(drafted.spec, drafted.motion))

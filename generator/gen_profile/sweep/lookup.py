@@ -14,7 +14,7 @@ from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path, as_values
-from gen_profile.suggestion import number_meant, suggestion
+from gen_profile.suggestion import finite_number, number_meant, suggestion
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.grid import Grid, GridAxis, overrides
 from gen_profile.sweep.store import case_folder, case_spec, grid_of, swept_table, take_out
@@ -188,11 +188,8 @@ def _value(axis: GridAxis, text: str | None) -> float | str:
         if text not in known:
             raise SpecError(f"{axis.key}: not among the values swept{suggestion(text, known)}")
         return text
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    value = finite_number(text)
+    if math.isnan(value):
         raise SpecError(f"{axis.key}: must be a finite number, found {text[:60]!r}{number_meant(text)}.")
     return value
 

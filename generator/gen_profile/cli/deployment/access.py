@@ -99,21 +99,20 @@ class Access:
         DeploymentError
         """
         if self.url.startswith("ads:"):
-            from gen_profile.deployment.ads import AdsAccess, AdsLink
+            from gen_profile.deployment.ads import AdsLink
 
-            host, net_id, ams_port = _groups(_ADS, self.url)
-            host, port = host or ".".join(net_id.split(".")[:4]), int(ams_port)
-            ads = AdsAccess(url=self.url, host=host, net_id=net_id, port=port, instance=self.instance)
-            return AdsLink(ads, table)
+            host, net_id, port = _groups(_ADS, self.url)
+            place = (net_id, int(port), host or ".".join(net_id.split(".")[:4]))
+            return AdsLink(self.url, place, self.instance, table)
         if self.data_block is None:
             from gen_profile.deployment.opcua import OpcUaLink
 
             return OpcUaLink(self.opcua())
-        from gen_profile.deployment.s7 import TCP_PORT, S7Access, S7Link
+        from gen_profile.deployment.s7 import TCP_PORT, S7Link
 
         host, tcp, rack, slot = _groups(_S7, self.url)
-        place = {"port": int(tcp or TCP_PORT), "rack": int(rack), "slot": int(slot)}
-        return S7Link(S7Access(url=self.url, host=host, block=self.data_block, **place), table)
+        processor = (host, int(rack), int(slot), int(tcp or TCP_PORT))
+        return S7Link(self.url, processor, self.data_block, table)
 
     def opcua(self) -> OpcUaAccess:
         """Say how an OPC UA server is reached; ask for the password, if there is to be one."""

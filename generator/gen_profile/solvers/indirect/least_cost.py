@@ -33,28 +33,9 @@ class LinearMachine:
     conditions: Array
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class CostMinimum:
-    """Outcome.
-
-    Attributes
-    ----------
-    controls : (points · m,) array
-        Changes of the controls.
-    multipliers : (conditions,) array
-        Of the end conditions.
-    pull : (points, outputs) array
-        Change of the cost's slope by what is costed, times the weights.
-    """
-
-    controls: Array
-    multipliers: Array
-    pull: Array
-
-
 def least_cost(
     machine: LinearMachine, cost: SwayCost, sway: Array, *, moved: Array, slope: Array, missing: Array
-) -> CostMinimum:
+) -> tuple[Array, Array, Array]:
     """Minimise the cost under end conditions.
 
     Parameters
@@ -69,6 +50,15 @@ def least_cost(
         Of the rest of the cost by the controls, before they change.
     missing : (conditions,) array
         What the end conditions shall change by.
+
+    Returns
+    -------
+    controls : (points · m,) array
+        Changes of the controls.
+    multipliers : (conditions,) array
+        Of the end conditions.
+    pull : (points, outputs) array
+        Change of the cost's slope by what is costed, times the weights.
 
     Raises
     ------
@@ -100,7 +90,7 @@ def least_cost(
         pull += (stiffness @ step[..., None])[..., 0]
         if np.abs(growth).max() <= CLOSE or cost.beta == 0.0:
             break
-    return CostMinimum(controls=controls, multipliers=multipliers, pull=weights * pull)
+    return controls, multipliers, weights * pull
 
 
 def _newton_step(hessian: Array, slope: Array, conditions: Array, missing: Array) -> tuple[Array, Array]:

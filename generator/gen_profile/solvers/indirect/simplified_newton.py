@@ -156,8 +156,9 @@ def _corrected(
     defects = slopes.reshape(current.slopes.shape) - current.slopes
     force, load = defects[..., :n], -weights * defects[..., n:]
     _, states, final = response.states(force)
-    slope, _ = response.costates(load, np.zeros(n))
-    least = least_cost(
+    multipliers = np.zeros(n)
+    slope, _ = response.costates(load, multipliers)
+    controls, multipliers[model.asked], pull = least_cost(
         model.machine,
         problem.sway_cost,
         sway,
@@ -165,11 +166,9 @@ def _corrected(
         slope=slope[..., model.driven_states].ravel(),
         missing=(problem.final - current.trajectory.nodes[-1, :n] - final)[model.asked],
     )
-    force[..., model.driven_states] += least.controls.reshape(*force.shape[:2], -1)
+    force[..., model.driven_states] += controls.reshape(*force.shape[:2], -1)
     rises, _, _ = response.states(force)
-    load += (model.costed.swapaxes(2, 3) @ least.pull.reshape(*load.shape[:2], -1, 1))[..., 0]
-    multipliers = np.zeros(n)
-    multipliers[model.asked] = least.multipliers
+    load += (model.costed.swapaxes(2, 3) @ pull.reshape(*load.shape[:2], -1, 1))[..., 0]
     _, falls = response.costates(load, multipliers)
     slopes = current.slopes + np.concatenate([rises, -falls / weights], axis=-1)
     final_costates = current.trajectory.nodes[-1, n:] + multipliers
