@@ -175,6 +175,7 @@ def test_a_planner_leads_the_plant(planned):
     assert {"enable", "execute", "velocity", "stop", "target", "live.L1"} < inputs
 
 
+@pytest.mark.slow
 def test_ecos_commands_a_planner(ecos, planned):
     rows = []
     with ecos.EcosSimulation(ssp_path=str(planned), step_size=STEP) as simulation:

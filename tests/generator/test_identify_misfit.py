@@ -76,6 +76,7 @@ def test_a_damping_that_is_wrong_is_named():
         estimate(hoist(c=0.0), ["L0"], [], [log_of(exact + NOISE)])
 
 
+@pytest.mark.slow
 def test_of_parameters_that_explain_a_log_alike_none_is_advised():
     """A swing tells c/m and nothing else of both, so m must not be blamed where c is another one."""
     exact = swing(HOIST.nominal() | {"c": 1500.0}, TIMES, [0.15, 0.0])
@@ -122,6 +123,7 @@ def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monk
     assert found.misfits[0] is not None
 
 
+@pytest.mark.slow
 def test_logs_of_two_machines_are_refused():
     own, other = (swing(HOIST.nominal() | {"L0": rope}, TIMES, [0.15, 0.0]) + NOISE for rope in (2.0, 2.1))
     assert estimate(hoist(), ["L0"], [], [log_of(own), log_of(0.7 * own)]).half_range["L0"] < 0.02

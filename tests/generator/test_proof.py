@@ -114,6 +114,7 @@ def test_a_sound_block_is_proved(spec, proof):
         assert 0.9 < document["limits"][name] <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_sway_on_the_way_is_told_where_it_is_limited(proof):
     assert proof.warnings() == ()
     assert attrs.evolve(proof, sway_limit=10.0).warnings() == ()
@@ -390,6 +391,7 @@ def test_check_repeats_the_proof_from_the_file(deployed):
     assert again["proof"] == document["proof"]
 
 
+@pytest.mark.slow
 def test_check_replays_one_history(deployed):
     folder, document = deployed
     worst = dict(document["proof"]["worst"])
@@ -431,6 +433,7 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
     assert max(found) == pytest.approx(100.0 * proof["share"], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -445,6 +448,7 @@ def test_what_means_nothing_for_a_block_is_refused(deployed, options, words):
     assert words in refused.err
 
 
+@pytest.mark.slow
 def test_what_only_a_design_has_is_refused_in_a_report(deployed):
     refused = run_here("report", deployed[0] / "bay 3.st", "--no-compare")
     assert refused.code == 2

@@ -23,6 +23,7 @@ def table(tmp_path_factory):
     return read_table(exported_planner(tmp_path_factory.mktemp("planner")))
 
 
+@pytest.mark.slow
 def test_a_clumsy_hand_is_followed(table):
     """New target on the way, stop, stick, quick stop, a drive that trips and moves on, no target at all."""
     script = [
