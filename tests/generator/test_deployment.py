@@ -23,7 +23,7 @@ from gen_profile.deployment.table import BlockTable, PlannerTable, read_table
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError, OutputError
 from gen_profile.spec.reading import preset_spec
 
-FAULTS = 150
+FAULTS = 60
 
 
 @pytest.fixture(scope="module")
