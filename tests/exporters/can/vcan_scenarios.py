@@ -146,10 +146,6 @@ def _say(cob_id, data):
     return act
 
 
-def _interrupt(streamer, _):
-    os.kill(streamer.pid, signal.SIGINT)
-
-
 def _freeze(streamer, _):
     """Stop the streamer for a while, in which the drive must be able to act."""
     os.kill(streamer.pid, signal.SIGSTOP)
@@ -173,7 +169,6 @@ SCENARIOS = {
     "whole": (AT_ONCE, None),
     "launched": (AT_LAUNCH_TIME, None),
     "frozen": (AT_ONCE, _freeze),
-    "interrupted": (AT_ONCE, _interrupt),
     "second-controller": (AT_ONCE, _say(0x301, bytes(4))),
     "bus-down": (AT_ONCE, _bus_down),
 }
