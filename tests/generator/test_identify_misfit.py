@@ -112,14 +112,13 @@ def test_what_no_parameter_explains_widens_the_range():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("plant", "rope", "axes"), [(CRANE, "L1", (0.0,)), (HOIST, "L0", (0.0, 4.0))])
-def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monkeypatch, plant, rope, axes):
+def test_where_no_machine_explains_half_of_a_log_large_swings_are_not_tried(monkeypatch):
     """They took more than ten minutes for 6,000 rows of a gyroscope that drifts."""
     monkeypatch.setattr(misfit, "nothing_left", lambda *_: pytest.fail("large swings were tried"))
     values = np.cumsum(np.random.default_rng(0).normal(0.0, 2e-3, len(TIMES)))
-    machine = SwingingMachine(plant=plant, parameters=plant.nominal(), q_a=axes)
-    known = parse_reading(f"{rope}={plant.nominal()[rope]}±0.01")
-    found = estimate(machine, [rope], [known], [log_of(values, load=plant.loads[0])])
+    machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 4.0))
+    known = parse_reading(f"L0={HOIST.nominal()['L0']}±0.01")
+    found = estimate(machine, ["L0"], [known], [log_of(values, load=HOIST.loads[0])])
     assert found.misfits[0] is not None
 
 
