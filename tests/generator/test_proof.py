@@ -142,6 +142,7 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
     assert 0 < len(begun) < len(many)
 
 
+@pytest.mark.slow
 def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatch):
     broken = attrs.evolve(GOOD, fault=1, cycles=0, stands=-1)
     monkeypatch.setattr(ClosedLoop, "watched", lambda *_: WatchedRun(run=broken))
