@@ -146,6 +146,7 @@ def fresh(files):
         yield url
 
 
+@pytest.mark.slow
 def test_what_stands_is_watched(files, fresh, tmp_path):
     old, log = files / "old" / "paper.st", tmp_path / "log.csv"
     where = ("--to", fresh, "--security", "none")
@@ -336,6 +337,7 @@ def test_odd_servers_are_told_apart(instance, words, files, odd, monkeypatch):
     assert found.code == 6 and re.search(words, found.err), found.err
 
 
+@pytest.mark.slow
 def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
     monkeypatch.setattr("gen_profile.deployment.opcua.REPLY", "aNothing")
     found = run_here("deploy", files / "old" / "paper.st", "--to", odd, "--security", "none")

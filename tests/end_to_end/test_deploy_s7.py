@@ -18,7 +18,7 @@ from gen_profile.deployment.s7_sim import SimulatedS7Controller
 from gen_profile.deployment.table import BlockTable, read_table
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError
 
-NUMBER, FAULTS = 7, 40
+NUMBER, FAULTS = 7, 20
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,8 @@ from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.playback.library import read_library
 from gen_profile_exporters.registry import container_of, find_container
 
+pytestmark = pytest.mark.slow
+
 CYCLE = "export.cycle_time=0.01"
 AXES = (
     "--vary",
@@ -55,14 +57,12 @@ def library(swept, tmp_path_factory):
     return path, outcome.document
 
 
-@pytest.mark.slow
 def test_one_file_gives_the_same_library(swept, library, tmp_path):
     path = archived(swept, tmp_path / "swept.sqlite")
     assert run_here("library", path, "--out", tmp_path / "bay 3.st").code == 0
     assert (tmp_path / "bay 3.st").read_bytes() == library[0].read_bytes()
 
 
-@pytest.mark.slow
 def test_holds_the_profiles_that_passed_in_their_order(swept, library):
     path, document = library
     rows = [row for row in read_table(swept, grid_of(swept)).to_pylist() if row["status"] == "passed"]
@@ -166,7 +166,6 @@ def test_a_library_that_would_issue_something_else_is_not_written(swept, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
     folder = sweep(tmp_path / "swept", "--vary", "solver.method=zvd")
     outcome = run_here("library", folder, "--out", tmp_path / "library.st")
@@ -176,7 +175,6 @@ def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
     )
 
 
-@pytest.mark.slow
 def test_a_sweep_of_which_nothing_passed_is_refused(tmp_path):
     folder = sweep(tmp_path / "swept", "--vary", "check.residual_sway=1e-9", "--set", "solver.method=zvd")
     outcome = run_here("library", folder, "--out", tmp_path / "library.st")

@@ -87,6 +87,7 @@ def test_a_sensor_on_the_bus_lets_the_block_damp_what_a_quick_stop_left(tmp_path
     assert outcome.document["drive"]["sway_residual_peak_m"] < 0.05  # without, 0.43 m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("check", "text", "words"),
     [

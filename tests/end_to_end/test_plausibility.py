@@ -102,7 +102,7 @@ def played(spec, command, form):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("move", MOVES.values(), ids=MOVES)
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=12)
 @given(
     form=st.sampled_from(list(FORMS)),
     cycle_time=st.sampled_from([0.002, 0.004, 0.0075, 0.01, 0.02, 0.05]),

@@ -235,6 +235,7 @@ def test_figures_and_spectra_are_of_an_axis_that_moves():
     assert min(plan.figures[name] for name in names) > 0.1
 
 
+@pytest.mark.slow
 def test_few_curves_are_drawn_each_in_a_colour_of_its_own_unless_all_are_asked_for(plain):
     def curves(**how):
         axis = draw_side_by_side([comparison_figure(plain, **how)], "title").axes[0]

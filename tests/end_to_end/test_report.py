@@ -238,6 +238,7 @@ def test_a_browser_that_prints_nothing_is_a_sentence(monkeypatch):
         printed(b"<p>")
 
 
+@pytest.mark.slow
 def test_several_axes_are_told_apart(tmp_path):
     outcome, _, text = report(tmp_path, "--preset", "gantry-crane", "--no-compare")
     assert outcome.code == 0

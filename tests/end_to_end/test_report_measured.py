@@ -157,6 +157,7 @@ def test_a_machine_that_swings_too_much_fails(tmp_path, spec, motion):
     assert outcome.errors[0].startswith("Check failed: On the machine the ")
 
 
+@pytest.mark.slow
 def test_people_are_told_what_the_machine_did_without_opening_the_page(tmp_path, spec, motion):
     log(tmp_path / "log.csv", motion, dict(spec.plant.parameters))
     words = ("--no-compare", "--measured", tmp_path / "log.csv", "--out", tmp_path / "page.html")

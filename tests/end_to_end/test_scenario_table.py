@@ -7,6 +7,8 @@ import re
 import pytest
 from command_line import run_here
 
+pytestmark = pytest.mark.slow
+
 ASKED = (
     "check.uncertain={L1=0.2}",
     "check.samples=8",
@@ -29,7 +31,6 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.slow
 def test_every_row_is_the_scenario_of_the_json_document(checked, tmp_path):
     path = tmp_path / "rows.csv"
     document = run_here("check", checked / "paper.csv", "--csv", path, "--json").document["check"]
@@ -51,7 +52,6 @@ def test_every_row_is_the_scenario_of_the_json_document(checked, tmp_path):
     assert {row["verdict"] for row in found} == {"passed", "failed"}
 
 
-@pytest.mark.slow
 def test_it_tells_what_each_group_s_setpoints_went_through(checked, tmp_path):
     path = tmp_path / "rows.csv"
     run_here("check", checked / "paper.csv", "--csv", path)
@@ -70,7 +70,6 @@ def test_a_single_scenario_is_a_table_of_one_row(checked, tmp_path):
     assert (row["row"], float(row["payload_m"])) == ("12", scenario["residual_peaks_m"]["payload"])
 
 
-@pytest.mark.slow
 def test_of_a_large_group_all_rows_are_there_and_the_same_every_time(checked, tmp_path):
     words = ("check", checked / "paper.csv", "--samples", "120", "--csv")
     document = json.loads(run_here(*words, tmp_path / "one.csv", "--json").out)["check"]

@@ -315,6 +315,7 @@ def test_nobody_who_takes_the_outcome(deployed):
     assert done.returncode == 6
 
 
+@pytest.mark.slow
 def test_sigterm_stops_the_axis(deployed, monkeypatch, hasty):
     send, sent = Pacer.send, []
 

@@ -177,6 +177,18 @@ def test_designs_have_names_that_lie_on_nothing_and_an_axis_with_several_places(
     assert badges == ["least sway on the way", "least acceleration"]  # all take as long
 
 
+def test_a_limit_beyond_all_designs_is_not_drawn_at_the_edge(page):
+    look_at(page, "compare")
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+    found = page.run("""
+        return [0.001, 0.004].map((residual) => {
+            const own = {method: 'own', duration: 3.0, acceleration: 0.3, sway: 0.02, residual};
+            designs.show(null, own, [], {limit: 0.003, phrase: (word) => word});
+            return document.querySelectorAll('#pareto .limit').length;
+        })""")
+    assert found == [0, 1]
+
+
 def test_cards_that_wait_say_so(page):
     page.run("location.reload()")
     page.wait("return document.querySelector('.waiting')?.textContent")
@@ -244,19 +256,6 @@ def test_the_end_of_the_move_is_dragged_and_undone_in_one_step(page):
     page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
     page.wait(SETTLED.format("passed"))
     assert state(page) == before
-
-
-def test_a_limit_beyond_all_designs_is_not_drawn_at_the_edge(page):
-    look_at(page, "compare")
-    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
-    found = page.run("""
-        return [0.001, 0.004].map((residual) => {
-            const own = {method: 'own', duration: 3.0, acceleration: 0.3, sway: 0.02, residual};
-            designs.show(null, own, [], {limit: 0.003, phrase: (word) => word});
-            return document.querySelectorAll('#pareto .limit').length;
-        })""")
-    assert found == [0, 1]
-    page.run("location.reload()")
 
 
 def test_designs_are_pinned_and_taken(page):

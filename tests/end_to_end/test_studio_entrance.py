@@ -33,6 +33,21 @@ def browser(tmp_path):
     return program
 
 
+@pytest.fixture(scope="module")
+def chromium():
+    with start() as window:
+        yield window
+
+
+@pytest.fixture
+def window(chromium):
+    """Give a window that no studio has let in."""
+    chromium.visit("about:blank")
+    chromium.driver.execute_cdp_cmd("Network.clearBrowserCookies", {})
+    chromium.complaints()
+    return chromium
+
+
 def command_lines():
     """Read what every local user can."""
     found = []
@@ -76,8 +91,8 @@ def test_no_command_line_holds_what_lets_a_browser_in(browser, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_browser_that_is_started_shows_the_page_at_an_address_without_a_key(browser, tmp_path):
-    with studio(browser=browser) as running, start() as window:
+def test_the_browser_that_is_started_shows_the_page_at_an_address_without_a_key(browser, window, tmp_path):
+    with studio(browser=browser) as running:
         page, _ = opened_file(tmp_path / "seen")
         window.visit(page.as_uri())
         window.wait("return document.querySelector('#pill.passed') !== null")
@@ -92,9 +107,9 @@ def test_the_browser_that_is_started_shows_the_page_at_an_address_without_a_key(
 
 
 @pytest.mark.slow
-def test_a_link_holds_the_state_alone_and_a_stranger_needs_the_code():
+def test_a_link_holds_the_state_alone_and_a_stranger_needs_the_code(window):
     state = StudioState(edits={"move.duration": 3.3})
-    with studio() as running, start() as window:
+    with studio() as running:
         window.visit(f"{running.address}#{state.address}")
         assert "3.3" not in window.find("body").text
         field = window.find("input[name=word]")
@@ -108,31 +123,28 @@ def test_a_link_holds_the_state_alone_and_a_stranger_needs_the_code():
 
 
 @pytest.mark.slow
-def test_a_page_goes_on_when_the_studio_is_there_again():
-    with start() as window:
-        with studio() as running:
-            running.open(window)
-            window.wait("return document.querySelector('#pill.passed') !== null")
-            field = window.find('input[type=number][aria-label="Duration"]')
-            field.send_keys(Keys.CONTROL, "a", Keys.NULL, "3.2\n")
-            window.wait("return document.querySelector('#pill.passed') !== null && location.hash !== ''")
-            port = urlsplit(running.address).port
-        window.wait("return document.querySelector('#notice').textContent.includes('was closed')")
-        with studio("--port", str(port)) as running:
-            window.wait("return document.querySelector('#notice').textContent.includes('type the code')")
-            page = window.driver.current_window_handle
-            window.driver.switch_to.new_window("tab")
-            running.open(window)
-            window.driver.switch_to.window(page)
-            window.wait("return document.querySelector('#notice').hidden")
-            field.send_keys(Keys.CONTROL, "a", Keys.NULL, "3.3\n")
-            window.wait("return document.querySelector('#answer').textContent !== 'Solving …'")
-            window.wait("return document.querySelector('#pill.passed') !== null")
-            window.wait("return document.querySelector('#command').textContent.includes('=3.3')")
-            boxes = window.run(
-                "return [...document.querySelectorAll('#formats input')].map((box) => box.value)"
-            )
-            assert len(boxes) == len(set(boxes))
+def test_a_page_goes_on_when_the_studio_is_there_again(window):
+    with studio() as running:
+        running.open(window)
+        window.wait("return document.querySelector('#pill.passed') !== null")
+        field = window.find('input[type=number][aria-label="Duration"]')
+        field.send_keys(Keys.CONTROL, "a", Keys.NULL, "3.2\n")
+        window.wait("return document.querySelector('#pill.passed') !== null && location.hash !== ''")
+        port = urlsplit(running.address).port
+    window.wait("return document.querySelector('#notice').textContent.includes('was closed')")
+    with studio("--port", str(port)) as running:
+        window.wait("return document.querySelector('#notice').textContent.includes('type the code')")
+        page = window.driver.current_window_handle
+        window.driver.switch_to.new_window("tab")
+        running.open(window)
+        window.driver.switch_to.window(page)
+        window.wait("return document.querySelector('#notice').hidden")
+        field.send_keys(Keys.CONTROL, "a", Keys.NULL, "3.3\n")
+        window.wait("return document.querySelector('#answer').textContent !== 'Solving …'")
+        window.wait("return document.querySelector('#pill.passed') !== null")
+        window.wait("return document.querySelector('#command').textContent.includes('=3.3')")
+        boxes = window.run("return [...document.querySelectorAll('#formats input')].map((box) => box.value)")
+        assert len(boxes) == len(set(boxes))
 
 
 def half_sent(address):

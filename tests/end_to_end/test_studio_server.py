@@ -190,6 +190,7 @@ def test_what_is_no_spec_leaves_the_page_as_it_is(running, content, words):
     assert words in heard["notice"]["sentence"] and "opened" not in heard
 
 
+@pytest.mark.slow
 def test_a_log_is_read_and_forgotten(running):
     reading = {"say": "read", "number": 3, "use": "", "columns": None, "after": 0.0, "at": [], "free": []}
     reading["state"] = {"preset": "", "edits": {}}

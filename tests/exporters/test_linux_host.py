@@ -21,7 +21,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files
 from gen_profile.spec.reading import parse_spec
 
-CYCLES = 10_000
+CYCLES = 6_000
 LOOKS = 0.02  # s between calls for rows; without a pause each would be for one, and take a processor
 SPEC = parse_spec(BAY.replace("bay 3", "host 3").replace("0.004", "0.001"))
 COMMANDS = (  # cycle, inputs from there on

@@ -196,6 +196,7 @@ class TestInPython:
             np.testing.assert_array_equal(issued, played[column][1 : 1 + len(issued)])
         assert planner.live == {"L1": 5.5}
 
+    @pytest.mark.slow
     def test_a_target_of_every_cycle_is_one_command_and_a_new_one_another(self):
         planner = gp.Planner(SPEC)
         for target in (0.5, 0.5, 0.6, 0.7):

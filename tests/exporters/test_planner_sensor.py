@@ -10,6 +10,8 @@ from gen_profile.planner.design import planner_block
 from gen_profile.planner.sensor import damping_kernel, damping_room
 from gen_profile.spec.reading import preset_spec
 
+pytestmark = pytest.mark.slow
+
 LIVE = "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}"
 SENSOR = 'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}'
 SWING = "planner.disturbance={swing={payload=0.5}, settle=12.0}"
@@ -51,7 +53,6 @@ def require_limits(issued, room=0.0):
         assert np.abs(issued["fPosition"] - STANDS).max() <= room + ROUNDING
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("rope", "phase"), [(3.0, 0.4), (6.0, 3.5), (9.0, 1.9)])
 def test_a_swing_that_nobody_computed_is_damped_in_time(spec, compiled, rope, phase):
     swung = crane(compiled, rope, swing=(0.5, phase))
@@ -169,7 +170,6 @@ def test_a_sensor_that_fails_before_it_showed_anything_withdraws_the_promise(com
     assert not swung.run(0.1, bLoadAtRest=1.0)["nPromise"][-1]  # who knows may say so
 
 
-@pytest.mark.slow
 def test_a_value_that_stays_the_same_may_hide_a_gust():
     compiled = compile_counting(planner_block(preset_spec("bay-crane", [LIVE, SENSOR, GUSTS])).text)
     swung, sound = crane(compiled), {"noise": 0.002, "random": np.random.default_rng(4)}
@@ -214,7 +214,6 @@ def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compi
     assert not again["nSensorFault"][-1] and again["bSensorUsed"][-1] and again["bPromise"][-1]
 
 
-@pytest.mark.slow
 def test_a_rate_sensor_of_the_wrong_sign_is_noticed_on_a_long_rope_as_soon_as_on_a_short_one():
     rate = SENSOR.replace('"angle"', '"rate"').replace("offset=0.005", "offset=0.02")
     compiled = compile_counting(planner_block(preset_spec("bay-crane", [LIVE, rate, GUSTS])).text)
@@ -303,7 +302,6 @@ def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
     assert np.abs(issued["sway"][-500:]).max() < 0.005
 
 
-@pytest.mark.slow
 def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes():
     compiled = compile_counting(planner_block(preset_spec("slosh-tank", TANK)).text)
     random = np.random.default_rng(0)
@@ -383,7 +381,6 @@ GANTRY = [
 ]
 
 
-@pytest.mark.slow
 def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails():
     compiled = compile_counting(planner_block(preset_spec("gantry-crane", GANTRY)).text)
     gantry, random = MeasuredGantry(CountedBlock(compiled), 3.0, swing=(0.45, -0.3), cycle=0.02), np.random

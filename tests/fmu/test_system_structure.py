@@ -158,6 +158,7 @@ def planned(version, tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("version", ["2"], indirect=True)
 def test_a_planner_leads_the_plant(planned):
     with zipfile.ZipFile(planned) as opened:
         names, structure = opened.namelist(), etree.fromstring(opened.read("SystemStructure.ssd"))
@@ -175,6 +176,8 @@ def test_a_planner_leads_the_plant(planned):
     assert {"enable", "execute", "velocity", "stop", "target", "live.L1"} < inputs
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2"], indirect=True)
 def test_ecos_commands_a_planner(ecos, planned):
     rows = []
     with ecos.EcosSimulation(ssp_path=str(planned), step_size=STEP) as simulation:

@@ -23,7 +23,7 @@ from gen_profile.deployment.table import BlockTable, PlannerTable, read_table
 from gen_profile.errors import CheckFailed, DeploymentError, ExportError, OutputError
 from gen_profile.spec.reading import preset_spec
 
-FAULTS = 150
+FAULTS = 60
 
 
 @pytest.fixture(scope="module")
@@ -332,6 +332,7 @@ def test_libraries_and_single_motions_are_told_apart(tables, libraries, block):
         deploy(tables["new"], box_of(DirectLink(fresh(libraries))))
 
 
+@pytest.mark.slow
 def test_a_library_of_constants_is_deployed_likewise(libraries, unchecked, tmp_path):
     block = fresh(libraries)
     path = exported_library(tmp_path, [0.25, 0.2, 0.15], "export.plc_tables=constants")
@@ -385,6 +386,7 @@ def test_an_interruption_leaves_the_block_to_others_and_tells_what_is_used(table
     assert deploy(tables["other"], box_of(DirectLink(block))).action == "deployed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("at", "change", "words"),
     [

@@ -68,6 +68,7 @@ def log_of(rope=ROPE, *, noise=1e-3, seed=0, after=15.0, move=quintic):
     return SwingLog(times=times, values=values, quantity="rate", load="payload")
 
 
+@pytest.mark.slow
 def test_a_log_narrows_the_range_to_the_true_rope():
     learned = learn(SPEC, PLAYED, [log_of()])
     (low, high) = learned.spec.checked_ranges()["L0"]
@@ -108,6 +109,7 @@ def test_a_machine_that_changed_is_named(rope):
     assert found == pytest.approx(rope - 1.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_log_in_another_unit_is_refused():
     log = log_of(noise=1e-4)
     with pytest.raises(InfeasibleProblem, match=r"shows 3 times the rate .* look at its unit"):
@@ -131,6 +133,7 @@ def test_a_log_of_another_run_is_refused():
         )
 
 
+@pytest.mark.slow
 def test_a_sway_that_was_seen_excludes_ropes():
     after = np.linspace(LASTS + 0.2, LASTS + 12.0, 2000)
     angles, _ = pendulum(np.concatenate([[0.0], after]))
@@ -159,6 +162,7 @@ def test_ranges_never_grow(known, left):
         assert known[0] <= low <= max(known[0], left[0]) and min(known[1], left[1]) <= high <= known[1]
 
 
+@pytest.mark.slow
 def test_ranges_are_stated_where_they_were():
     given_ = {
         "robustness.uncertain": {"L0": 0.1},

@@ -60,7 +60,7 @@ def test_what_a_refusal_names_passes(tmp_path, monkeypatch):
     monkeypatch.setattr(suggestions, "CHANGES", dict([first]))
     swaying = BAY.replace("residual_sway = 0.05", "residual_sway = 0.002").replace("L1 = 0.05", "L1 = 0.1")
     (tmp_path / "bay.toml").write_text(swaying)
-    options = ("planner", "write", tmp_path / "bay.toml", "--out", tmp_path / "out", "--histories", 20)
+    options = ("planner", "write", tmp_path / "bay.toml", "--out", tmp_path / "out", "--histories", 8)
     failed = run_here(*options, "--json")
     assert failed.code == 4
     assert "It would pass" in failed.err

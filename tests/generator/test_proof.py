@@ -28,6 +28,7 @@ from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
 COUNT = 25  # histories, the fewest that have one of each group
+FEW = 12  # none of which is a rhythm
 LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 
 
@@ -114,6 +115,7 @@ def test_a_sound_block_is_proved(spec, proof):
         assert 0.9 < document["limits"][name] <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_sway_on_the_way_is_told_where_it_is_limited(proof):
     assert proof.warnings() == ()
     assert attrs.evolve(proof, sway_limit=10.0).warnings() == ()
@@ -140,6 +142,7 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
     assert 0 < len(begun) < len(many)
 
 
+@pytest.mark.slow
 def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatch):
     broken = attrs.evolve(GOOD, fault=1, cycles=0, stands=-1)
     monkeypatch.setattr(ClosedLoop, "watched", lambda *_: WatchedRun(run=broken))
@@ -256,7 +259,7 @@ def test_a_block_that_gives_commands_up_fails_and_one_that_stands_for_ever_too()
 def test_other_machines_are_proved(written, live):
     """Also one whose rope the hoist tells, and whose errors are none."""
     spec = parse_spec(written)
-    proof = prove(spec, planner_block(spec).text, histories=COUNT)
+    proof = prove(spec, planner_block(spec).text, histories=FEW)
     assert proof.reasons() == ()
     live_values = {one.history.live[live] for one in proof.judged}
     assert (min(live_values), max(live_values)) == spec.planner.live[live]
@@ -268,7 +271,7 @@ def test_other_machines_are_proved(written, live):
 def test_several_axes_are_proved_while_they_move_at_once():
     spec = parse_spec(GANTRY)
     text = planner_block(spec).text
-    proof = prove(spec, text, histories=COUNT)
+    proof = prove(spec, text, histories=FEW)
     assert proof.reasons() == ()
     document = proof.to_dict()
     names = [f"{axis}_{name}" for axis in "xy" for name in ("velocity", "acceleration", "jerk")]
@@ -364,7 +367,7 @@ def deployed(tmp_path_factory, designed):
     """The bay crane's block as the command line writes it."""
     folder = tmp_path_factory.mktemp("deployed")
     (folder / "bay.toml").write_text(BAY)
-    options = ("--out", folder, "--histories", 24, "--plot", folder / "proof.svg", "--json")
+    options = ("--out", folder, "--histories", 16, "--plot", folder / "proof.svg", "--json")
     written = run_here("planner", "write", folder / "bay.toml", *options)
     assert written.code == 0, written.err
     return folder, written.document
@@ -390,6 +393,7 @@ def test_check_repeats_the_proof_from_the_file(deployed):
     assert again["proof"] == document["proof"]
 
 
+@pytest.mark.slow
 def test_check_replays_one_history(deployed):
     folder, document = deployed
     worst = dict(document["proof"]["worst"])
@@ -431,10 +435,11 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
     assert max(found) == pytest.approx(100.0 * proof["share"], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--history", 24), "numbered from 0 to 23"),
+        (("--history", 16), "numbered from 0 to 15"),
         (("--samples", 5), "--samples: is for a motion"),
         (("--scale", "x=0.5"), "--scale: is for a motion"),
     ],
@@ -445,6 +450,7 @@ def test_what_means_nothing_for_a_block_is_refused(deployed, options, words):
     assert words in refused.err
 
 
+@pytest.mark.slow
 def test_what_only_a_design_has_is_refused_in_a_report(deployed):
     refused = run_here("report", deployed[0] / "bay 3.st", "--no-compare")
     assert refused.code == 2

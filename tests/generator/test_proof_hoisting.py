@@ -165,7 +165,7 @@ def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     """At the stated speed throughout, in corners, up and down, and with starts and stops in the others."""
     spec = parse_spec(written, changes)
     text = planner_block(spec).text
-    proof = prove(spec, text, histories=20)
+    proof = prove(spec, text, histories=12)
     assert proof.reasons() == ()
     assert proof.fraction(proof.worst) < 0.2
     ((name, rate),) = spec.planner.live_rate.items()

@@ -30,6 +30,7 @@ def groups(numbering):
     return [numbering.group(number) for number in range(numbering.count)]
 
 
+@pytest.mark.slow
 def test_a_few_histories_of_many_are_rhythms_and_one_is_a_shift(spec):
     assert groups(numbered(spec, 20)).count(RHYTHMS) == 0
     usual, deep = numbered(spec, 200), numbered(spec, 2000)

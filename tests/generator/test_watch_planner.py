@@ -14,6 +14,8 @@ from gen_profile.deployment.table import read_table
 from gen_profile.deployment.watching.watch import watch
 from gen_profile.errors import CheckFailed, DeploymentError
 
+pytestmark = pytest.mark.slow
+
 READY = (0.5, setting(bEnable=1.0, bLoadAtRest=1.0))
 TO_FIVE = (1.0, setting(fTarget=5.0, bExecute=1.0))
 

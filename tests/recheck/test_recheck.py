@@ -54,30 +54,20 @@ QUICK = (
     "robustness.uncertain={J=0.02}",
 )
 COARSE, COARSER = "export.cycle_time=0.008", "export.cycle_time=0.02"  # fewer pieces of a motion to enclose
-slow = pytest.mark.slow
 CERTIFIED = [
     SPEC,
     QUICK,
-    pytest.param(("flexible-joint", "robustness.uncertain={k=0.01, c=0.05}"), marks=slow),
-    pytest.param(("flexible-joint", "check.uncertain={}"), marks=slow),
-    pytest.param(
-        ("paper", "check.uncertain={}", "axis.unit=counts", "axis.counts_per_metre=30000"), marks=slow
-    ),
-    pytest.param(("slosh-tank", COARSE), marks=slow),
-    pytest.param(("slosh-tank", "check.uncertain={}", COARSER), marks=slow),
-    pytest.param(("slosh-tank", "plant.mu=0", "limits.sway=0.1"), marks=slow),
-    pytest.param(("mass-spring-chain", "robustness.uncertain={m3=0.02}", COARSE), marks=slow),
-    pytest.param(("mass-spring-chain", "plant.c1=2", "robustness.uncertain={k2=0.05}"), marks=slow),
-    pytest.param(("single-pendulum-crane", COARSER), marks=slow),
-    pytest.param(("single-pendulum-crane", "move.initial={phi=0.001}", COARSE), marks=slow),
-    pytest.param(("gantry-crane", COARSER), marks=slow),
-    pytest.param(
-        ("gantry-crane", "robustness.uncertain={L=0.002, c=0.02}", "limits.sway=0.4", COARSE), marks=slow
-    ),
-    pytest.param(("tower-crane", "robustness.uncertain={L=0.02}", COARSER), marks=slow),
-    pytest.param(("double-pendulum-crane", "robustness.uncertain={L1=0.02}", COARSE), marks=slow),
-    pytest.param(("double-pendulum-crane", "robustness.uncertain={m2=0.005}", COARSE), marks=slow),
-    pytest.param(("paper-beta0", "robustness.uncertain={L2=0.05}", "export.cycle_time=0.004"), marks=slow),
+    ("flexible-joint", "robustness.uncertain={k=0.01, c=0.05}"),
+    ("paper", "check.uncertain={}", "axis.unit=counts", "axis.counts_per_metre=30000"),
+    ("slosh-tank", COARSE),
+    ("slosh-tank", "check.uncertain={}", COARSER),
+    ("slosh-tank", "plant.mu=0", "limits.sway=0.1"),
+    ("mass-spring-chain", "plant.c1=2", "robustness.uncertain={k2=0.05}"),
+    ("single-pendulum-crane", "move.initial={phi=0.001}", COARSE),
+    ("gantry-crane", "robustness.uncertain={L=0.002, c=0.02}", "limits.sway=0.4", COARSE),
+    ("tower-crane", "robustness.uncertain={L=0.02}", COARSER),
+    ("double-pendulum-crane", "robustness.uncertain={m2=0.005}", COARSE),
+    ("paper-beta0", "robustness.uncertain={L2=0.05}", "export.cycle_time=0.004"),
 ]
 
 
@@ -127,6 +117,7 @@ def test_a_function_block_is_proved_again(tmp_path):
     assert check(*contents(artefact, certificate)).startswith("Proved of all machines with L0 from 2.94")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spec", CERTIFIED)
 def test_what_the_program_proves_is_proved_again(tmp_path, spec):
     artefact, certificate = certified(tmp_path, *spec)
@@ -297,7 +288,7 @@ def test_what_is_not_covered_is_said(tmp_path):
         check(*contents(artefact, certificate))
 
 
-@slow
+@pytest.mark.slow
 def test_on_the_command_line_it_says_what_it_trusts(genuine, capsys, copied):
     artefact, certificate = genuine
     manifest = artefact.with_name("manifest.json")

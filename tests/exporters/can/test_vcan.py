@@ -140,13 +140,6 @@ def test_a_frozen_streamers_drive_stops_by_itself(scenario):
     assert 0.0 < scenario.drive["position_m"][0] < 0.25
 
 
-@on("interrupted")
-def test_ctrl_c_stops_the_axis(scenario):
-    assert scenario.codes == (6, 0)
-    assert scenario.stream["reason"] == "Stopped by SIGINT. The axes were stopped."
-    assert_quick_stop(scenario)
-
-
 @on("second-controller")
 def test_a_second_controller_stops_the_axis(scenario):
     assert scenario.codes[0] == 6
