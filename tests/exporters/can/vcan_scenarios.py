@@ -79,9 +79,9 @@ def run(place, log, queue, disturb):
     )
     report = (place / "stream.json").read_text()
     if disturb is None:
-        told = json.loads(report or "{}")
-        whole = told.get("cycles_sent") == told.get("cycles_planned")  # none was skipped
-        running = whole and told.get("state") == "done" and told["drive"]["cycles_unanswered"] == 0
+        reported = json.loads(report or "{}")
+        whole = reported.get("cycles_sent") == reported.get("cycles_planned")  # none was skipped
+        running = whole and reported.get("state") == "done" and reported["drive"]["cycles_unanswered"] == 0
     late = [float(ms) / 1e3 for ms in re.findall(r"([\d.]+) ms late at cycle", report)]
     stalled = any(seconds < FROZEN - 0.1 for seconds in late) if disturb is _freeze else bool(late)
     return running and not stalled and "no heartbeat" not in report
