@@ -150,7 +150,7 @@ def _changed(line: str) -> Iterator[tuple[str, str]]:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Machine:
-    """A machine, histories, and what became of the sound block in each."""
+    """A machine, histories, and what became of the sound block in each, once that is tried."""
 
     name: str
     spec: Spec
@@ -159,11 +159,11 @@ class Machine:
     histories: Histories
     drawn: Sequence[History]
     groups: Sequence[str]
-    shown: list[JudgedHistory]
+    shown: list[JudgedHistory] = attrs.field(factory=list)
 
 
 def machine(name: str, spec: Spec, count: int) -> Machine:
-    """Look at what the sound block does."""
+    """Draw a machine's histories."""
     captured = list[block.PlannerConstants]()
     text_of, design.block_text = (
         design.block_text,
@@ -179,7 +179,6 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
     drawn = [(numbering.group(number), numbering.history(number)) for number in range(count)]
     random.Random(name).shuffle(drawn)
     groups, drawn = zip(*drawn, strict=True)
-    judgements = [one for _, one in judged(spec, text, histories, drawn, groups)]
     return Machine(
         name=name,
         spec=spec,
@@ -188,8 +187,12 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
         histories=histories,
         drawn=drawn,
         groups=groups,
-        shown=judgements,
     )
+
+
+def sound(one: Machine) -> list[JudgedHistory]:
+    """Look at what the sound block does."""
+    return [found for _, found in judged(one.spec, one.text, one.histories, one.drawn, one.groups)]
 
 
 def judged(
@@ -403,13 +406,12 @@ def quick_compiler() -> Compiler:
     return attrs.evolve(found, command=command, identity=f"{found.identity} -Og")
 
 
-def machine_of(given: tuple[str, int]) -> Machine:
-    """Look at what the sound block does on one of these machines."""
-    name, count = given
-    return machine(name, MACHINES[name], count)
-
-
 _shared: list[Machine] = []  # of a worker, which has them from its parent
+
+
+def sound_at(place: int) -> list[JudgedHistory]:
+    """Look at what the sound block does on one of the machines."""
+    return sound(_shared[place])
 
 
 def tried(numbered: tuple[int, Mutant]) -> tuple[int, Mutant, str, str, float]:
@@ -432,23 +434,25 @@ def main() -> None:
         os.environ["GEN_PROFILE_CACHE"] = cache  # compiled mutants are of no use later
         quick = quick_compiler()
         execution.find_compiler = lambda: quick
-        asked = [(name, arguments.histories) for name in arguments.machines or MACHINES]
+        _shared.extend(
+            machine(name, MACHINES[name], arguments.histories) for name in arguments.machines or MACHINES
+        )
         with get_context("fork").Pool(arguments.workers) as pool:
-            machines = pool.map(machine_of, asked, chunksize=1)
-        for one in machines:
-            sound = Counter(kind for history in one.shown for kind in kinds_of(one.spec, history))
-            print(f"{one.name}, sound: {dict(sound)}", flush=True)
-        report(machines, arguments)
+            shown = pool.map(sound_at, range(len(_shared)), chunksize=1)
+        for one, found in zip(_shared, shown, strict=True):
+            one.shown.extend(found)
+            faults = Counter(kind for history in one.shown for kind in kinds_of(one.spec, history))
+            print(f"{one.name}, sound: {dict(faults)}", flush=True)
+        report(arguments)
 
 
-def report(machines: list[Machine], arguments: argparse.Namespace) -> None:
+def report(arguments: argparse.Namespace) -> None:
     """Try mutants side by side, and print what became of each, and of all."""
     known, tally, survivors, ways = listed(), Counter[str](), list[str](), Counter[str]()
-    those = list(enumerate(chosen(machines, arguments.count, arguments.seed)))
+    those = list(enumerate(chosen(_shared, arguments.count, arguments.seed)))
     asked = [one for one in those if arguments.only is None or one[0] in arguments.only]
     drawn = [one for one in asked if one[1].key not in known]
     tally["listed"] = len(asked) - len(drawn)
-    _shared.extend(machines)
     with get_context("fork").Pool(arguments.workers) as pool:
         for number, mutant, what, how, took in pool.imap_unordered(tried, drawn):
             tally[what] += 1
