@@ -5,12 +5,14 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
 from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
 from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.problem.linearization import linearize
+from gen_profile.proof.habits import Change
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, GustSpec, SensorSpec
 from gen_profile_fmu.running.block_run import BlockRun, Measurement
@@ -163,6 +165,20 @@ class SensedHistory:
         return self.fault == "dead"
 
     @property
+    def aged(self) -> bool:
+        """Whether it tells an old value where there is no news, and its age."""
+        return self.seed % 2 > 0 and self.lost > 0.0
+
+    def ages(self, spec: Spec, cycle: float) -> Iterator[Change]:
+        """Give what its input for that is told then, where a cycle takes so many s."""
+        sensor, _ = _stated(spec)
+        first = int(np.ceil(self.lost / cycle))
+        for k in range(round(LOST * sensor.drop_out / cycle) * self.aged):
+            age = (round(self.delay / cycle) + k + 1) * cycle
+            inputs = {planned_axes(spec)[number].of(SENSOR[2]): age for number in sensed_directions(spec)}
+            yield Change(time=(first + k) * cycle, lasts=0.0, inputs=inputs)
+
+    @property
     def ends(self) -> float:
         """When the last gust does, or the sensor fails, in s."""
         return max([self.fails if self.fault else 0.0, *(gust.time + gust.lasts for gust in self.gusts)])
@@ -209,7 +225,7 @@ class SensedHistory:
         gain, added, age, valid = rows.T
         gain[:], added[:] = 1.0, self.offsets[place] + sensor.noise * random.standard_normal(cycles)
         age[:], valid[:] = round(self.delay / cycle), 1.0
-        valid[(times >= self.lost) & (times < self.lost + LOST * sensor.drop_out)] = 0.0
+        self._lose(rows, np.flatnonzero((times >= self.lost) & (times < self.lost + LOST * sensor.drop_out)))
         first = min(round(self.fails / cycle), cycles - 1)
         match self.fault if place == self.failing else "":
             case "silent":
@@ -238,6 +254,15 @@ class SensedHistory:
             case "drop-outs":
                 valid[first:] = _coming_and_going(LOST * sensor.drop_out / cycle, cycles - first, random)
         return rows
+
+    def _lose(self, rows: Array, lost: NDArray[np.intp]) -> None:
+        """Let there be no news in some cycles; or the last value, whose age is told."""
+        _, added, age, valid = rows.T
+        if self.aged:
+            age[lost] += 1.0 + np.arange(len(lost))
+            added[lost] = added[lost[:1] - 1]
+        else:
+            valid[lost] = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
