@@ -103,6 +103,9 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (100, 4, 57),  # 2.7 s late, as what half of a long plan leaves was calmed
         (300, 140, 204),  # a setpoint that jumped by 3 mm, as a kernel in work was dropped for a stick
     ],
+    "followed": [
+        (128, 5, 20),  # a setpoint that jumped by 0.22 m, as one axis was weighed before calming, one after
+    ],
     "measured": [
         (2000, 1003, 112),  # an override that was not obeyed for 20 s, as the load was damped on the way
         (2000, 1007, 1110),  # no fault: fSensorScale was judged in the cycle of bReset

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
 from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
-from gen_profile.planner.sensor import damping_room, largest_innovation
+from gen_profile.planner.sensor import damping_room, estimation_error, largest_innovation, stiffness_error
 from gen_profile.problem.linearization import linearize
 from gen_profile.proof.habits import Change
 from gen_profile.spec.model import Spec
@@ -43,6 +43,7 @@ JUMP = 2.2  # by the greatest difference from what is expected that counts as a 
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
+UNSURE, LATE = 0.2, 0.3  # of all that is stated, by which it may be in any case; more by the whole delay
 STRONG = 1.5  # own motions by what else swings, root mean square of a period, at which that is known
 KNOWN_TO = 0.4  # (0.35)
 LEAKY = 0.3  # damping ratio by which what is shown of them is forgotten
@@ -274,6 +275,26 @@ def sensed(spec: Spec, choices: Sequence[float] | Array) -> bool:
     return spec.planner.sensor is not None and bool(choices[0] >= NONE)
 
 
+def estimation_errors(spec: Spec) -> tuple[float, float]:
+    """Find by how much, in m, an estimate may be off by stated gusts, and by stated errors of frequencies."""
+    return estimation_error(spec, errors=0.0), estimation_error(spec, gusts=0.0)
+
+
+def may_be_off(spec: Spec, one: SensedHistory, stated: tuple[float, float], stiffness: float) -> float:
+    """Tell by how much, in m, an estimate may be off in a history beside what it states.
+
+    By the share of the `estimation_errors` that gusts and frequencies make there, whose squares differ by
+    `stiffness` from those told; and by some of them as the delay is not known.
+    """
+    sensor, disturbance = _stated(spec)
+    gust = max((abs(gust.acceleration) for gust in one.gusts), default=0.0)
+    shares = gust / disturbance.gust.acceleration if disturbance.gust else 0.0, stiffness_error(spec)
+    wrong = min(1.0, stiffness / shares[1]) if shares[1] else 0.0
+    low, high = sensor.delay
+    late = abs(2.0 * one.delay - low - high) / (high - low) if high > low else 0.0
+    return max(shares[0] * stated[0] + wrong * stated[1], (UNSURE + LATE * late) * sum(stated))
+
+
 def sensor_faults(
     spec: Spec,
     one: SensedHistory,
@@ -298,7 +319,7 @@ def sensor_faults(
     cycle, period, last : float
         s: a cycle, the slowest swing, and when the last command came, or an input last changed.
     estimation_error : float
-        m, by which an estimate may be off beside what it states, from `estimation_error`.
+        m, by which an estimate `may_be_off`.
     resets : sequence of float
         s, when bReset was set.
     """
