@@ -4,10 +4,11 @@ A mutant changes one place of one part of the text, or one constant. It is kille
 fault that the sound block does not show there, or leaves more sway than is allowed. Drawn are mutants that
 change the block of one of the machines at least; `--seed` draws others.
 
-Of those that survive, some are slower: commands of one kind are carried out later than by the sound block on
-average. Others are as good: axes move otherwise, without a fault and as quickly. The rest change nothing in
-any history. ``equivalent_mutants.toml`` lists those that a proof cannot kill, with the reason why; they are
-counted apart. Blocks are compiled by ``cc -Og``, if there is one: that takes longest.
+Others are slower: commands of one kind are carried out later than by the sound block on average. Either is
+noticed. Some are as good: axes move otherwise, without a fault and as quickly. The rest change nothing in the
+first quarter of a machine's histories, after which no more are tried. ``equivalent_mutants.toml`` lists those
+that a proof cannot kill, with the reason why; they are counted apart. Blocks are compiled by ``cc -Og``, if
+there is one.
 """
 
 from __future__ import annotations
@@ -33,30 +34,36 @@ import attrs
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from planned_machines import GANTRY, HOIST
+from planned_machines import FORMER, GANTRY, HOIST
 
 from gen_profile.errors import GenProfileError
 from gen_profile.planner import design, execution
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
-from gen_profile.proof.numbering import DRAWS, Numbering
+from gen_profile.proof.numbering import DRAWS, RHYTHMS, SEARCH, Numbering
 from gen_profile.proof.verdict import JudgedHistory, kind_of, late_on_average, lateness
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.planner import block
+from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_fmu.building import compiler
 from gen_profile_fmu.building.compiler import Compiler
 
 SLOWER = 0.02  # slow periods, by which a mutant is later on average
+CERTAIN = 0.1  # of them, by which a quarter of the histories will do
 AT_ONCE = 8  # histories between looks at whether a mutant is killed
+QUARTER = 4  # share of the histories after which a machine is left on which nothing is otherwise
+NOTICED = ("killed", "slower")
 OPPOSITE = {"<": ">=", ">": "<=", "<=": ">", ">=": "<", "=": "<>", "<>": "="}
 COMPARED = re.compile(r" (<=|>=|<>|<|>|=) ")
 ASSIGNED = re.compile(r"( *(?:IF .* THEN )?)(\w+(?:\[[^]]*\])?) := (.*?);(.*)")
 DECIDED = re.compile(r"( *(?:ELS)?IF) (.*) THEN(.*)")
 NUMBER = re.compile(r"(?<![\w.])(\d+\.\d+(?:E[+-]?\d+)?)")
 AXIS = re.compile(r"\[(n(?:Plan)?Axis)\]")
-CONSTANT = re.compile(r"(?m)^ *(c\w+) : (ARRAY \[[^]]*\] OF )?(LREAL|DINT) := \[?([^;\]]*)\]?;")
+CONSTANT = re.compile(r"(?m)^\s*(c\w+) : (ARRAY \[[^]]*\] OF )?LREAL := \[?([^;\]]*)\]?;")
+FACTORS = (0.5, 0.8, 1.25, 2.0)
+FIRST = 2  # numbers of an array: in later ones of a polynomial little is to be seen
 ROUNDING, BEYOND = 1e-5, 1e6  # numbers that are as good half as great again: of rounding, and beyond all
 UNKNOWN = {"interface", "costs"}  # declarations; what a step may cost, which other tests count
 LISTED = Path(__file__).with_name("equivalent_mutants.toml")
@@ -101,12 +108,11 @@ def mutants(text: str) -> Iterator[Mutant]:
             for number, line in enumerate(_code(path.read_text("ascii"))):
                 for way, now in _changed(line):
                     yield Mutant(way=way, part=path.stem, line=number, now=now, before=line)
-    for name, _, kind, values in CONSTANT.findall(text):
-        for place, value in enumerate(values.split(",")):
-            if kind == "LREAL" and float(value):
-                for factor in (0.5, 0.8, 1.25, 2.0):
-                    now = repr(factor * float(value))
-                    yield Mutant(way="constant", part=name, line=place, now=now, before=value)
+    for name, _, values in CONSTANT.findall(text):
+        for place, value in enumerate(values.split(",")[:FIRST]):
+            if float(value):
+                for factor in FACTORS:
+                    yield Mutant(way="constant", part=name, line=place, now=f"{factor} *", before="")
 
 
 def _code(text: str) -> list[str]:
@@ -144,7 +150,7 @@ def _changed(line: str) -> Iterator[tuple[str, str]]:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Machine:
-    """A machine, histories, and what became of the sound block in each."""
+    """A machine, histories, and what became of the sound block in each, once that is tried."""
 
     name: str
     spec: Spec
@@ -153,11 +159,11 @@ class Machine:
     histories: Histories
     drawn: Sequence[History]
     groups: Sequence[str]
-    shown: list[JudgedHistory]
+    shown: list[JudgedHistory] = attrs.field(factory=list)
 
 
 def machine(name: str, spec: Spec, count: int) -> Machine:
-    """Look at what the sound block does."""
+    """Draw a machine's histories."""
     captured = list[block.PlannerConstants]()
     text_of, design.block_text = (
         design.block_text,
@@ -172,8 +178,12 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
     numbering = attrs.evolve(numbering, parents=((),) * len(numbering.rounds))
     drawn = [(numbering.group(number), numbering.history(number)) for number in range(count)]
     random.Random(name).shuffle(drawn)
-    groups, drawn = zip(*drawn, strict=True)
-    judgements = [one for _, one in judged(spec, text, histories, drawn, groups)]
+    drawn.sort(key=lambda one: one[0] != RHYTHMS)  # in these most is left by errors
+    former = [
+        (SEARCH, Numbering.of(histories, *numbers[:2]).history(numbers[2]))
+        for numbers in FORMER.get(name, ())
+    ]
+    groups, drawn = zip(*former, *drawn, strict=True)
     return Machine(
         name=name,
         spec=spec,
@@ -182,8 +192,12 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
         histories=histories,
         drawn=drawn,
         groups=groups,
-        shown=judgements,
     )
+
+
+def sound(one: Machine) -> list[JudgedHistory]:
+    """Look at what the sound block does."""
+    return [found for _, found in judged(one.spec, one.text, one.histories, one.drawn, one.groups)]
 
 
 def judged(
@@ -244,10 +258,10 @@ def altered(text: str, mutant: Mutant) -> str:
     def changed(found: re.Match[str]) -> str:
         if found[1] != mutant.part:
             return found[0]
-        values = found[4].split(",")
+        values = found[3].split(",")
         if mutant.line < len(values):
-            values[mutant.line] = mutant.now
-        return found[0].replace(found[4], ",".join(values))
+            values[mutant.line] = literal(float(mutant.now.split()[0]) * float(values[mutant.line]))
+        return found[0].replace(found[3], ",".join(values))
 
     return CONSTANT.sub(changed, text)
 
@@ -283,32 +297,48 @@ def chosen(machines: list[Machine], count: int, seed: str) -> Iterator[Mutant]:
                 return
 
 
+def tried_on(mutant: Mutant, one: Machine) -> tuple[str, str, float, int, int]:
+    """Tell what becomes of one, how, how much later, in how many histories otherwise, and of how many."""
+    found_all, otherwise = list[JudgedHistory](), 0
+    try:
+        for number, found in judged(one.spec, mutated(one, mutant), one.histories, one.drawn, one.groups):
+            sound = one.shown[number]
+            if number == len(one.drawn) // QUARTER and (not otherwise or later(found_all, one)[0] > CERTAIN):
+                break
+            found_all.append(found)
+            if new := kinds_of(one.spec, found) - kinds_of(one.spec, sound):
+                return "killed", f"{one.name} {number}: {'; '.join(sorted(new))}", 0.0, 1, number
+            otherwise += found.on_the_way != sound.on_the_way or found.residual != sound.residual
+    except GenProfileError as error:
+        return "killed", f"{one.name}: no block: {str(error)[:80]}", 0.0, 1, 0
+    if new := next(late_on_average(found_all), ""):
+        return "killed", f"{one.name}: {new}", 0.0, 1, 0
+    slowest, kind = later(found_all, one)
+    how = f"{one.name}: {kind} later on average by {slowest:.2g} slow periods"
+    what = "slower" if slowest > SLOWER else "as good" if otherwise else "unchanged"
+    return what, how, slowest, otherwise, len(found_all)
+
+
 def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str, str]:
-    """Tell what becomes of one, and by which judge on which machine, or how much later it is."""
-    slowest, otherwise, count = (0.0, "nothing"), 0, 0
+    """Tell what becomes of one on the first machine that notices it, or on all."""
+    found = []
     for one in machines:
-        if not changes(one, mutant):
-            continue
-        text, found_all = mutated(one, mutant), list[JudgedHistory]()
-        try:
-            for number, found in judged(one.spec, text, one.histories, one.drawn, one.groups):
-                sound = one.shown[number]
-                found_all.append(found)
-                if new := kinds_of(one.spec, found) - kinds_of(one.spec, sound):
-                    return "killed", f"{one.name} {number}: {'; '.join(sorted(new))}"
-                otherwise += found.on_the_way != sound.on_the_way or found.residual != sound.residual
-        except GenProfileError as error:
-            return "killed", f"{one.name}: no block: {str(error)[:80]}"
-        if new := next(late_on_average(found_all), ""):
-            return "killed", f"{one.name}: {new}"
-        count += len(found_all)
-        late, before = means(found_all), means(one.shown)
-        slowest = max(slowest, *((late[kind] - before[kind], f"{one.name}: {kind}") for kind in late))
+        if changes(one, mutant):
+            what, how, *_ = result = tried_on(mutant, one)
+            if what in NOTICED:
+                return what, how
+            found.append(result)
+    _, how, _, _, _ = max(found, key=lambda result: result[2])
+    otherwise, count = (sum(result[place] for result in found) for place in (3, 4))
     if not otherwise:
         return "unchanged", f"in {count} histories"
-    what = "slower" if slowest[0] > SLOWER else "as good"
-    how = f"{slowest[1]} later on average by {slowest[0]:.2g} slow periods"
-    return what, f"{how}; otherwise in {otherwise} of {count} histories"
+    return "as good", f"{how}; otherwise in {otherwise} of {count} histories"
+
+
+def later(found: Sequence[JudgedHistory], one: Machine) -> tuple[float, str]:
+    """Tell by how many slow periods these are later than with the sound block, on average, and in what."""
+    late, before = means(found), means(one.shown[: len(found)])
+    return max((late[kind] - before[kind], kind) for kind in late)
 
 
 def means(histories: Sequence[JudgedHistory]) -> dict[str, float]:
@@ -327,6 +357,9 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
             *(CYCLE, "planner.events=true", "planner.live_rate={L1=0.2}"),
             *("check.uncertain={L1=0.01}", "check.residual_sway=0.02"),
         ],
+    ),
+    "followed": parse_spec(
+        GANTRY, [CYCLE, "planner.live_rate={L=0.1}", "check.uncertain={L=0.01}", "check.residual_sway=0.02"]
     ),
     "tight": preset_spec("bay-crane", [CYCLE, "check.residual_sway=0.025"]),
     "slow": parse_spec(
@@ -384,6 +417,11 @@ def quick_compiler() -> Compiler:
 _shared: list[Machine] = []  # of a worker, which has them from its parent
 
 
+def sound_at(place: int) -> list[JudgedHistory]:
+    """Look at what the sound block does on one of the machines."""
+    return sound(_shared[place])
+
+
 def tried(numbered: tuple[int, Mutant]) -> tuple[int, Mutant, str, str, float]:
     """Try one, and time it."""
     began = perf_counter()
@@ -395,7 +433,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=100, help="mutants that are not listed")
     parser.add_argument("--seed", default="mutants")
-    parser.add_argument("--histories", type=int, default=64)
+    parser.add_argument("--histories", type=int, default=192, help="of each machine")
     parser.add_argument("--machines", nargs="*", choices=MACHINES, help="just these")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", type=int, nargs="*", help="just those of these numbers")
@@ -404,33 +442,41 @@ def main() -> None:
         os.environ["GEN_PROFILE_CACHE"] = cache  # compiled mutants are of no use later
         quick = quick_compiler()
         execution.find_compiler = lambda: quick
-        machines = [
+        _shared.extend(
             machine(name, MACHINES[name], arguments.histories) for name in arguments.machines or MACHINES
-        ]
-        for one in machines:
-            sound = Counter(kind for history in one.shown for kind in kinds_of(one.spec, history))
-            print(f"{one.name}, sound: {dict(sound)}", flush=True)
-        report(machines, arguments)
+        )
+        with get_context("fork").Pool(arguments.workers) as pool:
+            shown = pool.map(sound_at, range(len(_shared)), chunksize=1)
+        for one, found in zip(_shared, shown, strict=True):
+            one.shown.extend(found)
+            faults = Counter(kind for history in one.shown for kind in kinds_of(one.spec, history))
+            print(f"{one.name}, sound: {dict(faults)}", flush=True)
+        report(arguments)
 
 
-def report(machines: list[Machine], arguments: argparse.Namespace) -> None:
+def report(arguments: argparse.Namespace) -> None:
     """Try mutants side by side, and print what became of each, and of all."""
     known, tally, survivors, ways = listed(), Counter[str](), list[str](), Counter[str]()
-    those = list(enumerate(chosen(machines, arguments.count, arguments.seed)))
+    those = list(enumerate(chosen(_shared, arguments.count, arguments.seed)))
     asked = [one for one in those if arguments.only is None or one[0] in arguments.only]
     drawn = [one for one in asked if one[1].key not in known]
     tally["listed"] = len(asked) - len(drawn)
-    _shared.extend(machines)
     with get_context("fork").Pool(arguments.workers) as pool:
         for number, mutant, what, how, took in pool.imap_unordered(tried, drawn):
             tally[what] += 1
             if what == "killed":
                 ways[how.partition(": ")[2].partition(";")[0]] += 1
-            else:
+            elif what not in NOTICED:
                 survivors.append(f"{what}: {number}: {mutant} ({how})")
             print(f"{number}: {mutant}\n    {what}: {how} ({took:.1f} s)", flush=True)
-    print(f"{dict(tally)}; by judge: {dict(ways.most_common())}")
-    print("not killed:", *sorted(survivors), sep="\n  ")
+    noticed = sum(tally[what] for what in NOTICED)
+    print(f"by judge: {dict(ways.most_common())}")
+    print("not noticed:", *sorted(survivors), sep="\n  ")
+    print(
+        f"{noticed} of {len(drawn)} that are not listed as equivalent are noticed: {tally['killed']} killed, "
+        f"{tally['slower']} slower; {tally['as good']} are as good, {tally['unchanged']} change nothing; "
+        f"{tally['listed']} more are listed."
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Machines that planner blocks are proved for, and the double pendulum by equations of its own."""
+"""Machines that planner blocks are proved for, what they once failed, and a double pendulum of its own."""
 
 import numpy as np
 
@@ -48,6 +48,71 @@ export = { cycle_time = 0.001 }
 x = { velocity = 1.0, acceleration = 0.3, jerk = 1.0, travel = [0.0, 40.0] }
 y = { velocity = 0.5, acceleration = 0.4, jerk = 1.0, travel = [0.0, 12.0] }
 """
+FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed, number
+    "zones": [
+        (300, 34, 9),  # error 8, as an axis came out of a blocked interval and went on
+        (400, 1, 51),  # a stick followed 9 s too late: the first pulse after its plan was lost
+        (400, 5, 58),  # a stick that exceeded a slow interval by 0.115 m/s
+        (400, 12, 233),  # a pulse beyond the ends that were stated meanwhile, by 0.5 mm
+        (400, 12, 237),  # error 8, where a plan began beside a blocked interval
+        (400, 7, 167),  # 19 mm beyond the stated ends of a stop
+        (300, 12, 23),  # judged by the rope of its beginning, while it planned for another one
+        (200, 2, 134),  # a stop 0.1 s late, sought along the motion of an axis that turns round
+        (300, 144, 153),  # no fault: another rope was given in the first cycle, so the first one never was
+        (200, 4, 4),  # no fault: judged by the time that it was in a slow interval, too
+        (
+            1000,
+            7001,
+            490,
+        ),  # no fault: a slow interval's limit holds three slots before it, where the target was
+    ],
+    "slow": [
+        (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
+        (300, 8, 58),  # 15 cm beyond the stated ends, as a pulse was weighed where the override became 0
+        (300, 5, 39),  # fTimeToGo half of what it took pulses to turn round
+        (225, 5, 64),  # a rope that came with a command, as that of before was being taken over: 7 mm left
+        (225, 5, 125),  # 2.6 s late, as from rest a plan for the target before led away from the new one
+        (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
+        (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
+        (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
+        (400, 13, 106),  # it stood as long as its rope changed, as that was taken over again and again
+        (400, 12, 20),  # stop ends 10⁹ m away in a cycle without bEnable, in which a pulse had been weighed
+        (400, 2, 35),  # a stick 3.4 s late, as what was taken away of a motion that speeds up was nothing
+        (400, 13, 12),  # moved by a tap that was given before the machine was known
+        (300, 31, 97),  # fTimeToGo 8 s too short where an axis turned round, as that of the stop was stated
+        (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
+        (300, 143, 44),  # fTimeToGo 8 s too short in a stop's last two slots, before the axis turned round
+    ],
+    "wide": [
+        (400, 10, 87),  # 4 s against a stick of two axes, one of which was too fast for a plan
+        (300, 43, 144),  # a stop 4 s late, as each search began with too few slots
+        (300, 83, 197),  # a stop 4 s late, as searches that came too late went on as if they had not
+        (300, 80, 155),  # never ready again: disabled while a plan was sought with what was just taken over
+    ],
+    "damped": [
+        (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
+        (300, 5, 97),  # 11 s late at a target
+    ],
+    "hoisted": [
+        (300, 5, 172),  # 15 mm beyond them
+        (300, 5, 192),  # at a fifth of full speed, as calming broke the pulses' rise off
+        (150, 1, 43),  # a plan by the rope of 60 s ago, as a stick had held the axis at its end
+        (150, 1, 93),  # a stop 6 s late: plans to a stick's velocity left no time to learn of the rope
+        (200, 1, 80),  # a target 0.5 s late, as nothing made up for slots that calmed
+        (200, 2, 81),  # a stick 0.6 s late, as a pulse was cut before the axis stood
+        (225, 3, 9),  # a stop 4.8 s late, as its stated ends left too little room for calming
+        (100, 4, 57),  # 2.7 s late, as what half of a long plan leaves was calmed
+        (300, 140, 204),  # a setpoint that jumped by 3 mm, as a kernel in work was dropped for a stick
+    ],
+    "followed": [
+        (128, 5, 20),  # a setpoint that jumped by 0.22 m, as one axis was weighed before calming, one after
+    ],
+    "measured": [
+        (2000, 1003, 112),  # an override that was not obeyed for 20 s, as the load was damped on the way
+        (2000, 1007, 1110),  # no fault: fSensorScale was judged in the cycle of bReset
+        (2000, 1002, 725),  # damped 4.5 s late, as the last 5 mm took the axis 6 s
+    ],
+}
 
 
 def swing(time, acceleration, m1, m2, L1, L2, **_):

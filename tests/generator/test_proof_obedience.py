@@ -443,3 +443,23 @@ def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
 def test_a_live_parameter_that_changes_on_the_way_ends_the_promise():
     assert kind_of(WORDS["kept"]) in kinds(attrs.evolve(obedient(), live_changes=[(300, 350)]))
     assert kinds(attrs.evolve(obedient(), live_changes=[(1000, 1050)])) == set()  # it is taken over
+
+
+def test_what_is_left_goes_with_the_root_of_the_period_where_a_rope_changes_at_rest():
+    """After the stop, from 2 rad/s to 1: √2 times as much, to 10 %."""
+    changed = CYCLES - 900
+    slower = attrs.evolve(MODES, poles=0.5 * MODES.poles)
+    for factor, wrong in (
+        (2.0**0.5, set()),
+        (1.5, set()),
+        (1.0, {"fSwayLeft is wrong"}),
+        (1.6, {"fSwayLeft is wrong"}),
+    ):
+        followed = with_output("fSwayLeft", slice(None), 0.01)
+        followed.issued["fSwayLeft"][changed:] *= factor
+        known = {"live_changes": [(changed, changed + 9)], "last_known": changed + 9, "last_modes": slower}
+        retold = np.arange(CYCLES) >= changed
+        assert (
+            kinds(attrs.evolve(followed, modes=MODES, retold=retold, **known)) & {"fSwayLeft is wrong"}
+            == wrong
+        )

@@ -40,6 +40,7 @@ OUTSIDE = 0.03  # share of the histories that begin before the travel, or behind
 ROUGH_SHARE = 0.35  # share of the histories in which the load may be left swinging
 ALONE = 0.1  # half the share of stick commands that leave one of several axes alone
 LEGS = 8  # of one speed each, in which a live parameter changes on the way
+HOISTED_AFTER, RESTS = 0.4, 8.0  # share of the rhythms after which ropes change; and periods after the stop
 HOISTED_ON = 2.0  # periods after the last command in which it still may
 
 _PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
@@ -302,6 +303,7 @@ class Histories:
         rough = swings * (BRAKING if is_sensed else len(ROUGH))
         if 0.0 < lasts < SHIFT:
             manners = [rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)]
+            manners.append(self._hoisted_at_rest(rows.ravel()[5 + axes], manners[0].commands[-1].time))
         else:
             rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
             manners = [*self._manners(rows, first, manner, ending, rough=rough, lasts=lasts)]
@@ -316,9 +318,20 @@ class Histories:
             commands=commands,
             axes=self.axes,
             hoisting=self._hoisting(legs, live_values, commands[-1].time),
-            changes=(*self._zones(starts, first, amount), *chain(*(one.changes for one in manners))),
+            changes=(
+                *self._zones(starts, first, amount),
+                *chain(*(one.changes for one in manners)),
+                *(found.ages(self.spec, self.spec.export.cycle_time) if found else ()),
+            ),
             sensed=found,
         )
+
+    def _hoisted_at_rest(self, choice: float, last: float) -> Manner:
+        """Tell other live parameters after some of the rhythms, as the axes rest."""
+        live = {} if choice > HOISTED_AFTER or self.spec.planner.live_rate else self.spec.planner.live
+        given = {f"f{name}": _between(ends, choice / HOISTED_AFTER) for name, ends in live.items()}
+        change = Change(time=last + RESTS * self.period, lasts=inf, inputs=given)
+        return Manner(commands=(), changes=(change,) if given else ())
 
     def _hoisting(
         self, choices: Array, live_values: Mapping[str, float], last: float

@@ -49,6 +49,7 @@ BESIDE, MOST_BESIDE = 1e-4, 500.0  # of the allowed sway, likewise; and how ofte
 EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
+RESCALED = 0.1  # of what is left, by which it may differ after live parameters have changed
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 ACTS = 2.0  # slots, in which what a stick asked for is led to
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
@@ -412,6 +413,7 @@ def taken_over(run: Followed) -> Iterator[Allowance]:
 def remains(run: Followed) -> Iterator[Allowance]:
     """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
     yield from _remains_at_last(run)
+    yield from _swings_on(run)
     unknown = [order.begin for order in run.orders if order.kind in (QUICK_STOP, DISABLED)]
     unknown += [*run.rest_reports, *np.flatnonzero(run.retold)[:1].tolist()]
     until = min(unknown, default=run.cycles)
@@ -450,6 +452,24 @@ def _remains_at_last(run: Followed) -> Iterator[Allowance]:
         left, *_ = run.last_modes.left(run.acceleration[:, rests[0] :], ends, run.cycle)
         worst = int(np.argmax(left))
         yield Allowance("swings", rests[1 + worst], float(left[worst]), UNDISTURBED * run.sway_limit)
+
+
+def _swings_on(run: Followed) -> Iterator[Allowance]:
+    """Judge that what is left keeps its action where live parameters change at rest: it goes with 1/√ω."""
+    stated = run.issued.get("fSwayLeft")
+    if stated is None or run.modes is None or run.last_modes is None or run.modes.damped:
+        return
+    after = run.last_known + run.after(ENABLED + run.reaction)
+    begins = {begin for begin, known in run.live_changes if known == run.last_known}
+    if not begins or after >= run.cycles or len({*run.live_changes}) > 1:
+        return
+    own = slice(min(begins) - 1, after + 1)
+    if not (run.stands & run.guided)[own].all() or any(own.start < at <= after for at in run.rest_reports):
+        return
+    roots = np.sqrt(run.modes.poles[:, 0].imag / run.last_modes.poles[:, 0].imag)
+    before, now = stated[own.start], stated[after]
+    wrong = max(now - roots.max() * before, roots.min() * before - now)
+    yield Allowance("sway left", after, float(wrong), RESCALED * float(before))
 
 
 JUDGES = (truths, velocities, stops, numbers, promises, remains, events, blocked, slowed, taken_over)
