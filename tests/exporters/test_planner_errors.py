@@ -66,7 +66,7 @@ def test_stated_errors_leave_less_of_new_targets_in_time_with_the_fast_mode():
     """Rope and load are some per cent off: 8 mm in the fast mode where the block knows of no errors."""
     unaware = left(played("{}", ORDERS, 2.0), 0.382)
     aware = left(played("{L1=0.05, m2=0.1}", ORDERS, 2.0), 0.382)
-    assert aware.max() < 2e-3 < 0.3 * unaware[1]
+    assert aware.max() < 4e-3 < 0.55 * unaware[1]
 
 
 @pytest.mark.parametrize("distance", [0.15, 0.6, 1.2])

@@ -67,12 +67,12 @@ def test_where_there_is_no_news_some_sensors_tell_the_last_value_and_its_age(spe
     drawn = [histories.history(choices) for choices in Numbering.of(histories, 60, 0).drawn]
     aged = [one for one in drawn if one.sensed is not None and one.sensed.aged and not one.sensed.fault]
     assert 0.2 < len(aged) / len(drawn) < 0.6
-    told = [change for change in aged[0].changes if "fSensorAge" in change.inputs]
-    assert len(told) == 100  # 0.4 s
-    cycles = round(told[-1].time / CYCLE) + 2
+    aged_values = [change for change in aged[0].changes if "fSensorAge" in change.inputs]
+    assert len(aged_values) == 100  # 0.4 s
+    cycles = round(aged_values[-1].time / CYCLE) + 2
     rows = aged[0].sensed.measurement(spec, ["fSensor", "bSensorValid"], CYCLE, cycles).cycles[:, 0]
     ages = rows[-101:-1, 2] * CYCLE
-    assert ages == pytest.approx([change.inputs["fSensorAge"] for change in told])
+    assert ages == pytest.approx([change.inputs["fSensorAge"] for change in aged_values])
     assert (rows[:, 3] == 1.0).all()
     assert len({*rows[-102:-1, 1]}) == 1
 

@@ -53,11 +53,11 @@ from gen_profile_exporters.playback.structured_text import block_name, literal
 
 FUTURE = 140  # slots of a committed future
 LONGEST = 132  # of a plan; farther targets are approached by pulses, as a stick would
-MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have the same velocity
-KERNEL_SLOTS = 56
+KERNEL_SLOTS = 56  # and unknowns of a plan; in a longer one the slots in the middle have the same velocity
+HALF = 24  # unknowns of a plan whose second half mirrors the first one, likewise
 LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
-REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
+REACH_SLOTS = (*range(20, 31), *range(32, 48, 2), *range(48, 88, 4), 96, LONGEST)  # measured
 SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
 PULSE_WORK = 60  # operations of each slot of a pulse that is weighed
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
@@ -329,8 +329,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cTerms": terms,
         "cDegrees": c.degrees,
         "cColumns": KERNEL_SLOTS,
-        "cMost": MOST,
-        "cHalf": MOST // 2,
+        "cHalf": HALF,
         "cLongest": LONGEST,
         "cLongestOnWay": 72 if c.rates else 80,  # where the axis moves already
         "cKernelFirst": 18,
@@ -380,7 +379,7 @@ def _reaction(c: PlannerConstants) -> float:
 
     def bound(period: float) -> float:
         cycles = max(1, round(period / (SLOTS_PER_PERIOD * c.cycle)))
-        ahead = 2 + 2 * len(c.axes) * of_search.SEARCH_ITERATIONS * _column_work(c) * MOST // (
+        ahead = 2 + 2 * len(c.axes) * of_search.SEARCH_ITERATIONS * _column_work(c) * 2 * HALF // (
             _work(c) * cycles
         )
         return 2 * (ahead + 2) * cycles * c.cycle

@@ -54,7 +54,7 @@ def real(*, robust: bool) -> dict[str, float]:
         "cRampShare": 0.6 if robust else 0.37,  # of the kernel's slots, with which the search begins
         "cRampGrowth": 0.4,  # by so much more for full speed
         "cRampBack": 0.6,  # of a stop's slots, that a plan takes longer which leads back
-        "cAcross": 0.2,  # of the square of the slope that plans may leave: of the part that is mostly less
+        "cAcross": 0.3,  # of the square of the slope that plans may leave: of the part that is mostly less
         "cSlopeLeast": 0.25,  # of that slope, which they may leave where the past leaves no room
-        "cRefused": 0.25,  # by which that declines with each plan that would leave too much
+        "cRefused": 0.6,  # by which that declines with each plan that would leave too much
     }

@@ -171,7 +171,7 @@ class SensedHistory:
         return self.seed % 2 > 0 and self.lost > 0.0
 
     def ages(self, spec: Spec, cycle: float) -> Iterator[Change]:
-        """Give what its input for that is told then, where a cycle takes so many s."""
+        """Give its input for that age then, where a cycle takes so many s."""
         sensor, _ = _stated(spec)
         first = int(np.ceil(self.lost / cycle))
         for k in range(round(LOST * sensor.drop_out / cycle) * self.aged):
@@ -257,7 +257,7 @@ class SensedHistory:
         return rows
 
     def _lose(self, rows: Array, lost: NDArray[np.intp]) -> None:
-        """Let there be no news in some cycles; or the last value, whose age is told."""
+        """Let there be no news in some cycles; or the last value, with its age."""
         _, added, age, valid = rows.T
         if self.aged:
             age[lost] += 1.0 + np.arange(len(lost))

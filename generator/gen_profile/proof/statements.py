@@ -460,10 +460,10 @@ def _swings_on(run: Followed) -> Iterator[Allowance]:
     if stated is None or run.modes is None or run.last_modes is None or run.modes.damped:
         return
     after = run.last_known + run.after(ENABLED + run.reaction)
-    begins = {begin for begin, known in run.live_changes if known == run.last_known}
-    if not begins or after >= run.cycles or len({*run.live_changes}) > 1:
+    starts = {begin for begin, known in run.live_changes if known == run.last_known}
+    if not starts or after >= run.cycles or len({*run.live_changes}) > 1:
         return
-    own = slice(min(begins) - 1, after + 1)
+    own = slice(min(starts) - 1, after + 1)
     if not (run.stands & run.guided)[own].all() or any(own.start < at <= after for at in run.rest_reports):
         return
     roots = np.sqrt(run.modes.poles[:, 0].imag / run.last_modes.poles[:, 0].imag)
