@@ -14,7 +14,6 @@ from gen_profile.artefacts.reading import (
     compared,
     manifest_beside,
     read_artefact,
-    read_motion,
     require_companions,
     strays,
 )
@@ -171,7 +170,7 @@ def read_table(path: Path) -> BlockTable:
     CheckFailed
         It is not the file that was exported, or one beside it not the one that was exported with it.
     """
-    container, content = find_container(container_of(path)), read_motion(path)
+    container, content = find_container(container_of(path)), read_artefact(path)
     kind: type[BlockTable] = PlannerTable if is_planner_block(path) else BlockTable
     if kind is PlannerTable:
         specs: tuple[Spec, ...] = (_exported_spec(path, content, planner=True),)
@@ -214,7 +213,7 @@ def _exported_spec(path: Path, content: bytes, *, planner: bool = False) -> Spec
 
 def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:
     """Read the specs that a library's index lists; none where there is no index."""
-    index = path.with_name(f"{path.name.removesuffix(formats()[container_of(path)].suffix)}.json")
+    index = path.with_name(f"{path.name[: -len(formats()[container_of(path)].suffix)]}.json")
     document = _document(index)
     if "profiles" not in document:
         return ()

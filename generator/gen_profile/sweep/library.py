@@ -170,7 +170,12 @@ def index_of(
     specs: list[Mapping[str, Any]],
 ) -> bytes:
     """Write the index beside a library and its other files: what each profile is, and a hash of all that."""
-    document = {"block": block, "sha256": sha256(written), "profiles": profiles, "specs": specs}
+    document: dict[str, Any] = {
+        "block": block,
+        "sha256": sha256(written),
+        "profiles": profiles,
+        "specs": specs,
+    }
     document["companions"] = {file.filename: sha256(file.content) for file in others}
     document[SEAL] = seal_of(document)
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
