@@ -90,10 +90,13 @@ def test_a_companion_that_is_named_is_compared_before_its_file_is_named(folder):
     words = "; it goes with paper.log, which holds the motion; name that."
     intact, altered = folder / "paper.dbc", folder / "paper.startup.csv"
     alter(altered)
-    told = run_here("check", intact)
-    assert (told.code, told.errors) == (2, [f"Error: {intact} is the one that was exported{words}"])
-    told = run_here("check", altered)
-    assert (told.code, told.errors) == (4, [f"Error: {altered} is NOT the one that was exported{words}"])
+    outcome = run_here("check", intact)
+    assert (outcome.code, outcome.errors) == (2, [f"Error: {intact} is the one that was exported{words}"])
+    outcome = run_here("check", altered)
+    assert (outcome.code, outcome.errors) == (
+        4,
+        [f"Error: {altered} is NOT the one that was exported{words}"],
+    )
 
 
 def test_a_missing_companion_is_noted_and_one_of_another_delivery_fails(folder, tmp_path):
@@ -104,13 +107,13 @@ def test_a_missing_companion_is_noted_and_one_of_another_delivery_fails(folder, 
     alone = folder / "copy.TcPOU"
     (folder / "FB_paper.TcPOU").rename(alone)
     (folder / "GVL_paper.TcGVL").unlink()
-    told = run_here("check", alone, "--scenario", 0)
-    assert told.code == 0
-    assert "FB_paper_Axis.TcPOU as exported; GVL_paper.TcGVL missing, not compared" in told.out
+    outcome = run_here("check", alone, "--scenario", 0)
+    assert outcome.code == 0
+    assert "FB_paper_Axis.TcPOU as exported; GVL_paper.TcGVL missing, not compared" in outcome.out
     shutil.copy(tmp_path / "other/GVL_other.TcGVL", folder / "GVL_paper.TcGVL")
-    told = run_here("check", alone, "--scenario", 0, "--json")
-    document = told.document
-    assert (told.code, document["check"]["passed"]) == (4, False)
+    outcome = run_here("check", alone, "--scenario", 0, "--json")
+    document = outcome.document
+    assert (outcome.code, document["check"]["passed"]) == (4, False)
     due = {"FB_paper_Axis.TcPOU": "matches", "GVL_paper.TcGVL": "differs"}
     assert document["artefact"]["companions"] == due
     assert check_artefact(folder / "FB_other.TcPOU", row=0).passed
