@@ -19,7 +19,7 @@ import click
 from json_page import require_documented
 
 from gen_profile.cli import main
-from gen_profile.cli.commands import cli
+from gen_profile.cli.entry import cli
 
 
 def commands_of(group: click.Group, before: str = "") -> dict[str, click.Command]:

@@ -39,7 +39,7 @@ def exported_library(folder, distances, *changes):
     library = library_source(entries, target_of(preset_spec("paper", [*VARIABLES, *changes])))
     path = folder / "moves.st"
     path.write_text(library.text(), "ascii")
-    path.with_suffix(".json").write_bytes(index_of(library.name, path.read_bytes(), [], specs))
+    path.with_suffix(".json").write_bytes(index_of(library.name, path.read_bytes(), [], [], specs))
     return path
 
 

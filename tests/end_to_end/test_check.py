@@ -84,7 +84,12 @@ def test_an_altered_renamed_file_gives_its_own_sway_in_a_fresh_process(folder):
     outcome = run_process("check", "renamed.csv", "--json", cwd=folder)
     assert outcome.code == 4
     document = outcome.document
-    assert document["artefact"] == {"format": "csv", "path": "renamed.csv", "manifest": "differs"}
+    assert document["artefact"] == {
+        "format": "csv",
+        "path": "renamed.csv",
+        "manifest": "differs",
+        "companions": {},
+    }
     sway = assert_sways_as(document["check"], column(altered))
     assert (np.abs(sway[:3] - sway_after_export(folder)) > 1e-6).any()
     assert any("manifest.json" in line for line in outcome.errors)
@@ -294,10 +299,6 @@ def test_a_suffix_that_no_format_has_is_a_sentence(folder):
 
 
 def test_a_file_that_goes_with_a_motion_names_the_one_that_holds_it(folder):
-    for name in ("paper.asc", "paper.startup.csv"):
-        outcome = run_here("check", folder / name)
-        words = f"Error: {folder / name}: it goes with paper.log, which holds the motion; name that."
-        assert (outcome.code, outcome.errors) == (2, [words])
     assert run_here("report", folder / "paper.asc").errors[-1].endswith("which holds the motion; name that.")
 
 

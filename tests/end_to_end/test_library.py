@@ -9,7 +9,8 @@ import pytest
 from command_line import run_here
 from sweeps import archived
 
-from gen_profile.errors import ExportError
+from gen_profile.deployment.table import read_table as read_block_table
+from gen_profile.errors import CheckFailed, ExportError
 from gen_profile.spec.reading import preset_spec
 from gen_profile.sweep import library as profile_library
 from gen_profile.sweep.store import grid_of
@@ -112,6 +113,14 @@ def test_the_suffix_tells_the_format(swept, library, tmp_path, name, others):
     block = find_container(container_of(name)).unwrap((tmp_path / name).read_bytes(), target)
     hashes = [motion.payload_hash() for motion in read_library(block, target)]
     assert hashes == [entry["payload_sha256"] for entry in due["profiles"]]
+    table = read_block_table(tmp_path / name)
+    assert table.hashes["payload_sha256"]
+    for other in others:
+        (tmp_path / other).write_bytes(
+            (tmp_path / other).read_bytes().replace(b"nCause := 23", b"nCause := 0")
+        )
+        with pytest.raises(CheckFailed, match=f"^{other} is not the one that was exported with {name}"):
+            read_block_table(tmp_path / name)
 
 
 @pytest.mark.parametrize(

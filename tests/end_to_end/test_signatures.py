@@ -92,6 +92,14 @@ def test_whatever_was_altered_is_refused_and_nothing_run(copied, keys, why):
     assert "co-simulation" not in refused.err
 
 
+def test_a_signed_deliverys_altered_wrapper_is_refused(keys, tmp_path):
+    assert run_here(*BARE, "--export", "twincat", "--out", tmp_path, "--sign", keys / "own.key").code == 0
+    assert checked(tmp_path, keys, file="FB_paper.TcPOU").code == 0
+    swap(tmp_path / "FB_paper_Axis.TcPOU", "nCause := 23", "nCause := 0")
+    refused = checked(tmp_path, keys, file="FB_paper.TcPOU")
+    assert refused.code == 4 and "FB_paper_Axis.TcPOU is not the one" in refused.err
+
+
 def test_another_key_a_file_beside_and_no_key_are_refused(copied, keys):
     refused = checked(copied, keys, "other")
     assert refused.code == 4 and "by another key" in refused.errors[0]

@@ -399,7 +399,10 @@ def test_the_command_line_writes_and_executes_a_block(tmp_path):
         ("time_s,command,value,L9\n0,stop,,1\n", "no live parameter 'L9'; it has L1, m2"),
     ],
 )
-def test_a_fault_in_the_commands_is_told_with_its_line(text, commands, words):
+def test_a_fault_in_the_commands_is_told_with_its_line_before_anything_is_compiled(
+    text, commands, words, monkeypatch
+):
+    monkeypatch.setattr("gen_profile.planner.commands.BlockInstance", None)
     with pytest.raises(SpecError, match=words):
         play(text, commands)
 

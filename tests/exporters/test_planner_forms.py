@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 
+import attrs
 import numpy as np
 import pytest
 from command_line import run_here
@@ -28,6 +29,7 @@ from gen_profile_exporters.planner.openplc import openplc_files
 from gen_profile_exporters.playback.structured_text import read_table
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
+from gen_profile_exporters.vendors import siemens_scl
 
 BAY = """
 name = "bay 3"
@@ -70,6 +72,16 @@ def test_every_container_reads_back_as_the_same_program(block, program, format_,
         (tmp_path / wrapper.filename).write_bytes(wrapper.content)
         with pytest.raises(ExportError, match="holds a planner block's wrapper; name the"):
             read_block(tmp_path / wrapper.filename)
+
+
+@pytest.mark.parametrize("tables", ["constants", "variables"])
+def test_a_block_larger_than_a_data_block_is_told_what_makes_a_planner_smaller(block, monkeypatch, tables):
+    monkeypatch.setattr(siemens_scl, "MOST_BYTES", 1000)
+    spec = attrs.evolve(SPEC, export=attrs.evolve(SPEC.export, plc_tables=tables))
+    with pytest.raises(
+        ExportError, match=r"ask less of the planner: no robustness\.uncertain, fewer planner"
+    ):
+        block_files(block, spec, ["siemens-scl"])
 
 
 def test_xml_is_valid(block, tc6_schema):

@@ -475,7 +475,7 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
     (tmp_path / "commands.csv").write_text("\n".join(["time_s,command,value", *rows]) + "\n")
     played = ("planner", "play", tmp_path / "block.st", "--commands", tmp_path / "commands.csv")
     events = tmp_path / "events.csv"
-    assert run_here(*played, "--out", tmp_path / "setpoints.csv", "--events", events).code == 0
+    assert run_here(*played, "--out", tmp_path / "setpoints.csv", "--events", events).code == 6  # of 50 m
     explained = run_here("planner", "explain", events, "--json").document["events"]
     assert [one["code"] for one in explained if one["time_s"] < 0.45][:2] == [11, 63]
     later = [one["code"] for one in explained if one["time_s"] > 0.45]

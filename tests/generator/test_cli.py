@@ -134,6 +134,29 @@ def test_an_interrupt_is_no_bug(monkeypatch):
     assert outcome.errors[-1] == "Error: Interrupted."
 
 
+INTERRUPTED = """
+import signal, sys
+
+class Watched:
+    def find_spec(name, *_):
+        if name == "gen_profile.cli.commands":
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Watched)
+sys.argv = ["gen-profile", "formats", "--json"]
+from gen_profile.cli import main
+main()
+"""
+
+
+def test_an_interrupt_while_the_program_loads_ends_in_a_sentence():
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, encoding="utf-8", check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "Error: Interrupted.\n")
+    assert json.loads(done.stdout)["error"]["exit_code"] == 130
+
+
 @pytest.mark.slow
 def test_debugging_logs_what_libraries_tell(tmp_path):
     outcome = run_process("--debug", "--no-check", "--out", tmp_path)

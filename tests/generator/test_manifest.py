@@ -36,6 +36,22 @@ def test_is_plain_utf_8_json_that_ends_in_a_newline():
     assert document["check"] == {"passed": True}
 
 
+def test_of_two_exports_of_the_same_bytes_a_file_belongs_to_that_of_its_name():
+    """Two CAN logs may be alike, and their start-up lists not; a renamed copy is of the latest."""
+
+    def export(name):
+        files = {f"{name}.log": "00", f"{name}.dbc": name}
+        made = (Artefact(format="can", path=one, sha256=hash_, bytes=1) for one, hash_ in files.items())
+        return attrs.evolve(MANIFEST, name=name, artefacts=(*made, ARTEFACT))
+
+    both = export("b").after(export("a"))
+    for name, due in {"a.log": "a", "b.log": "b", "copy.log": "b"}.items():
+        found = both.covering(name, "00")
+        assert (found.name, found.companions(name, "00")) == (due, {f"{due}.dbc": due})
+    assert both.covering("a.log", "altered").companions("a.log", "altered") == {"a.dbc": "a"}
+    assert both.companions("brücke.csv", "00") == {} == both.companions("unknown", "altered")
+
+
 def test_says_unverified_without_a_check():
     assert json.loads(attrs.evolve(MANIFEST, check=None).to_json())["check"] == "unverified"
 

@@ -72,6 +72,7 @@ def test_what_cannot_be_meant_is_refused(name, override, place, cure):
         ("paper", "actuator={ type='first-order', tau=67 }", "actuator.tau", "did you mean 0.067?"),
         ("paper", "can.start_tolerance=1", "can.start_tolerance", "did you mean 0.001?"),
         ("paper", "check.residual_sway=0.2", "check.residual_sway", "state less."),
+        ("bay-crane", "plant.m1=350000", "plant.m1", "did you mean 350?"),
         ("bay-crane", "limits.travel=[0.0, 40000.0]", "limits.travel", "did you mean 40?"),
         ("bay-crane", "planner.live_rate={ L1 = 100 }", "planner.live_rate.L1", "did you mean 0.1?"),
         ("paper", "move={ distance=0.9, duration=0.5 }", "move.duration", "allow more than 0.5 s."),

@@ -14,7 +14,13 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, sample
-from gen_profile_exporters.block_source import BlockSource, BlockVariable, ordered, parse_function_block
+from gen_profile_exporters.block_source import (
+    BlockSource,
+    BlockVariable,
+    is_planner,
+    ordered,
+    parse_function_block,
+)
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import SIEMENS
 from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
@@ -62,8 +68,14 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """
     size = sum(_bytes(variable) for variable in source.variables)
     if size > MOST_BYTES:
-        smaller = 'export.plc_layout = "segments", a longer export.cycle_time, or fewer motions in a library'
-        cure = 'export.plc_tables = "constants"' if is_buffered(source) else smaller
+        cure = 'export.plc_layout = "segments", a longer export.cycle_time, or fewer motions in a library'
+        if is_planner(source.text()):
+            cure = (
+                "another form, or ask less of the planner: no robustness.uncertain, fewer planner.live, no "
+                "planner.zones and planner.events, fewer axes"
+            )
+        elif is_buffered(source):
+            cure = 'export.plc_tables = "constants"'
         raise ExportError(
             f"siemens-scl: the block's numbers take {size / 1000:.1f} kB, a data block holds "
             f"{MOST_BYTES / 1000:g} kB; take {cure}."

@@ -47,7 +47,7 @@ class Artefact:
     """
 
     format: str
-    path: str
+    path: str = attrs.field(validator=instance_of(str))
     sha256: str = attrs.field(validator=instance_of(str))
     bytes: int
     payload_sha256: str = ""
@@ -102,16 +102,24 @@ class Manifest:
         return attrs.evolve(self, earlier=tuple(one for one in remaining if one.artefacts))
 
     def covering(self, name: str, digest: str, *, planner: bool = False) -> Manifest | None:
-        """Find the export that a file comes from: by its SHA-256, else by its name.
+        """Find the export that a file comes from: by its SHA-256 (of several by its name), else by its name.
 
         A motion's file that was altered and renamed is taken for one of the latest motion.
         """
         listed = [(one, known) for one in (self, *self.earlier) for known in one.artefacts]
         alike = [(one, known) for one, known in listed if (known.format == PLANNER) == planner]
-        by_content = [one for one, known in listed if known.sha256 == digest]
+        same = [(one, known) for one, known in listed if known.sha256 == digest]
+        by_content = [one for one, _ in sorted(same, key=lambda found: found[1].path != name)]
         by_name = [one for one, known in alike if known.path == name]
         latest = [] if planner else [one for one, _ in alike]
         return next(iter(by_content or by_name or latest), None)
+
+    def companions(self, name: str, digest: str) -> dict[str, str]:
+        """List what was exported with a file in its format, SHA-256 by name; it is found as by `covering`."""
+        found = [known for known in self.artefacts if known.sha256 == digest or known.path == name]
+        own = min(found, key=lambda known: (known.sha256 != digest, known.path != name), default=None)
+        of_format = [known for known in self.artefacts if own is not None and known.format == own.format]
+        return {known.path: known.sha256 for known in of_format if known is not own}
 
     def words(self) -> str:
         """Tell what it is of: the kind and the names of the latest export's files."""

@@ -1,10 +1,11 @@
 """Reading what was delivered: an artefact, and the manifest beside it."""
 
-from pathlib import Path
+from collections.abc import Mapping
+from pathlib import Path, PureWindowsPath
 
-from gen_profile.artefacts.manifest import FILENAME, PLANNER, Manifest, parse_manifest, sha256
+from gen_profile.artefacts.manifest import FILENAME, PLANNER, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.bounded_file import DOCUMENT, MOST, read_bounded
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.errors import CheckFailed, GenProfileError, OutputError, SpecError
 
 
 def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
@@ -26,21 +27,42 @@ def read_motion(path: Path) -> bytes:
     Raises
     ------
     OutputError
-    SpecError
+    SpecError, CheckFailed
         By the manifest beside it, it only goes with the file that holds the motion, as a wrapper does.
     """
     content = read_artefact(path)
+    for own, artefacts in _listed(path):
+        holds = next(known.path for known in artefacts if known.format == own.format)
+        if own.format != PLANNER and holds != own.path:
+            words = f"it goes with {holds}, which holds the motion; name that."
+            raise refusal(path, content, words, SpecError)
+    return content
+
+
+def refusal(path: Path, content: bytes, words: str, kind: type[GenProfileError]) -> GenProfileError:
+    """Refuse a file that is not read itself, and say first whether it is the one of the manifest beside it.
+
+    Returns
+    -------
+    GenProfileError
+        Of that kind, or `CheckFailed` where the manifest lists another file of its name.
+    """
+    known = {own.sha256 for own, _ in _listed(path)}
+    if not known:
+        return kind(f"{path}: {words}")
+    if sha256(content) in known:
+        return kind(f"{path} is the one that was exported; {words}")
+    return CheckFailed(f"{path} is NOT the one that was exported; {words}")
+
+
+def _listed(path: Path) -> list[tuple[Artefact, tuple[Artefact, ...]]]:
+    """Find a file's name in the manifest beside it, if that can be read, and all files of the same export."""
     try:
         manifest = parse_manifest(read_artefact(path.parent / FILENAME, DOCUMENT), FILENAME)
     except OutputError:
-        return content
-    for artefacts in (one.artefacts for one in (manifest, *manifest.earlier)):
-        own = next((known for known in artefacts if known.path == path.name), None)
-        if own is not None and own.format != PLANNER:
-            holds = next(known.path for known in artefacts if known.format == own.format)
-            if holds != own.path:
-                raise SpecError(f"{path}: it goes with {holds}, which holds the motion; name that.")
-    return content
+        return []
+    exports = [one.artefacts for one in (manifest, *manifest.earlier)]
+    return [(known, files) for files in exports for known in files if known.path == path.name]
 
 
 def decoded(content: bytes, path: Path, what: str) -> str:
@@ -86,3 +108,44 @@ def manifest_beside(path: Path, content: bytes, *, planner: bool = False) -> Man
             "written with it."
         )
     return covering
+
+
+def compared(folder: Path, listed: Mapping[str, str]) -> dict[str, str]:
+    """Tell of files by name and SHA-256 whether each ``"matches"``, ``"differs"`` or is ``"missing"``."""
+    return {name: _compared(folder, name, digest) for name, digest in listed.items()}
+
+
+def _compared(folder: Path, name: str, digest: str) -> str:
+    if (
+        PureWindowsPath(name).name != name
+    ):  # touching what a stranger's list names could reach another computer
+        return "differs"
+    if not (folder / name).is_file():
+        return "missing"
+    return "matches" if sha256(read_artefact(folder / name)) == digest else "differs"
+
+
+def companions_of(manifest: Manifest | None, path: Path, content: bytes) -> dict[str, str]:
+    """Tell as `compared` does of each file that was exported with one, as its wrapper."""
+    return compared(path.parent, manifest.companions(path.name, sha256(content)) if manifest else {})
+
+
+def strays(path: Path, companions: Mapping[str, str]) -> tuple[str, ...]:
+    """Say which files beside one are not those that were exported with it."""
+    return tuple(
+        f"{name} is not the one that was exported with {path.name}: it was altered after its export, or "
+        "comes from another; export again."
+        for name, found in companions.items()
+        if found == "differs"
+    )
+
+
+def require_companions(manifest: Manifest | None, path: Path, content: bytes) -> None:
+    """Refuse a file where one beside it is not the one that was exported with it.
+
+    Raises
+    ------
+    CheckFailed
+    """
+    for sentence in strays(path, companions_of(manifest, path, content)):
+        raise CheckFailed(sentence)

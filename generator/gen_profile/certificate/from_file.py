@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import sha256
-from gen_profile.artefacts.reading import read_artefact, read_motion
+from gen_profile.artefacts.reading import read_artefact, read_motion, require_companions
 from gen_profile.artefacts.writing import deliver, require_place
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.setpoint_limits import Asked, asked_of_axes
@@ -163,7 +163,8 @@ def _bound_again(
 
 def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
     content = read_motion(path)
-    spec, _ = spec_and_manifest(path, content, spec)
+    spec, manifest = spec_and_manifest(path, content, spec)
+    require_companions(manifest, path, content)
     setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))
     for sentence in another_move(spec, setpoints):
         raise CertificateError(sentence)

@@ -9,12 +9,23 @@ from io import TextIOWrapper
 
 import click
 
+from gen_profile.cli import (  # noqa: F401  # each adds its commands
+    can,
+    commissioning,
+    deployment,
+    fmu,
+    planner,
+    report,
+    streaming,
+    studio,
+    sweep,
+)
 from gen_profile.cli.commands import cli
 from gen_profile.cli.outcome import print_error, unprinted
 
 
-def main() -> None:
-    """Run the command line; the entry point."""
+def run() -> None:
+    """Run the command line."""
     # for matrices this small, threads that wait for one another cost several times what they save
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # else Python looks for garbage among all that it loaded, just before it ends
@@ -35,6 +46,11 @@ def main() -> None:
             raise
         # what is interrupted while compiled code runs may end in an error of that code's own
         sys.exit(print_error(click.Abort() if interruptions else _refusal() or error, as_json))
+
+
+def refuse_interrupted() -> int:
+    """Tell that it was interrupted; return the exit code."""
+    return print_error(click.Abort(), "--json" in sys.argv)
 
 
 def _refusal() -> Exception | None:

@@ -19,7 +19,7 @@ from gen_profile.cli.options import InputFile, OutputFile, PathType, SpecChoice,
 from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, signing_key, signing_option
-from gen_profile.errors import SpecError
+from gen_profile.errors import SpecError, StreamAborted
 from gen_profile.progress import Progress
 
 if TYPE_CHECKING:
@@ -150,8 +150,6 @@ def play(
     if events_path is not None:
         deliver(events_path, setpoints.events.encode("ascii"))
     text = f"{path}: {setpoints.cycles} cycles"
-    if setpoints.errors:
-        text += f"; the block showed {'; '.join(map(error_words, setpoints.errors))}"
     if why := LOST.get(setpoints.unpromised):
         text += f"; the load may sway, because {why}"
     document = {
@@ -161,6 +159,9 @@ def play(
         "promise": not setpoints.unpromised,
     }
     print_outcome(document, text)
+    if setpoints.errors:
+        click.echo(f"Error: the block showed {'; '.join(map(error_words, setpoints.errors))}.", err=True)
+        raise SystemExit(StreamAborted.exit_code)
 
 
 @planner.command(epilog="Example: gen-profile planner explain events.csv")

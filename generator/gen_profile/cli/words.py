@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from gen_profile.certificate.document import certificate_path
-from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, named, number
+from gen_profile.evaluation.phrases import MANIFEST_WORDS, companions, mm, named, number
 from gen_profile.units import RATES
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
     rows = [
         ("move", _move(judged.spec)),
         *([("variant", judged.variant)] if judged.variant else []),
-        ("manifest", MANIFEST_WORDS[judged.manifest]),
+        *_provenance(judged),
         *findings,
         *_groups(check),
         *_wind(check),
@@ -99,6 +99,12 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
         *([] if certificate is None else (*_proved(certificate), *_written(judged.path, certificate))),
     ]
     return _block(str(judged.path), rows)
+
+
+def _provenance(judged: Judgement | BlockJudgement) -> Iterator[tuple[str, str]]:
+    yield "manifest", MANIFEST_WORDS[judged.manifest]
+    if judged.companions:
+        yield "exported with it", companions(judged.companions)
 
 
 def certificate(path: Path, document: Certificate) -> str:
@@ -142,7 +148,7 @@ def deployment(outcome: Deployment) -> str:
 
 def block_judgement(judged: BlockJudgement) -> str:
     """Tell how a planner block was judged, or what became of one history."""
-    rows = [("manifest", MANIFEST_WORDS[judged.manifest])]
+    rows = [*_provenance(judged)]
     if judged.history is None:
         return _block(str(judged.path), [*rows, *_proof(judged.check)])
     worst = judged.check.worst
@@ -356,7 +362,7 @@ def report(made: Report, path: Path) -> str:
 def planner_report(made: PlannerReport, path: Path) -> str:
     """Tell how the planner block was judged, and where the page lies."""
     judged = made.judgement
-    rows = [("manifest", MANIFEST_WORDS[judged.manifest]), *_proof(judged.check), ("wrote", str(path))]
+    rows = [*_provenance(judged), *_proof(judged.check), ("wrote", str(path))]
     return _block(str(judged.path), rows)
 
 

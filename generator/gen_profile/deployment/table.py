@@ -10,7 +10,13 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import SEAL, artefact_of, seal_of, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.reading import (
+    compared,
+    manifest_beside,
+    read_artefact,
+    require_companions,
+    strays,
+)
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.deployment.block_state import BlockState, MotionState, PlannerState
 from gen_profile.errors import CheckFailed, ExportError, OutputError
@@ -162,7 +168,7 @@ def read_table(path: Path) -> BlockTable:
     SpecError, OutputError, ExportError
         It is none, or there is no manifest or index of it.
     CheckFailed
-        It is not the file that was exported.
+        It is not the file that was exported, or one beside it not the one that was exported with it.
     """
     container, content = find_container(container_of(path)), read_artefact(path)
     kind: type[BlockTable] = PlannerTable if is_planner_block(path) else BlockTable
@@ -201,12 +207,13 @@ def _exported_spec(path: Path, content: bytes, *, planner: bool = False) -> Spec
     spec, manifest = spec_and_manifest(path, content, None, planner=planner)
     for fault in alterations(path, provenance(manifest, content, spec)):
         raise CheckFailed(fault)
+    require_companions(manifest, path, content)
     return spec
 
 
 def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:
     """Read the specs that a library's index lists; none where there is no index."""
-    index = path.with_name(f"{path.name.removesuffix(formats()[container_of(path)].suffix)}.json")
+    index = path.with_name(f"{path.name[: -len(formats()[container_of(path)].suffix)]}.json")
     document = _document(index)
     if "profiles" not in document:
         return ()
@@ -217,6 +224,8 @@ def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:
         )
     if document["sha256"] != sha256(content):
         raise CheckFailed(f"{path.name} is not the library of {index.name}: it was altered; make it again.")
+    for sentence in strays(path, compared(path.parent, document.get("companions", {}))):
+        raise CheckFailed(sentence)
     return tuple(spec_from_dict(one, path.parent) for one in document["specs"])
 
 

@@ -11,7 +11,18 @@ MANIFEST_WORDS = {
     "differs": "the file is NOT the one that was exported",
     "none": "no manifest of this spec beside the file",
 }
+COMPANION_WORDS = {"matches": "as exported", "differs": "NOT as exported", "missing": "missing, not compared"}
 SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
+
+
+def companions(found: Mapping[str, str]) -> str:
+    """Tell of the files that were exported with one which are as they were."""
+    words = ([name for name, word in found.items() if word == one] for one in COMPANION_WORDS)
+    return "; ".join(
+        f"{', '.join(names)} {said}"
+        for names, said in zip(words, COMPANION_WORDS.values(), strict=True)
+        if names
+    )
 
 
 def number(value: float) -> str:

@@ -10,8 +10,8 @@ import numpy as np
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.events import COLUMNS, events_of
-from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.interface import SENSED, BlockAxis, live_inputs, sensed_axes
+from gen_profile.planner.execution import BlockInstance, block_inputs
+from gen_profile.planner.interface import SENSED, BlockAxis, block_axes, live_inputs, sensed_axes
 from gen_profile.planner.sensor_log import SensorLog, read_rows, read_sensor_log
 from gen_profile.suggestion import number_meant
 
@@ -162,15 +162,16 @@ def play(
     ------
     ExportError, SpecError, CosimulationError
     """
-    block = BlockInstance(text)
-    commands = read_commands(commands_text, block.axes, live_inputs(block.inputs, block.axes))
-    cycle = block.inputs["fCycleTime"]
+    inputs, axes = block_inputs(text), block_axes(text)
+    commands = read_commands(commands_text, axes, live_inputs(inputs, axes))
+    cycle = inputs["fCycleTime"]
     if commands[-1].begin(cycle) > MOST_CYCLES:
         at, most = f"{commands[-1].time:g} s", f"{MOST_CYCLES * cycle:g} s"
         raise SpecError(f"commands: the last one comes at {at}, and at most {most} are played in one go.")
-    sensed = sensed_axes(block.inputs, block.axes)
+    sensed = sensed_axes(inputs, axes)
     log = None if sensor_text is None else read_sensor_log(sensor_text, sensed)
-    columns = _columns(block.axes) | ({"damping": "bDamping"} if sensed else {})
+    block = BlockInstance(text)  # compiled only for tables that can be played
+    columns = _columns(axes) | ({"damping": "bDamping"} if sensed else {})
     columns |= {axis.prefix + name: axis.of(output) for axis in sensed for name, output in SENSED.items()}
     places = {name: block.outputs.index(output) for name, output in columns.items()}
     lines, promise = ["time_s," + ",".join(columns)], block.outputs.index("nPromise")

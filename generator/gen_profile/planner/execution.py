@@ -51,7 +51,7 @@ class BlockInstance:
     @property
     def inputs(self) -> dict[str, float]:
         """Initial values of the inputs, by name."""
-        return {v.name: v.start for v in self._translation.inputs}
+        return block_inputs(self._text)
 
     @property
     def outputs(self) -> list[str]:
@@ -99,6 +99,11 @@ class BlockInstance:
         return issued
 
 
+def block_inputs(text: str) -> dict[str, float]:
+    """Read initial values of a block's inputs by name, without compiling it; raises as `BlockInstance`."""
+    return {v.name: v.start for v in _translated(text).inputs}
+
+
 def require_sound(fault: int) -> None:
     """Refuse what a block did that no block of ours does.
 
@@ -115,9 +120,12 @@ def require_sound(fault: int) -> None:
         raise ExportError(f"The function block {FAULTS[fault]}; its text was altered.")
 
 
+_translated = lru_cache(maxsize=4)(translate)
+
+
 @lru_cache(maxsize=4)
 def _loaded(text: str) -> tuple[Translation, ctypes.CDLL]:
-    translation = translate(text)
+    translation = _translated(text)
     return translation, _compiled(translation)
 
 

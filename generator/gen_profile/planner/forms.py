@@ -6,7 +6,7 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.artefacts.reading import decoded, read_artefact
+from gen_profile.artefacts.reading import decoded, read_artefact, refusal
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.planner.machine import planned_axes
@@ -46,28 +46,28 @@ def is_program(filename: str) -> bool:
     return filename.endswith((".c", ".h", ".py", OPENPLC))
 
 
-def refuse_program(path: Path) -> None:
+def refuse_program(path: Path, content: bytes) -> None:
     """Refuse a file that is C, or a program around it.
 
     Raises
     ------
-    ExportError
+    ExportError, CheckFailed
     """
     if is_program(path.name):
-        raise ExportError(
-            f"{path}: a program is not read back; name its block, in Structured Text or a form of it."
-        )
+        words = "a program is not read back; name its block, in Structured Text or a form of it."
+        raise refusal(path, content, words, ExportError)
 
 
-def refuse_wrapper(path: Path, text: str) -> None:
-    """Refuse a text that is the wrapper of a planner block.
+def refuse_wrapper(path: Path, content: bytes, text: str) -> None:
+    """Refuse a file whose text is the wrapper of a planner block.
 
     Raises
     ------
-    ExportError
+    ExportError, CheckFailed
     """
     if _WRAPPER.search(text):
-        raise ExportError(f"{path} holds a planner block's wrapper; name the block's own file beside it.")
+        words = "it holds a planner block's wrapper; name the block's own file beside it."
+        raise refusal(path, content, words, ExportError)
 
 
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
@@ -129,10 +129,10 @@ def read_block(path: Path) -> str:
         It holds no planner block, or is a program.
     """
     content = read_artefact(path, what=WHAT)
-    refuse_program(path)
+    refuse_program(path, content)
     text = block_in(path, content)
     if not is_planner(text):
-        refuse_wrapper(path, text)
+        refuse_wrapper(path, content, text)
         raise ExportError(f"{path} holds no planner block; name a file that gen-profile planner wrote.")
     return text
 

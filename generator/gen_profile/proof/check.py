@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 
 from gen_profile.artefacts.manifest import PLANNER, Manifest
-from gen_profile.artefacts.reading import read_artefact
+from gen_profile.artefacts.reading import companions_of, read_artefact, strays
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import block_in, refuse_program, refuse_wrapper
@@ -37,6 +37,8 @@ class BlockJudgement:
         Of all histories, or of the one that was asked for.
     manifest : str
         ``"matches"``, ``"differs"`` (the file is not the one that was written), or ``"none"`` for this spec.
+    companions : mapping of str to str
+        Of all other files of its export: ``"matches"``, ``"differs"`` or ``"missing"``.
     history : int or None
         Number of the only one.
     """
@@ -46,6 +48,7 @@ class BlockJudgement:
     spec: Spec
     check: Proof
     manifest: str
+    companions: Mapping[str, str] = attrs.field(factory=dict)
     history: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -53,7 +56,12 @@ class BlockJudgement:
         named = {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "artefact": {"format": PLANNER, "path": str(self.path), "manifest": self.manifest},
+            "artefact": {
+                "format": PLANNER,
+                "path": str(self.path),
+                "manifest": self.manifest,
+                "companions": self.companions,
+            },
         }
         if self.history is None:
             return {**named, "proof": self.check.to_dict()}
@@ -70,15 +78,17 @@ def is_planner_block(path: Path) -> bool:
         It cannot be read.
     ExportError
         It is a program, which is not read back, or the wrapper of one.
+    CheckFailed
+        Such a one is not the one that was exported.
     """
-    refuse_program(path)
     content = read_artefact(path)
+    refuse_program(path, content)
     try:
         container_of(path)
         text = block_in(path, content)
     except (SpecError, ExportError, OutputError):  # none that carries blocks, or that holds none
         return False
-    refuse_wrapper(path, text)
+    refuse_wrapper(path, content, text)
     return is_planner(text)
 
 
@@ -123,7 +133,7 @@ def check_block(
     spec, manifest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)
     _require_inputs(path, text, planner_block(spec).text)
-    agreement = provenance(manifest, content, spec)
+    agreement, companions = provenance(manifest, content, spec), companions_of(manifest, path, content)
     known = _record(manifest) if agreement != "none" else {}
     count = histories or histories_of(manifest if known else None)
     if history is not None and not 0 <= history < count:
@@ -137,8 +147,16 @@ def check_block(
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec), count, seed, parents)
         replayed = replay(spec, text, numbering, history, progress)
-    check = attrs.evolve(replayed, faults=alterations(path, agreement))
-    return BlockJudgement(path=path, text=text, spec=spec, check=check, manifest=agreement, history=history)
+    check = attrs.evolve(replayed, faults=(*alterations(path, agreement), *strays(path, companions)))
+    return BlockJudgement(
+        path=path,
+        text=text,
+        spec=spec,
+        check=check,
+        manifest=agreement,
+        companions=companions,
+        history=history,
+    )
 
 
 def _require_inputs(path: Path, text: str, due: str) -> None:

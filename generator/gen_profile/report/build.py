@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 
 from gen_profile.artefacts.manifest import sha256
-from gen_profile.artefacts.reading import read_motion
+from gen_profile.artefacts.reading import read_motion, require_companions
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import Design, design
 from gen_profile.errors import OutputError
@@ -139,6 +139,7 @@ def artefact_report(path: Path, **options: Any) -> Report:
     spec, manifest = spec_and_manifest(path, content, None)
     if provenance(manifest, content, spec) != "matches":
         raise OutputError(f"{path} was altered after its export: gen-profile check judges it as it is now.")
+    require_companions(manifest, path, content)
     made = report(spec, [format_of(path)], **options)
     if sha256(content) not in {artefact.sha256 for artefact in made.design.artefacts}:
         raise OutputError(

@@ -11,7 +11,7 @@ import tomli_w
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.charts.proof import damping_figures, history_figure, map_figure, worst_damped
-from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, number
+from gen_profile.evaluation.phrases import MANIFEST_WORDS, companions, mm, number
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.check import BlockJudgement, check_block
 from gen_profile.proof.closed_loop import Trace, trace
@@ -142,6 +142,7 @@ def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -
     files = [
         (f"{judgement.path.name}, SHA-256", sha256(read_artefact(judgement.path))),
         ("Manifest", MANIFEST_WORDS[judgement.manifest]),
+        ("Exported with it", companions(judgement.companions) or "nothing"),
         ("Spec, SHA-256", spec.sha256()),
     ]
     whole = Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict()))

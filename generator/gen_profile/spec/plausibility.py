@@ -35,6 +35,7 @@ RESIDUAL_OF_ROPE = 0.5  # a load that hangs by 30° after the move
 RESIDUAL_OF_MOVE = 0.05
 WORST_TIMING = 4.0  # times its quasi-static sway, a mode sways after steps of acceleration to +a, -a and 0
 FAR = 10.0  # times the load's whole way
+HEAVY = 50.0  # times its payload, that a hook block may weigh
 LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
 
 
@@ -82,6 +83,7 @@ def plausibility_warnings(spec: Spec) -> tuple[str, ...]:
 
 def _implausibilities(spec: Spec) -> Iterator[Implausibility]:
     scale = _scale(spec)
+    yield from _masses(spec)
     yield from _move(spec)
     yield from _limits(spec, scale)
     yield from _residual(spec, scale)
@@ -108,6 +110,17 @@ def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Itera
         verdict = "which no such machine reaches" if value > never else "which few machines reach"
         template = "{problem}, {verdict}; {cure}"
         yield _odd(place, template, problem=problem, verdict=verdict, cure=cure, refused=value > never)
+
+
+def _masses(spec: Spec) -> Iterator[Implausibility]:
+    """Question a hook block that no such load needs; an empty hook, of a payload of 0, is left alone."""
+    if spec.plant.type != "double-pendulum-crane":
+        return
+    hook, load = spec.plant.parameters["m1"], spec.plant.parameters["m2"]
+    if hook > HEAVY * load > 0.0:
+        cure = _thousandth(hook, "masses are in kg")
+        template = "a hook block of {hook:g} kg is {times:.3g} times as heavy as its payload; {cure}"
+        yield _odd("plant.m1", template, hook=hook, times=hook / load, cure=cure)
 
 
 def _move(spec: Spec) -> Iterator[Implausibility]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, PLANNER, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_motion
+from gen_profile.artefacts.reading import manifest_beside, read_motion, require_companions
 from gen_profile.errors import CheckFailed, SpecError, StreamAborted
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.can import CanSpec
@@ -108,6 +108,7 @@ def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: b
     manifest, beside = manifest_beside(path, content, planner=format_ == PLANNER), path.parent / FILENAME
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == format_}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
+    require_companions(manifest, path, content)
     if manifest.check is None and not accept_unverified:
         raise SpecError(
             f"{path} is unverified: export it with its check, or accept it as it is (accept_unverified)."

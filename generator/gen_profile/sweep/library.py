@@ -1,7 +1,7 @@
 """From a sweep to one PLC block that plays any of its profiles, made of the very files that passed."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from gen_profile.spec.reading import as_path
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.store import case_files, case_folder, case_spec, grid_of, swept_table
 from gen_profile_exporters.block_source import BlockSource
-from gen_profile_exporters.exporter import Target, target_of
+from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
 from gen_profile_exporters.registry import container_of, find_container, formats
 
@@ -97,7 +97,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
         _require_same(container.unwrap(written, target), target, profiles)
         for file in others:
             staging.write(file.filename, file.content)
-        staging.write(index.name, index_of(library.name, written, profiles, specs))
+        staging.write(index.name, index_of(library.name, written, others, profiles, specs))
         staging.deliver()
     return Library(
         path=path,
@@ -163,9 +163,19 @@ def _require_same(library: BlockSource, target: Target, profiles: list[dict[str,
 
 
 def index_of(
-    block: str, written: bytes, profiles: list[dict[str, Any]], specs: list[Mapping[str, Any]]
+    block: str,
+    written: bytes,
+    others: Sequence[File],
+    profiles: list[dict[str, Any]],
+    specs: list[Mapping[str, Any]],
 ) -> bytes:
-    """Write the index beside a library: what each profile is, its spec, and a hash of all that."""
-    document = {"block": block, "sha256": sha256(written), "profiles": profiles, "specs": specs}
+    """Write the index beside a library and its other files: what each profile is, and a hash of all that."""
+    document: dict[str, Any] = {
+        "block": block,
+        "sha256": sha256(written),
+        "profiles": profiles,
+        "specs": specs,
+    }
+    document["companions"] = {file.filename: sha256(file.content) for file in others}
     document[SEAL] = seal_of(document)
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import StringIO
 from itertools import chain
 from pathlib import Path
@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_motion
+from gen_profile.artefacts.reading import companions_of, manifest_beside, read_motion, strays
 from gen_profile.errors import CosimulationError, ExportError, OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.evaluation.simulation import Response, Sway
@@ -108,6 +108,8 @@ class Judgement(Drawable):
     check : Check
     manifest : str
         ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
+    companions : mapping of str to str
+        Of each file that was exported with it, as its wrapper: ``"matches"``, ``"differs"`` or ``"missing"``.
     variant : str or None
         What was changed of the motion, in words.
     """
@@ -117,6 +119,7 @@ class Judgement(Drawable):
     spec: Spec
     check: Check
     manifest: str
+    companions: Mapping[str, str] = attrs.field(factory=dict)
     variant: str | None = None
 
     def summary(self) -> dict[str, object]:
@@ -133,7 +136,12 @@ class Judgement(Drawable):
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "artefact": {"format": self.format, "path": str(self.path), "manifest": self.manifest},
+            "artefact": {
+                "format": self.format,
+                "path": str(self.path),
+                "manifest": self.manifest,
+                "companions": self.companions,
+            },
             "variant": self.variant,
             "check": self.check.to_dict(),
         }
@@ -190,7 +198,7 @@ def check_artefact(
     content, format_ = read_motion(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
-    agreement = provenance(manifest, content, spec)
+    agreement, companions = provenance(manifest, content, spec), companions_of(manifest, path, content)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     asked, played, variant = varied(spec, setpoints, *map(as_names, (scale, mirror, offset)))
@@ -199,9 +207,17 @@ def check_artefact(
         check = _verdict(asked, played, rows, progress)
     except CosimulationError as error:  # as of setpoints that no machine can follow
         raise CosimulationError(" ".join([str(error), *implausibilities(asked, played)])) from error
-    faults = (*check.faults, *alterations(path, agreement))
+    faults = (*check.faults, *alterations(path, agreement), *strays(path, companions))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
-    return Judgement(path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant)
+    return Judgement(
+        path=path,
+        format=format_,
+        spec=spec,
+        check=check,
+        manifest=agreement,
+        companions=companions,
+        variant=variant,
+    )
 
 
 def scenario_table(judgement: Judgement) -> str:
