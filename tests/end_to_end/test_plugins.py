@@ -106,6 +106,7 @@ def test_they_design_export_and_check(installed):
         "format": "text",
         "path": "gen-profile-out/plugged.txt",
         "manifest": "matches",
+        "companions": {},
     }
 
 
