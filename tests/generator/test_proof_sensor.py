@@ -21,7 +21,7 @@ from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.obedience import WORDS
 from gen_profile.proof.orders import POSITION
 from gen_profile.proof.prove import prove
-from gen_profile.proof.sensing import FAULTS, JUMP, LATE, UNSURE, Gust, may_be_off, sensor_faults
+from gen_profile.proof.sensing import FAULTS, JUMP, Gust, sensor_faults
 from gen_profile.proof.verdict import kind_of
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.running.block_run import BlockRun
@@ -60,33 +60,6 @@ def test_histories_have_sensors_of_every_kind_and_old_ones_stay(spec):
     assert all(before.time + before.lasts <= after.time for before, after in pairs)  # no more than stated
     plain = Histories.of(preset_spec("bay-crane", MEASURED[:1]))
     assert histories.choices > plain.choices
-
-
-def test_where_there_is_no_news_some_sensors_tell_the_last_value_and_its_age(spec):
-    histories = Histories.of(spec)
-    drawn = [histories.history(choices) for choices in Numbering.of(histories, 60, 0).drawn]
-    aged = [one for one in drawn if one.sensed is not None and one.sensed.aged and not one.sensed.fault]
-    assert 0.2 < len(aged) / len(drawn) < 0.6
-    aged_values = [change for change in aged[0].changes if "fSensorAge" in change.inputs]
-    assert len(aged_values) == 100  # 0.4 s
-    cycles = round(aged_values[-1].time / CYCLE) + 2
-    rows = aged[0].sensed.measurement(spec, ["fSensor", "bSensorValid"], CYCLE, cycles).cycles[:, 0]
-    ages = rows[-101:-1, 2] * CYCLE
-    assert ages == pytest.approx([change.inputs["fSensorAge"] for change in aged_values])
-    assert (rows[:, 3] == 1.0).all()
-    assert len({*rows[-102:-1, 1]}) == 1
-
-
-def test_an_estimate_may_be_off_by_what_gusts_errors_and_delay_make(spec):
-    drawn = map(Histories.of(spec).history, Numbering.of(Histories.of(spec), 60, 0).drawn)
-    calm = attrs.evolve(next(one.sensed for one in drawn if one.sensed is not None), gusts=(), delay=0.1)
-    gusty = attrs.evolve(calm, gusts=(Gust(time=2.0, lasts=1.0, acceleration=-0.1, along=(1.0,)),))
-    assert may_be_off(spec, calm, (0.2, 0.1), 0.0) == pytest.approx(UNSURE * 0.3)
-    assert may_be_off(spec, attrs.evolve(calm, delay=0.15), (0.2, 0.1), 0.0) == pytest.approx(
-        (UNSURE + LATE) * 0.3
-    )
-    assert may_be_off(spec, gusty, (0.2, 0.1), 0.0) == pytest.approx(0.2)
-    assert may_be_off(spec, gusty, (0.2, 0.1), 1.0) == pytest.approx(0.3)
 
 
 def test_a_gust_pushes_as_its_acceleration_says(spec):

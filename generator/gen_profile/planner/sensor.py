@@ -205,10 +205,8 @@ def largest_innovation(spec: Spec) -> float:
     return _gate(sensor, max(_disturbed(sensor, disturbance, one) for one in sensed))
 
 
-def estimation_error(spec: Spec, *, gusts: float = 1.0, errors: float = 1.0) -> float:
+def estimation_error(spec: Spec) -> float:
     """Find by how much, in m, an estimate of the end load's sway is off in gusts and with wrong frequencies.
-
-    By so great shares of the stated ones.
 
     No acceleration within bounds moves it by more than the integral of the size of what an impulse leaves
     (Desoer and Vidyasagar 1975); wrong frequencies act as an acceleration on the stated swing and on what
@@ -218,13 +216,11 @@ def estimation_error(spec: Spec, *, gusts: float = 1.0, errors: float = 1.0) -> 
     points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
     own = 2.0 * max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
     return max(
-        _estimation_error_at(spec, _sensed(spec, point, one), own, (gusts, errors))
-        for point in points
-        for one in directions
+        _estimation_error_at(spec, _sensed(spec, point, one), own) for point in points for one in directions
     )
 
 
-def _estimation_error_at(spec: Spec, one: SensedModes, own: float, shares: tuple[float, float]) -> float:
+def _estimation_error_at(spec: Spec, one: SensedModes, own: float) -> float:
     assert spec.planner.sensor is not None
     state, measured, gain = _filter(spec.planner.sensor, one)
     estimated, pushed = np.zeros((2, len(state)))
@@ -234,19 +230,17 @@ def _estimation_error_at(spec: Spec, one: SensedModes, own: float, shares: tuple
     for _ in range(round(IMPULSE_PHASE / (step * float(one.frequencies[0])))):
         sizes.append(abs(float(estimated @ pushed)))
         pushed = transition @ pushed
-    gust, stiffness = _unknown_accelerations(spec, one)
-    unknown = shares[0] * gust + shares[1] * (stiffness + stiffness_error(spec) * own)
-    return float(np.sum(sizes) * step * unknown)
+    return float(np.sum(sizes) * step * (_unknown_acceleration(spec, one) + _stiffness_error(spec) * own))
 
 
-def _unknown_accelerations(spec: Spec, one: SensedModes) -> tuple[float, float]:
+def _unknown_acceleration(spec: Spec, one: SensedModes) -> float:
     """Find what acts as an acceleration in m/s² and is not known: gusts, and wrong frequencies."""
     gust = spec.planner.disturbance.gust if spec.planner.disturbance else None
     restoring = float(one.frequencies[0]) ** 2 * one.swing / abs(float(one.push[0]))
-    return gust.acceleration if gust else 0.0, stiffness_error(spec) * restoring
+    return (gust.acceleration if gust else 0.0) + _stiffness_error(spec) * restoring
 
 
-def stiffness_error(spec: Spec) -> float:
+def _stiffness_error(spec: Spec) -> float:
     """By which share the slowest mode's stiffness may be wrong."""
     return 2.0 * float(frequency_errors(spec)[0])
 
@@ -364,7 +358,7 @@ def _others(spec: Spec, sensor: SensorSpec, one: SensedModes) -> float:
     energy = later.T @ solve_continuous_lyapunov(corrected.T, -measured.T @ measured) @ later
     noise = SURE_OTHERS * sensor.noise * np.sqrt(max(NOISE_TIME, spec.export.cycle_time))
     seen = (
-        peak * sum(_unknown_accelerations(spec, one)) * np.sqrt(0.5 * MEMORY * period)
+        peak * _unknown_acceleration(spec, one) * np.sqrt(0.5 * MEMORY * period)
         + np.sqrt(np.linalg.norm(energy, 2))
         + noise
     )

@@ -20,12 +20,12 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.problem.linearization import linearize
+from gen_profile.planner.sensor import estimation_error
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import SHIFT, SLOWEST, Histories, History
 from gen_profile.proof.judging import WatchedRun, judge_run
 from gen_profile.proof.numbering import Numbering
-from gen_profile.proof.sensing import estimation_errors, may_be_off, sensor_faults
+from gen_profile.proof.sensing import sensor_faults
 from gen_profile.proof.verdict import JudgedHistory
 from gen_profile.proof.watching import BlockWatch
 from gen_profile.spec.model import Spec
@@ -77,7 +77,7 @@ class ClosedLoop:
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
         self._machine = histories.machine
-        self._stated = estimation_errors(spec) if spec.planner.sensor else (0.0, 0.0)
+        self._estimation_error = estimation_error(spec) if spec.planner.sensor else 0.0
         fmu = plant_fmu(self._machine)
         for _ in range(workers):
             self._followers.put(self._open.enter_context(BlockFollower(fmu)))
@@ -297,20 +297,9 @@ class ClosedLoop:
                 cycle=self.cycle,
                 period=period,
                 last=last,
-                estimation_error=may_be_off(
-                    self._spec, history.sensed, self._stated, self._stiffness_error(history)
-                ),
+                estimation_error=self._estimation_error,
                 resets=[one.time for one in history.changes if "bReset" in one.inputs],
             )
-
-    def _stiffness_error(self, history: History) -> float:
-        """Tell by which share the slowest frequency's square is other than the block is given."""
-        machines = history.parameters, self._histories.perturbed(history, {})
-        true, given = (
-            float(linearize(self._spec.machine(), one, list(history.places)).frequencies.min())
-            for one in machines
-        )
-        return abs((true / given) ** 2 - 1.0)
 
     def _crossing(self, axis: int) -> float:
         """Find the time in s that an axis needs from end to end by a history's slowest command, at most.

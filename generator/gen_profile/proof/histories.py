@@ -318,11 +318,7 @@ class Histories:
             commands=commands,
             axes=self.axes,
             hoisting=self._hoisting(legs, live_values, commands[-1].time),
-            changes=(
-                *self._zones(starts, first, amount),
-                *chain(*(one.changes for one in manners)),
-                *(found.ages(self.spec, self.spec.export.cycle_time) if found else ()),
-            ),
+            changes=(*self._zones(starts, first, amount), *chain(*(one.changes for one in manners))),
             sensed=found,
         )
 

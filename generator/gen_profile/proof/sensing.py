@@ -5,14 +5,12 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
 from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
-from gen_profile.planner.sensor import damping_room, estimation_error, largest_innovation, stiffness_error
+from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.problem.linearization import linearize
-from gen_profile.proof.habits import Change
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, GustSpec, SensorSpec
 from gen_profile_fmu.running.block_run import BlockRun, Measurement
@@ -43,7 +41,6 @@ JUMP = 2.2  # by the greatest difference from what is expected that counts as a 
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
-UNSURE, LATE = 0.2, 0.3  # of all that is stated, by which it may be in any case; more by the whole delay
 STRONG = 1.5  # own motions by what else swings, root mean square of a period, at which that is known
 KNOWN_TO = 0.4  # (0.35)
 LEAKY = 0.3  # damping ratio by which what is shown of them is forgotten
@@ -166,20 +163,6 @@ class SensedHistory:
         return self.fault == "dead"
 
     @property
-    def aged(self) -> bool:
-        """Whether it tells an old value where there is no news, and its age."""
-        return self.seed % 2 > 0 and self.lost > 0.0
-
-    def ages(self, spec: Spec, cycle: float) -> Iterator[Change]:
-        """Give its input for that age then, where a cycle takes so many s."""
-        sensor, _ = _stated(spec)
-        first = int(np.ceil(self.lost / cycle))
-        for k in range(round(LOST * sensor.drop_out / cycle) * self.aged):
-            age = (round(self.delay / cycle) + k + 1) * cycle
-            inputs = {planned_axes(spec)[number].of(SENSOR[2]): age for number in sensed_directions(spec)}
-            yield Change(time=(first + k) * cycle, lasts=0.0, inputs=inputs)
-
-    @property
     def ends(self) -> float:
         """When the last gust does, or the sensor fails, in s."""
         return max([self.fails if self.fault else 0.0, *(gust.time + gust.lasts for gust in self.gusts)])
@@ -226,7 +209,7 @@ class SensedHistory:
         gain, added, age, valid = rows.T
         gain[:], added[:] = 1.0, self.offsets[place] + sensor.noise * random.standard_normal(cycles)
         age[:], valid[:] = round(self.delay / cycle), 1.0
-        self._lose(rows, np.flatnonzero((times >= self.lost) & (times < self.lost + LOST * sensor.drop_out)))
+        valid[(times >= self.lost) & (times < self.lost + LOST * sensor.drop_out)] = 0.0
         first = min(round(self.fails / cycle), cycles - 1)
         match self.fault if place == self.failing else "":
             case "silent":
@@ -256,15 +239,6 @@ class SensedHistory:
                 valid[first:] = _coming_and_going(LOST * sensor.drop_out / cycle, cycles - first, random)
         return rows
 
-    def _lose(self, rows: Array, lost: NDArray[np.intp]) -> None:
-        """Let there be no news in some cycles; or the last value, with its age."""
-        _, added, age, valid = rows.T
-        if self.aged:
-            age[lost] += 1.0 + np.arange(len(lost))
-            added[lost] = added[lost[:1] - 1]
-        else:
-            valid[lost] = 0.0
-
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
         return attrs.asdict(self)
@@ -273,26 +247,6 @@ class SensedHistory:
 def sensed(spec: Spec, choices: Sequence[float] | Array) -> bool:
     """Whether some choices are of a history with a sensor."""
     return spec.planner.sensor is not None and bool(choices[0] >= NONE)
-
-
-def estimation_errors(spec: Spec) -> tuple[float, float]:
-    """Find by how much, in m, an estimate may be off by stated gusts, and by stated errors of frequencies."""
-    return estimation_error(spec, errors=0.0), estimation_error(spec, gusts=0.0)
-
-
-def may_be_off(spec: Spec, one: SensedHistory, stated: tuple[float, float], stiffness: float) -> float:
-    """Tell by how much, in m, an estimate may be off in a history beside what it states.
-
-    By the share of the `estimation_errors` that gusts and frequencies make there, whose squares differ by
-    `stiffness` from those told; and by some of them as the delay is not known.
-    """
-    sensor, disturbance = _stated(spec)
-    gust = max((abs(gust.acceleration) for gust in one.gusts), default=0.0)
-    shares = gust / disturbance.gust.acceleration if disturbance.gust else 0.0, stiffness_error(spec)
-    wrong = min(1.0, stiffness / shares[1]) if shares[1] else 0.0
-    low, high = sensor.delay
-    late = abs(2.0 * one.delay - low - high) / (high - low) if high > low else 0.0
-    return max(shares[0] * stated[0] + wrong * stated[1], (UNSURE + LATE * late) * sum(stated))
 
 
 def sensor_faults(
@@ -319,7 +273,7 @@ def sensor_faults(
     cycle, period, last : float
         s: a cycle, the slowest swing, and when the last command came, or an input last changed.
     estimation_error : float
-        m, by which an estimate `may_be_off`.
+        m, by which an estimate may be off beside what it states, from `estimation_error`.
     resets : sequence of float
         s, when bReset was set.
     """
