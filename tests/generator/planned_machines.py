@@ -82,6 +82,7 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (300, 31, 97),  # fTimeToGo 8 s too short where an axis turned round, as that of the stop was stated
         (1000, 7001, 373),  # fTimeToGo 15 s too short for a slot, as a stop had ended the way by pulses
         (300, 143, 44),  # fTimeToGo 8 s too short in a stop's last two slots, before the axis turned round
+        (300, 31, 203),  # 0.6 s late, as it rested on the way: pulses that led back counted as a stop's plan
     ],
     "wide": [
         (400, 10, 87),  # 4 s against a stick of two axes, one of which was too fast for a plan
