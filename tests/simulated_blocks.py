@@ -47,19 +47,24 @@ def exported_planner(folder, *changes):
     """A planner block, and a manifest that asks for few histories; it is proved when it is deployed."""
     spec = preset_spec("bay-crane", ["export.plc_tables=variables", *changes])
     (file, *_) = block_files(planner_block(spec), spec, ["plc"])
-    artefact = artefact_of("planner", file.filename, file.content)
+    deliver_planner(folder, spec, [file], histories=8)
+    return folder / file.filename
+
+
+def deliver_planner(folder, spec, files, **check):
+    """Write files of a planner block, and a manifest with what it knows of its proof."""
     manifest = Manifest(
         name=spec.name,
         spec=spec.to_dict(),
         spec_sha256=spec.sha256(),
         profile_sha256="",
         versions={},
-        artefacts=(artefact,),
-        check={"histories": 8},
+        artefacts=tuple(artefact_of("planner", file.filename, file.content) for file in files),
+        check=check,
     )
-    (folder / file.filename).write_bytes(file.content)
+    for file in files:
+        (folder / file.filename).write_bytes(file.content)
     (folder / "manifest.json").write_bytes(manifest.to_json())
-    return folder / file.filename
 
 
 class DirectLink:

@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 from command_line import run_here
+from simulated_blocks import deliver_planner
 
-from gen_profile.artefacts.manifest import PLANNER, Manifest, artefact_of
 from gen_profile.certificate.from_file import certify_artefact
 from gen_profile.deployment.table import read_table
 from gen_profile.designs.design import design
@@ -128,18 +128,7 @@ def planned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planned")
     names = [*(name for name in containers() if name != "siemens-scl"), *PROGRAMS]
     files = block_files(planner_block(PLANNED), PLANNED, names)
-    manifest = Manifest(
-        name=PLANNED.name,
-        spec=PLANNED.to_dict(),
-        spec_sha256=PLANNED.sha256(),
-        profile_sha256="",
-        versions={},
-        artefacts=tuple(artefact_of(PLANNER, file.filename, file.content) for file in files),
-        check={"passed": True, "histories": 1},
-    )
-    for file in files:
-        (folder / file.filename).write_bytes(file.content)
-    (folder / "manifest.json").write_bytes(manifest.to_json())
+    deliver_planner(folder, PLANNED, files, passed=True, histories=1)
     return folder, [file.filename for file in files]
 
 

@@ -53,10 +53,11 @@ from gen_profile_exporters.playback.structured_text import block_name, literal
 
 FUTURE = 140  # slots of a committed future
 LONGEST = 132  # of a plan; farther targets are approached by pulses, as a stick would
-KERNEL_SLOTS = 56  # and unknowns of a plan; in a longer one the slots in the middle have the same velocity
+COLUMNS = 56  # unknowns of a plan; in a longer one the slots in the middle have the same velocity
 HALF = 24  # unknowns of a plan whose second half mirrors the first one, likewise
+KERNEL_SLOTS = COLUMNS  # of a kernel, at most
 LONG_KERNEL = 40  # slots, from which on no longer one is sought
-WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
+WIDE = COLUMNS + 4  # with two committed shares before, and two zeros behind
 REACH_SLOTS = (*range(20, 31), *range(32, 48, 2), *range(48, 88, 4), 96, LONGEST)  # measured
 SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
 PULSE_WORK = 60  # operations of each slot of a pulse that is weighed
@@ -279,7 +280,7 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "column": WIDE,
         "wide": WIDE,
         "mean": 4 * axes,
-        "conditions": conditions * KERNEL_SLOTS,
+        "conditions": conditions * COLUMNS,
         "row": conditions,
         "gram": conditions**2,
         "bounds": 4 * WIDE,
@@ -328,7 +329,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cLives": len(c.live),
         "cTerms": terms,
         "cDegrees": c.degrees,
-        "cColumns": KERNEL_SLOTS,
+        "cColumns": COLUMNS,
         "cHalf": HALF,
         "cLongest": LONGEST,
         "cLongestOnWay": 72 if c.rates else 80,  # where the axis moves already

@@ -116,10 +116,8 @@ def compared(folder: Path, listed: Mapping[str, str]) -> dict[str, str]:
 
 
 def _compared(folder: Path, name: str, digest: str) -> str:
-    if (
-        PureWindowsPath(name).name != name
-    ):  # touching what a stranger's list names could reach another computer
-        return "differs"
+    if PureWindowsPath(name).name != name:
+        return "differs"  # a path in a stranger's list could lead to another computer
     if not (folder / name).is_file():
         return "missing"
     return "matches" if sha256(read_artefact(folder / name)) == digest else "differs"
