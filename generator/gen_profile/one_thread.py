@@ -12,7 +12,10 @@ from threadpoolctl import ThreadpoolController
 
 
 class _OneThread(ContextDecorator):
-    """The limit of the whole process, from the first context that begins to the last one that ends."""
+    """Let BLAS and LAPACK use one thread in a context or function, and in all that run at the same time.
+
+    The limit is that of the whole process, from the first context that begins to the last one that ends.
+    """
 
     def __init__(self) -> None:
         self._lock, self._open = Lock(), 0
@@ -30,12 +33,7 @@ class _OneThread(ContextDecorator):
                 self._limit.restore_original_limits()
 
 
-_ONE_THREAD = _OneThread()
-
-
-def one_thread() -> _OneThread:
-    """Let BLAS and LAPACK use one thread in the context or function, and in all that run at the same time."""
-    return _ONE_THREAD
+one_thread = _OneThread()
 
 
 @cache

@@ -12,7 +12,7 @@ import scipy.linalg
 from threadpoolctl import threadpool_info
 def threads():
     return [one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"]
-first, second, found = one_thread(), one_thread(), []
+first, second, found = one_thread, one_thread, []
 first.__enter__()
 found.append(threads())
 second.__enter__()

@@ -15,7 +15,7 @@ R = TypeVar("R")
 def in_order(function: Callable[[T], R], work: Iterable[T]) -> Iterator[R]:
     """Do work as it comes, on threads, as NumPy lets them run at once; few are ahead, as arrays are large."""
     count, running = processors(), deque[Future[R]]()
-    with one_thread(), ThreadPoolExecutor(count) as pool:
+    with one_thread, ThreadPoolExecutor(count) as pool:
         for one in work:
             running.append(pool.submit(function, one))
             if len(running) > count:

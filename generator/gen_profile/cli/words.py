@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from gen_profile.sweep.library import Library
     from gen_profile.sweep.lookup import LookupResult
     from gen_profile.sweep.run import Sweep
-    from gen_profile.verification.check import Judgement
+    from gen_profile.verification.check import JudgedFile, Judgement
     from gen_profile.verification.verdict import Check
 
 
@@ -101,7 +101,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
     return _block(str(judged.path), rows)
 
 
-def _provenance(judged: Judgement | BlockJudgement) -> Iterator[tuple[str, str]]:
+def _provenance(judged: JudgedFile) -> Iterator[tuple[str, str]]:
     yield "manifest", MANIFEST_WORDS[judged.manifest]
     if judged.companions:
         yield "exported with it", companions(judged.companions)

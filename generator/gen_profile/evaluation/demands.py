@@ -18,8 +18,6 @@ class AxisDemand:
     Attributes
     ----------
     axis : Coordinate
-    column : int
-        Of the axis.
     quantity : str
         ``"velocity"``, ``"acceleration"`` or ``"jerk"``.
     unit : str
@@ -30,7 +28,6 @@ class AxisDemand:
     """
 
     axis: Coordinate
-    column: int
     quantity: str
     unit: str
     asked: float
@@ -39,14 +36,18 @@ class AxisDemand:
 
 def demands(spec: Spec, command: Profile) -> Iterator[AxisDemand]:
     """List what a command asks of every axis, in the order of axes and of derivatives."""
-    for column, axis in enumerate(spec.machine().actuated):
-        limits = spec.limits.of(column)
-        for order, (quantity, per) in enumerate(RATES.items(), start=1):
-            yield AxisDemand(
-                axis=axis,
-                column=column,
-                quantity=quantity,
-                unit=f"{axis.unit}{per}",
-                asked=greatest(command, order, column),
-                allowed=getattr(limits, quantity),
-            )
+    for column in range(len(spec.machine().actuated)):
+        yield from axis_demands(spec, command, column)
+
+
+def axis_demands(spec: Spec, command: Profile, column: int) -> Iterator[AxisDemand]:
+    """List what a command asks of one axis, in the order of derivatives."""
+    axis, limits = spec.machine().actuated[column], spec.limits.of(column)
+    for order, (quantity, per) in enumerate(RATES.items(), start=1):
+        yield AxisDemand(
+            axis=axis,
+            quantity=quantity,
+            unit=f"{axis.unit}{per}",
+            asked=greatest(command, order, column),
+            allowed=getattr(limits, quantity),
+        )

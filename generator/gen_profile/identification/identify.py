@@ -266,7 +266,7 @@ def identify(
         )
     machine = SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood)
     logs = tuple(shortened(log, machine) for log in measurements if isinstance(log, SwingLog))
-    with one_thread():
+    with one_thread:
         names = [q.name for q in plant.parameters if q.name in asked]
         estimated = estimate(machine, names, readings, logs, progress)
     return Identification(

@@ -347,7 +347,7 @@ def learn(
             raise SpecError("seen: tells of machines only where the load hung at rest before; log a run.")
     machines = before = Machines(plant=plant, parameters=spec.plant.parameters, ranges=ranges)
     showed = []
-    with one_thread():
+    with one_thread:
         for run in runs:
             if isinstance(run, SwingLog):
                 machines, evidence = narrowed_by_log(machines, played, run, progress)

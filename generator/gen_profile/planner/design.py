@@ -68,7 +68,7 @@ class PlannerBlock:
     period: float
 
 
-@one_thread()
+@one_thread
 def planner_block(spec: Spec) -> PlannerBlock:
     """Write the planner block of a spec.
 

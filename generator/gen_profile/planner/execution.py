@@ -101,7 +101,7 @@ class BlockInstance:
 
 def block_inputs(text: str) -> dict[str, float]:
     """Read initial values of a block's inputs by name, without compiling it; raises as `BlockInstance`."""
-    return {v.name: v.start for v in _translated(text).inputs}
+    return {v.name: v.start for v in translate(text).inputs}
 
 
 def require_sound(fault: int) -> None:
@@ -120,12 +120,9 @@ def require_sound(fault: int) -> None:
         raise ExportError(f"The function block {FAULTS[fault]}; its text was altered.")
 
 
-_translated = lru_cache(maxsize=4)(translate)
-
-
 @lru_cache(maxsize=4)
 def _loaded(text: str) -> tuple[Translation, ctypes.CDLL]:
-    translation = _translated(text)
+    translation = translate(text)
     return translation, _compiled(translation)
 
 

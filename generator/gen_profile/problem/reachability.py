@@ -34,7 +34,7 @@ def independent_states(A: Array, B: Array, order: NDArray[np.intp], shares: Arra
     -------
     (k,) array of bool
     """
-    with one_thread():
+    with one_thread:
         responses, step = B[None], expm(A / SAMPLES)
     while len(responses) <= SAMPLES:
         responses, step = np.concatenate([responses, step @ responses]), step @ step

@@ -19,50 +19,31 @@ from gen_profile.proof.prove import HISTORIES, prove, replay
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path
-from gen_profile.verification.check import alterations, provenance, spec_and_manifest
+from gen_profile.verification.check import JudgedFile, alterations, provenance, spec_and_manifest
 from gen_profile_exporters.block_source import is_planner, parse_function_block
 from gen_profile_exporters.registry import container_of
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class BlockJudgement:
+class BlockJudgement(JudgedFile):
     """A proof of one file, and what its manifest says about it.
 
     Attributes
     ----------
-    path : Path
     text : str
-    spec : Spec
     check : Proof
         Of all histories, or of the one that was asked for.
-    manifest : str
-        ``"matches"``, ``"differs"`` (the file is not the one that was written), or ``"none"`` for this spec.
-    companions : mapping of str to str
-        Of all other files of its export: ``"matches"``, ``"differs"`` or ``"missing"``.
     history : int or None
         Number of the only one.
     """
 
-    path: Path
     text: str = attrs.field(repr=False)
-    spec: Spec
     check: Proof
-    manifest: str
-    companions: Mapping[str, str] = attrs.field(factory=dict)
     history: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        named = {
-            "name": self.spec.name,
-            "spec_sha256": self.spec.sha256(),
-            "artefact": {
-                "format": PLANNER,
-                "path": str(self.path),
-                "manifest": self.manifest,
-                "companions": self.companions,
-            },
-        }
+        named = self.identity(PLANNER)
         if self.history is None:
             return {**named, "proof": self.check.to_dict()}
         history = self.check.described(self.check.worst)

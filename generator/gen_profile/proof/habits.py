@@ -33,7 +33,7 @@ BEATS = (  # what a rhythm commands in turn, and its sign
     (("position", 1.0), ("stop", 0.0), ("position", -1.0), ("stop", 0.0)),
 )
 
-_MORE = 0.6180339887  # turns one choice into others
+MORE = 0.6180339887  # turns one choice into others
 
 
 @attrs.frozen(kw_only=True)
@@ -53,19 +53,17 @@ class Change:
     inputs: Mapping[str, float]
 
 
-@attrs.frozen(kw_only=True)
-class Manner:
-    """What becomes of a command.
+Manner = tuple[Command | Change, ...]  # what becomes of a command: commands in its place, and changes
 
-    Attributes
-    ----------
-    commands : tuple of Command
-        In its place.
-    changes : tuple of Change
-    """
 
-    commands: tuple[Command, ...]
-    changes: tuple[Change, ...] = ()
+def commands_in(manner: Manner) -> tuple[Command, ...]:
+    """Leave out what is no command."""
+    return tuple(one for one in manner if isinstance(one, Command))
+
+
+def changes_in(manner: Manner) -> tuple[Change, ...]:
+    """Leave out what is no change."""
+    return tuple(one for one in manner if isinstance(one, Change))
 
 
 @attrs.frozen(kw_only=True)
@@ -146,17 +144,19 @@ def habit(command: Command, which: float, how: float, around: Surroundings) -> M
     around : Surroundings
     """
     if which < 0.5:
-        return Manner(commands=(command,))
+        return (command,)
     habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *ROUGH[: around.rough] * OFTEN]
     return habits[min(int(2.0 * len(habits) * (which - 0.5)), len(habits) - 1)](command, how, around)
 
 
-def _between(ends: tuple[float, float], fraction: float) -> float:
-    return ends[0] + fraction * (ends[1] - ends[0])
+def between(ends: tuple[float, float], fraction: float) -> float:
+    """Choose a value by its share of the way from one end to the other."""
+    low, high = ends
+    return float(low + fraction * (high - low)) if fraction < 1.0 else high
 
 
 def _fraction(fraction: float, number: int) -> float:
-    return (fraction + _MORE * (number + 1)) % 1.0
+    return (fraction + MORE * (number + 1)) % 1.0
 
 
 def _log(low: float, high: float, fraction: float) -> float:
@@ -195,7 +195,7 @@ def _again(command: Command, how: float, around: Surroundings) -> Manner:
     """Give the same target cyclically, as a panel does."""
     wait = _log(2.0 * around.cycle, LONGEST_WAIT, how)
     first = _towards(command, how, around)
-    return Manner(commands=tuple(_followed(first, k * wait) for k in range(REPEATED)))
+    return tuple(_followed(first, k * wait) for k in range(REPEATED))
 
 
 def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
@@ -209,20 +209,20 @@ def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
             for value, (low, high) in zip(first.values, around.targets, strict=True)
         )
 
-    return Manner(commands=tuple(_followed(first, k * wait, values=crept(k)) for k in range(CREEPING)))
+    return tuple(_followed(first, k * wait, values=crept(k)) for k in range(CREEPING))
 
 
 def _tap(command: Command, how: float, around: Surroundings) -> Manner:
     """Tap the stick."""
     stick = _stick(command, how, around)
-    return Manner(commands=(stick, _followed(stick, around.brief(how, 0.5), values=around.neutral)))
+    return stick, _followed(stick, around.brief(how, 0.5), values=around.neutral)
 
 
 def _reversal(command: Command, how: float, around: Surroundings) -> Manner:
     """Throw the stick over for a short time."""
     stick, back = _stick(command, how, around), around.period * (0.3 + _fraction(how, 4))
     over = _followed(stick, back, values=tuple(-value for value in stick.values))
-    return Manner(commands=(stick, over, _followed(stick, back + around.brief(how, 0.5))))
+    return stick, over, _followed(stick, back + around.brief(how, 0.5))
 
 
 def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
@@ -238,7 +238,7 @@ def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
         _followed(first, (k + 1) * wait, command=kind, values=values)
         for k, (kind, values) in enumerate(others)
     ]
-    return Manner(commands=(first, *commands)[: 2 + int(3.0 * _fraction(how, 7))])
+    return (first, *commands)[: 2 + int(3.0 * _fraction(how, 7))]
 
 
 def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
@@ -249,7 +249,7 @@ def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
     for k in range(STOPS):
         commands.append(_followed(first, (2 * k + 1) * wait, command=kind, values=values))
         commands.append(_followed(first, (2 * k + 2) * wait))
-    return Manner(commands=tuple(commands))
+    return tuple(commands)
 
 
 def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Manner:
@@ -260,13 +260,12 @@ def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Ma
     if _fraction(how, 5) < 0.5:
         limited = zip(around.suffixes, around.speeds, strict=True)
         inputs = {f"fVelocityLimit{end}": fraction * most for end, (_, most) in limited}
-    slowed = _change(command, later, lasts, inputs)
-    return Manner(commands=(command, _followed(command, later + lasts)), changes=(slowed,))
+    return command, _followed(command, later + lasts), _change(command, later, lasts, inputs)
 
 
 def _patient(command: Command, how: float, around: Surroundings) -> Manner:
     """Wait for what a command comes to."""
-    return Manner(commands=(command, _followed(command, around.period * (3.0 + 7.0 * how))))
+    return command, _followed(command, around.period * (3.0 + 7.0 * how))
 
 
 def _held(command: Command, how: float, around: Surroundings) -> Manner:
@@ -274,8 +273,7 @@ def _held(command: Command, how: float, around: Surroundings) -> Manner:
     later, lasts = around.part(how, 3), around.brief(how, 3.0)
     tap = _followed(_stick(command, how, around), later + 0.2 * lasts)
     taps = (tap, _followed(tap, 0.6 * lasts, values=around.neutral)) if _fraction(how, 4) > 0.5 else ()
-    held = _change(command, later, lasts, {"rOverride": 0.0})
-    return Manner(commands=(command, *taps), changes=(held,))
+    return command, *taps, _change(command, later, lasts, {"rOverride": 0.0})
 
 
 def _wild(command: Command, how: float, around: Surroundings) -> Manner:
@@ -287,7 +285,7 @@ def _wild(command: Command, how: float, around: Surroundings) -> Manner:
         values += [(f"f{name}", wild, lasts) for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high)]
         values += [(f"f{name}", low + _fraction(how, 8) * (high - low), 0.0)] * 2
     name, wild, lasts = values[int(how * len(values)) % len(values)]
-    return Manner(commands=(command,), changes=(_change(command, around.part(how, 3), lasts, {name: wild}),))
+    return command, _change(command, around.part(how, 3), lasts, {name: wild})
 
 
 def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
@@ -304,7 +302,7 @@ def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
         wait = 0.3 * around.period
         commands.append(_followed(commands[-1], wait, values=around.neutral))
         commands.append(_followed(commands[1], 2.0 * wait))
-    return Manner(commands=tuple(commands), changes=(_change(command, later, lasts, {name: wrong}), reset))
+    return *commands, _change(command, later, lasts, {name: wrong}), reset
 
 
 def _correction(command: Command, how: float, around: Surroundings) -> Manner:
@@ -313,7 +311,7 @@ def _correction(command: Command, how: float, around: Surroundings) -> Manner:
     *others, last = first.values
     step = _log(1e-4, 0.1, _fraction(how, 3)) * (high - low) * _inwards(last, (low, high))
     wait = around.period * (1.0 + 8.0 * _fraction(how, 4))
-    return Manner(commands=(first, _followed(first, wait, values=(*others, last + step))))
+    return first, _followed(first, wait, values=(*others, last + step))
 
 
 def _refused(command: Command, how: float, around: Surroundings) -> Manner:
@@ -321,24 +319,21 @@ def _refused(command: Command, how: float, around: Surroundings) -> Manner:
     first, wait = _towards(command, how, around), around.part(how, 3)
     low, high = around.targets[-1]
     wrong = (*first.values[:-1], (nan, inf, low - OUTSIDE, high + OUTSIDE)[int(4.0 * how) % 4])
-    again = _followed(first, wait + 0.5 * around.period)
-    return Manner(commands=(first, _followed(first, wait, values=wrong), again))
+    return first, _followed(first, wait, values=wrong), _followed(first, wait + 0.5 * around.period)
 
 
 def _denied(command: Command, how: float, around: Surroundings) -> Manner:
     """Command a position while the axis is to stop."""
     stop = _stopped(command, around.period * (0.2 + _fraction(how, 3)))
     edge = _change(stop, around.part(how, 4), around.brief(how, 0.3), {"bExecute": 1.0})
-    return Manner(commands=(command, stop, _followed(stop, 1.5 * around.period)), changes=(edge,))
+    return command, stop, _followed(stop, 1.5 * around.period), edge
 
 
 def _mistimed(command: Command, how: float, around: Surroundings) -> Manner:
     """Call the block in another task for a while."""
     later, lasts = around.part(how, 3), around.brief(how, 0.5)
     wrong = _change(command, later, lasts, {"fCycleTime": around.cycle * (0.5 if how < 0.5 else 1.01)})
-    return Manner(
-        commands=(command, _stopped(command, later + lasts + 10.0 * around.cycle)), changes=(wrong,)
-    )
+    return command, _stopped(command, later + lasts + 10.0 * around.cycle), wrong
 
 
 def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
@@ -348,13 +343,12 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
     places = (nan, -FAR, FAR, -1.01 * limit, 1.01 * limit, 0.99 * limit)
     away = {f"fActPosition{suffix}": places[int(6.0 * how) % 6]}
     most, within = {f"fFollowingLimit{suffix}": limit}, around.period * (1.0 + _fraction(how, 5))
-    return Manner(
-        commands=(first, _stopped(first, begin + within)),
-        changes=(
-            _change(first, begin - before, before, away),
-            _change(first, begin, around.part(how, 4), away | most),
-            _change(first, begin + within - 4.0 * around.cycle, 0.0, {"bReset": 1.0}),
-        ),
+    return (
+        first,
+        _stopped(first, begin + within),
+        _change(first, begin - before, before, away),
+        _change(first, begin, around.part(how, 4), away | most),
+        _change(first, begin + within - 4.0 * around.cycle, 0.0, {"bReset": 1.0}),
     )
 
 
@@ -364,17 +358,15 @@ def _braked(command: Command, how: float, around: Surroundings) -> Manner:
     rest_report = _change(first, 2.5 * wait, 0.0, {"bLoadAtRest": 1.0})
     before = _log(around.cycle, min(SOON * around.cycle, wait), _fraction(how, 4))
     stop = [_stopped(first, wait - before)] * (how < 0.5)
-    return Manner(
-        commands=(first, *stop, _stopped(first, wait, "quick-stop"), _stopped(first, 3.0 * wait)),
-        changes=() if around.hoists else (rest_report,),  # one that calms by a model believes that
-    )
+    commands = first, *stop, _stopped(first, wait, "quick-stop"), _stopped(first, 3.0 * wait)
+    return commands if around.hoists else (*commands, rest_report)  # one that calms by a model believes that
 
 
 def _released(command: Command, how: float, around: Surroundings) -> Manner:
     """Drop bExecute, on the way or long before it rises again."""
     lasts = around.brief(_fraction(how, 3), 3.0)
     dropped = _change(command, 5.0 * around.period * how, lasts, {"bExecute": 0.0})
-    return Manner(commands=(_towards(command, how, around),), changes=(dropped,))
+    return _towards(command, how, around), dropped
 
 
 def _contradicted(command: Command, how: float, around: Surroundings) -> Manner:
@@ -383,9 +375,11 @@ def _contradicted(command: Command, how: float, around: Surroundings) -> Manner:
     wrong = (
         {"bExecute": 1.0} if how < 0.5 else {f"fVelocityCommand{around.suffixes[-1]}": (nan, inf)[how > 0.75]}
     )
-    return Manner(
-        commands=(stick, _followed(stick, gone, values=around.neutral), _followed(stick, 1.2 * gone)),
-        changes=(_change(stick, around.part(how, 4), around.brief(how, 0.3), wrong),),
+    return (
+        stick,
+        _followed(stick, gone, values=around.neutral),
+        _followed(stick, 1.2 * gone),
+        _change(stick, around.part(how, 4), around.brief(how, 0.3), wrong),
     )
 
 
@@ -400,7 +394,7 @@ def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
     zone = around.zone(k, place, _fraction(how, 6), ZONES - 1, slow=_fraction(how, 7) < 0.5)
     reset = _change(command, later + lasts + 2.0 * around.cycle, 0.0, {"bReset": 1.0})
     again = _followed(command, later + lasts + 0.5 * around.period)
-    return Manner(commands=(command, again), changes=(_change(command, later, lasts, zone), reset))
+    return command, again, _change(command, later, lasts, zone), reset
 
 
 def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
@@ -415,13 +409,14 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
     if how > 0.8 and not around.hoists:  # nowhere, and so not taken over yet
         name, k = "fActPosition" if how < 0.9 else "fActVelocity", int(100.0 * how) % len(around.suffixes)
         taken = {f"{name}{around.suffixes[k]}": nan} if how < 0.95 else {"fCycleTime": 0.5 * around.cycle}
-    changes = (
+    manner = (
+        command,
+        _followed(command, later + lasts + around.period),
         _change(command, later, lasts + 4.0 * around.cycle * (not goes), {"bEnable": 0.0}),
         _change(command, later, lasts + 1.5 * around.cycle * goes, taken),
         _change(command, later + lasts + 3.0 * around.period, 0.0, {"bLoadAtRest": 1.0}),
     )
-    again = _followed(command, later + lasts + around.period)
-    return Manner(commands=(command, again), changes=changes[:-1] if around.hoists else changes)
+    return manner[:-1] if around.hoists else manner
 
 
 def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
@@ -434,9 +429,9 @@ def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
         lasts = 0.05 * around.period
         times = [k * lasts for k in range(CREEPING)]
     shares = [_fraction(how, 5) * (1.0 - k / CREEPING) for k in range(len(times))]
-    given = [{f"f{name}": _between(ends, share) for name, ends in around.live.items()} for share in shares]
+    given = [{f"f{name}": between(ends, share) for name, ends in around.live.items()} for share in shares]
     changes = [_change(command, time, lasts, inputs) for time, inputs in zip(times, given, strict=True)]
-    return Manner(commands=(command,), changes=tuple(changes) if around.live and not around.hoists else ())
+    return (command, *changes) if around.live and not around.hoists else (command,)
 
 
 Habit = Callable[[Command, float, Surroundings], Manner]
@@ -497,4 +492,4 @@ def rhythm(choices: Array, around: Surroundings, lasts: float) -> Manner:
         }
         commands.append(Command(time=time, command=command, values=values.get(command, ())))
         time += waits[len(commands) % 2]
-    return Manner(commands=(*commands, Command(time=time, command="stop")))
+    return *commands, Command(time=time, command="stop")

@@ -6,7 +6,7 @@ hypercube, corners are choices of 0 and 1, and a search moves through the same c
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import accumulate, chain, islice, pairwise, product
+from itertools import accumulate, islice, pairwise, product
 from math import ceil, inf, isfinite
 from typing import Any, Self
 
@@ -23,7 +23,8 @@ from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.sampling import latin_hypercube
-from gen_profile.proof.habits import BRAKING, HELD, ROUGH, Change, Manner, Surroundings, habit, rhythm
+from gen_profile.proof import habits
+from gen_profile.proof.habits import MORE, Change, Manner, Surroundings, between
 from gen_profile.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.spec.model import Spec
 
@@ -46,7 +47,6 @@ HOISTED_ON = 2.0  # periods after the last command in which it still may
 _PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
 _PER_HABIT = 2  # choices: which, and how
 _PER_LEG = 2  # choices: speed, how long
-_MORE = 0.6180339887  # turns one choice into others
 
 
 @attrs.frozen(kw_only=True)
@@ -150,7 +150,7 @@ class History:
     @property
     def misinformed(self) -> bool:
         """Whether it is reported, true or not, that the load hangs still or that a rope is another."""
-        given = {name[1:] for change in self.changes if change.lasts > HELD for name in change.inputs}
+        given = {name[1:] for change in self.changes if change.lasts > habits.HELD for name in change.inputs}
         blind = self.sensed is not None and self.sensed.blind
         return blind or self._has("bLoadAtRest") or not given.isdisjoint(self.live)
 
@@ -285,10 +285,10 @@ class Histories:
         *parts, rows, legs, sensor = np.split(choices, np.cumsum(self.sizes)[:-1])
         starts, box, (first, manner, amount), ending = (part.tolist() for part in parts)
         live_values = {
-            name: _between(ends, fraction) for (name, ends), fraction in zip(live.items(), box, strict=False)
+            name: between(ends, fraction) for (name, ends), fraction in zip(live.items(), box, strict=False)
         }
         errors = {
-            name: _between(ends, fraction)
+            name: between(ends, fraction)
             for (name, ends), fraction in zip(uncertain.items(), box[len(live) :], strict=True)
         }
         parameters, places = _machine(self.spec, live_values, errors)
@@ -296,18 +296,18 @@ class Histories:
             travel = self.spec.limits.of(number).travel
             assert travel is not None
             beyond = max(start - 1.0 + OUTSIDE, 0.0) - max(OUTSIDE - start, 0.0)
-            places[number] = _between(travel, _widened(start)) + beyond * (travel[1] - travel[0])
+            places[number] = between(travel, _widened(start)) + beyond * (travel[1] - travel[0])
         rows = rows.reshape(MOST_COMMANDS, -1)
         is_sensed = not lasts and sensed(self.spec, sensor)
         swings = not lasts and manner * len(MANNERS) % 1.0 < ROUGH_SHARE
-        rough = swings * (BRAKING if is_sensed else len(ROUGH))
+        rough = swings * (habits.BRAKING if is_sensed else len(habits.ROUGH))
         if 0.0 < lasts < SHIFT:
-            manners = [rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)]
-            manners.append(self._hoisted_at_rest(rows.ravel()[5 + axes], manners[0].commands[-1].time))
+            given = habits.rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)
+            given += self._hoisted_at_rest(rows.ravel()[5 + axes], habits.commands_in(given)[-1].time)
         else:
             rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
-            manners = [*self._manners(rows, first, manner, ending, rough=rough, lasts=lasts)]
-        commands = tuple(chain(*(one.commands for one in manners)))
+            given = tuple(self._given(rows, first, manner, ending, rough=rough, lasts=lasts))
+        commands = habits.commands_in(given)
         found = None
         if is_sensed:
             found = SensedHistory.of(self.spec, sensor.tolist(), commands[-1].time, (parameters, places))
@@ -318,16 +318,16 @@ class Histories:
             commands=commands,
             axes=self.axes,
             hoisting=self._hoisting(legs, live_values, commands[-1].time),
-            changes=(*self._zones(starts, first, amount), *chain(*(one.changes for one in manners))),
+            changes=(*self._zones(starts, first, amount), *habits.changes_in(given)),
             sensed=found,
         )
 
     def _hoisted_at_rest(self, choice: float, last: float) -> Manner:
         """Tell other live parameters after some of the rhythms, as the axes rest."""
         live = {} if choice > HOISTED_AFTER or self.spec.planner.live_rate else self.spec.planner.live
-        given = {f"f{name}": _between(ends, choice / HOISTED_AFTER) for name, ends in live.items()}
+        given = {f"f{name}": between(ends, choice / HOISTED_AFTER) for name, ends in live.items()}
         change = Change(time=last + RESTS * self.period, lasts=inf, inputs=given)
-        return Manner(commands=(), changes=(change,) if given else ())
+        return (change,) if given else ()
 
     def _hoisting(
         self, choices: Array, live_values: Mapping[str, float], last: float
@@ -339,7 +339,7 @@ class Histories:
             rates.items(), choices.reshape(len(rates), LEGS, _PER_LEG), strict=True
         ):
             speeds = [
-                rate * _between((-1.0, 1.0), _widened(fraction, 0.25)) for fraction in legs[:, 0].tolist()
+                rate * between((-1.0, 1.0), _widened(fraction, 0.25)) for fraction in legs[:, 0].tolist()
             ]
             shares = 0.1 + legs[:, 1]
             times = list(accumulate((until * shares / shares.sum()).tolist(), initial=0.0))
@@ -350,9 +350,9 @@ class Histories:
         """Parameters of a machine that differs by some errors from what the block is given in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
-    def _manners(
+    def _given(
         self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: int, lasts: float
-    ) -> Iterator[Manner]:
+    ) -> Iterator[Command | Change]:
         """Follow the rows until their time is over, then come to rest."""
         within, longest = lasts or max(COMMANDED, PERIODS * self.period), PAUSE if lasts else LONGEST
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
@@ -363,17 +363,17 @@ class Histories:
                 break
             command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
             slowed, which, how = row[last + 1 :]
-            behaviour = habit(self._slowed(command, slowed), which, how, around)
-            earliest = behaviour.commands[-1].time + 2.0 * around.cycle
-            yield behaviour
-            time = behaviour.commands[-1].time + self.period * SHORTEST * (longest / SHORTEST) ** row[last]
+            behaviour = habits.habit(self._slowed(command, slowed), which, how, around)
+            yield from behaviour
+            time = habits.commands_in(behaviour)[-1].time
+            earliest = time + 2.0 * around.cycle
+            time += self.period * SHORTEST * (longest / SHORTEST) ** row[last]
         time = max(min(time, within), earliest)
         how, *others = ending
         if how < 0.05:
-            last_one = Command(time=time, command="quick-stop")
+            yield Command(time=time, command="quick-stop")
         else:
-            last_one = self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
-        yield Manner(commands=(last_one,))
+            yield self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
 
     def _zones(self, starts: Sequence[float], *shares: float) -> Iterator[Change]:
         """Block intervals beyond where the axes start, and make others slow."""
@@ -381,7 +381,7 @@ class Histories:
         if not self.spec.planner.zones:
             return
         for k, start in enumerate(starts):
-            place, width = ((fraction + _MORE * (k + 1)) % 1.0 for fraction in shares)
+            place, width = ((fraction + MORE * (k + 1)) % 1.0 for fraction in shares)
             zone = around.zone(
                 k, 0.8 + 0.15 * place if start < 0.5 else 0.05 + 0.1 * place, 0.3 * width, 0, slow=False
             )
@@ -407,19 +407,19 @@ class Histories:
         if choice < 0.5:
             return command
         if choice < 0.75:
-            return attrs.evolve(command, override=_between((SLOWEST, 1.0), 4.0 * choice - 2.0))
-        fraction = _between((SLOWEST, 1.0), 4.0 * choice - 3.0)
+            return attrs.evolve(command, override=between((SLOWEST, 1.0), 4.0 * choice - 2.0))
+        fraction = between((SLOWEST, 1.0), 4.0 * choice - 3.0)
         return attrs.evolve(command, velocity_limits=tuple(fraction * self._velocity(k) for k in self.axes))
 
     def _command(self, time: float, which: int, values: Sequence[float]) -> Command:
         match which:
             case 0:
                 targets = (target_range(self.spec, number) for number in self.axes)
-                places = (_between(ends, _widened(v)) for ends, v in zip(targets, values, strict=True))
+                places = (between(ends, _widened(v)) for ends, v in zip(targets, values, strict=True))
                 return Command(time=time, command="position", values=tuple(places))
             case 1:
                 ends = ((-self._velocity(number), self._velocity(number)) for number in self.axes)
-                speeds = (_between(between, self._stick(v)) for between, v in zip(ends, values, strict=True))
+                speeds = (between(own, self._stick(v)) for own, v in zip(ends, values, strict=True))
                 return Command(time=time, command="velocity", values=tuple(speeds))
         return Command(time=time, command="stop")
 
@@ -439,15 +439,10 @@ def written(value: float) -> float | str:
     return value if isfinite(value) else str(value)
 
 
-def _between(ends: tuple[float, float], fraction: float) -> float:
-    low, high = ends
-    return float(low + fraction * (high - low)) if fraction < 1.0 else high
-
-
 def _turned(rows: Array, lasts: float) -> Array:
     """Repeat rows of choices, other ones each time, so many that each may last a second."""
     times = ceil(lasts / len(rows))
-    return (np.tile(rows, (times, 1)) + _MORE * np.repeat(np.arange(times), len(rows))[:, None]) % 1.0
+    return (np.tile(rows, (times, 1)) + MORE * np.repeat(np.arange(times), len(rows))[:, None]) % 1.0
 
 
 def _widened(fraction: float, margin: float = 0.05) -> float:

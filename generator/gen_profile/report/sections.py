@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison
 from gen_profile.comparison.robustness import Robustness, error_grid, robustness_of
 from gen_profile.designs.design import Design
-from gen_profile.evaluation.demands import demands
+from gen_profile.evaluation.demands import axis_demands, demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
 from gen_profile.motion.metrics import extremes
@@ -127,9 +126,8 @@ def _limits(spec: Spec, evaluation: MotionEvaluation, figures: Mapping[str, floa
 
 
 def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]:
-    by_axis = groupby(demands(spec, evaluation.command), key=lambda one: one.column)
-    for (column, of_axis), axis in zip(by_axis, spec.machine().actuated, strict=True):
-        for one in of_axis:
+    for column, axis in enumerate(spec.machine().actuated):
+        for one in axis_demands(spec, evaluation.command, column):
             name = f"{one.quantity} of {axis.name}"
             if one.allowed is None:
                 yield TableRow(cells=(name, f"{number(one.asked)} {one.unit}", "no limit stated", "", ""))

@@ -205,7 +205,7 @@ def newton_step(flow: Array, current: Trajectory, initial: Array, final: Array) 
     diagonal = np.arange(count * size)
     matrices[:, diagonal, diagonal] += 1.0
     right[..., 1:] = np.eye(size)
-    with one_thread():
+    with one_thread:
         response = np.asarray(np.linalg.solve(matrices, right.reshape(intervals, count * size, 1 + size)))
     response = response.reshape(intervals, count, size, 1 + size)
 

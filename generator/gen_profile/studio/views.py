@@ -5,7 +5,6 @@ Every part is a mapping of plain values with its name under ``"part"``. What tak
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import groupby
 from typing import Any
 
 import attrs
@@ -14,7 +13,7 @@ import numpy as np
 from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.errors import GenProfileError, NoMotion, SpecError
-from gen_profile.evaluation.demands import demands
+from gen_profile.evaluation.demands import axis_demands
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, peak
@@ -100,11 +99,11 @@ def _json(knob: Any) -> dict[str, Any]:
 
 def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any]]:
     """Hold what the drives are asked for against the limits."""
-    by_axis = groupby(demands(spec, evaluation.command), key=lambda one: one.column)
-    for (column, of_axis), axis in zip(by_axis, spec.machine().actuated, strict=True):
+    for column, axis in enumerate(spec.machine().actuated):
         limits, name = spec.limits.of(column), axis.name if len(spec.axis) > 1 else ""
         taken: list[tuple[str, str, float, float | None]]
-        taken = [(one.quantity, one.unit, one.asked, one.allowed) for one in of_axis]
+        asked = axis_demands(spec, evaluation.command, column)
+        taken = [(one.quantity, one.unit, one.asked, one.allowed) for one in asked]
         if limits.travel is not None:
             least, most = extremes(evaluation.command, 0, column)
             low, high = limits.travel

@@ -208,7 +208,7 @@ def _work(connection: Connection) -> None:
         os.setpgrp()
     import_module("gen_profile.studio.views")  # before the first question comes
     gc.freeze()  # what was loaded stays: looking through it for garbage takes as long as a solve
-    with one_thread(), suppress(EOFError, OSError):
+    with one_thread, suppress(EOFError, OSError):
         while True:
             job = connection.recv()
             while connection.poll():

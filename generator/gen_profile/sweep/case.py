@@ -114,7 +114,7 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcom
     """
     require_versions(recipe.versions, "this sweep")
     try:
-        with _ALONE, one_thread(), on_processors(1):
+        with _ALONE, one_thread, on_processors(1):
             outcome, files = design_in_memory(recipe.spec(values), recipe.formats, by_fmpy=case % EVERY == 0)
         return CaseOutcome(record=_record(case, values, outcome), files=files)
     except errors.GenProfileError as error:

@@ -96,30 +96,49 @@ def _axis(option: str, name: str, axes: Sequence[str]) -> str:
     return name
 
 
-@attrs.frozen(kw_only=True, eq=False, repr=False)
-class Judgement(Drawable):
-    """A check of one file, and what its manifest says about it.
+@attrs.frozen(kw_only=True, eq=False)
+class JudgedFile:
+    """A file that was judged by a spec, and what the manifest beside it says about it.
 
     Attributes
     ----------
     path : Path
-    format : str
     spec : Spec
-    check : Check
     manifest : str
         ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
     companions : mapping of str to str
         Of each file that was exported with it, as its wrapper: ``"matches"``, ``"differs"`` or ``"missing"``.
+    """
+
+    path: Path
+    spec: Spec
+    manifest: str
+    companions: Mapping[str, str] = attrs.field(factory=dict)
+
+    def identity(self, format_: str) -> dict[str, Any]:
+        """Nest plain values for JSON that tell which file was judged, and by which spec."""
+        artefact = {"format": format_, "path": str(self.path), "manifest": self.manifest}
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "artefact": {**artefact, "companions": self.companions},
+        }
+
+
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Judgement(Drawable, JudgedFile):
+    """A check of one file, and what its manifest says about it.
+
+    Attributes
+    ----------
+    format : str
+    check : Check
     variant : str or None
         What was changed of the motion, in words.
     """
 
-    path: Path
     format: str
-    spec: Spec
     check: Check
-    manifest: str
-    companions: Mapping[str, str] = attrs.field(factory=dict)
     variant: str | None = None
 
     def summary(self) -> dict[str, object]:
@@ -133,18 +152,7 @@ class Judgement(Drawable):
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        return {
-            "name": self.spec.name,
-            "spec_sha256": self.spec.sha256(),
-            "artefact": {
-                "format": self.format,
-                "path": str(self.path),
-                "manifest": self.manifest,
-                "companions": self.companions,
-            },
-            "variant": self.variant,
-            "check": self.check.to_dict(),
-        }
+        return {**self.identity(self.format), "variant": self.variant, "check": self.check.to_dict()}
 
 
 def check_artefact(

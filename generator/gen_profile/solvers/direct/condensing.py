@@ -139,7 +139,7 @@ def _eliminated(constant: Array, by_state: Array, by_input: Array, integration: 
         ],
         axis=-1,
     )
-    with one_thread():
+    with one_thread:
         solved = np.linalg.solve(inner, right.reshape(intervals, STAGES * n, -1)).reshape(right.shape)
     across = np.einsum("i,kial->kal", GAUSS.end, solved)
     across[:, :, 1 : 1 + n] += (1.0 - GAUSS.end.sum()) * np.eye(n)

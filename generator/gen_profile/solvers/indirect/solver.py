@@ -81,7 +81,7 @@ def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
     return judged(problem, weighted, refined.solution, iterations, refined.residual or costed.residual)
 
 
-@one_thread()
+@one_thread
 def solve(problem: Problem, options: IndirectOptions = USUAL) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
