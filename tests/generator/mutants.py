@@ -34,14 +34,14 @@ import attrs
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from planned_machines import FORMER, GANTRY, HOIST
+from planned_machines import GANTRY, HOIST, histories_apart, numbering
 
 from gen_profile.errors import GenProfileError
 from gen_profile.planner import design, execution
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
-from gen_profile.proof.numbering import DRAWS, RHYTHMS, SEARCH, Numbering
+from gen_profile.proof.numbering import DRAWS, RHYTHMS, SEARCH
 from gen_profile.proof.verdict import JudgedHistory, kind_of, late_on_average, lateness
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
@@ -174,16 +174,12 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
     finally:
         design.block_text = text_of
     histories = Histories.of(spec)
-    numbering = Numbering.of(histories, count, seed=5)  # nothing is known to climb from
-    numbering = attrs.evolve(numbering, parents=((),) * len(numbering.rounds))
-    drawn = [(numbering.group(number), numbering.history(number)) for number in range(count)]
+    numbered = numbering(histories, count, seed=5)
+    drawn = [(numbered.group(number), numbered.history(number)) for number in range(count)]
     random.Random(name).shuffle(drawn)
     drawn.sort(key=lambda one: one[0] != RHYTHMS)  # in these most is left by errors
-    former = [
-        (SEARCH, Numbering.of(histories, *numbers[:2]).history(numbers[2]))
-        for numbers in FORMER.get(name, ())
-    ]
-    groups, drawn = zip(*former, *drawn, strict=True)
+    apart = [(SEARCH, history) for history in histories_apart(name, histories)]
+    groups, drawn = zip(*apart, *drawn, strict=True)
     return Machine(
         name=name,
         spec=spec,
@@ -378,15 +374,15 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
             "limits.axis.y={velocity=1.0, acceleration=0.1, jerk=1.0, travel=[0.0, 20.0]}",
         ],
     ),
-    "gyro": preset_spec(
+    "gyro": preset_spec(  # gusts and errors are small, so that a wrong estimate shows
         "gantry-crane",
         [
-            *(CYCLE, "planner.live={L=[3.0, 9.0]}", "robustness.uncertain={L=0.05}"),
+            *(CYCLE, "planner.live={L=[3.0, 9.0]}", "robustness.uncertain={L=0.005}"),
             "limits={velocity=1.0, acceleration=0.4, jerk=2.0, travel=[0.0, 20.0]}",
             'planner.sensor={quantity="rate", of=["theta_x", "theta_y"], noise=0.002, offset=0.02}',
             "planner.sensor.delay=[0.05, 0.15]",
             "planner.disturbance={swing={payload-x=0.5, payload-y=0.5}, settle=15.0}",
-            "planner.disturbance.gust={acceleration=0.1, longest=5.0}",
+            "planner.disturbance.gust={acceleration=0.02, longest=5.0}",
         ],
     ),
     "damped": preset_spec("bay-crane", [CYCLE, "plant.c1=200.0"]),

@@ -1,6 +1,15 @@
-"""Machines that planner blocks are proved for, what they once failed, and a double pendulum of its own."""
+"""Machines that planner blocks are proved for, histories beside the drawn ones, and a double pendulum."""
 
+from math import inf, sin
+
+import attrs
 import numpy as np
+
+from gen_profile.planner.commands import Command
+from gen_profile.planner.design import STEADY
+from gen_profile.proof.habits import Change
+from gen_profile.proof.histories import Histories, History
+from gen_profile.proof.numbering import Numbering
 
 G = 9.81
 CYCLE = 0.004
@@ -57,6 +66,7 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (400, 12, 237),  # error 8, where a plan began beside a blocked interval
         (400, 7, 167),  # 19 mm beyond the stated ends of a stop
         (300, 12, 23),  # judged by the rope of its beginning, while it planned for another one
+        (200, 2, 183),  # no fault: an axis comes out of a blocked interval
         (200, 2, 134),  # a stop 0.1 s late, sought along the motion of an axis that turns round
         (300, 144, 153),  # no fault: another rope was given in the first cycle, so the first one never was
         (200, 4, 4),  # no fault: judged by the time that it was in a slow interval, too
@@ -112,6 +122,61 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (2000, 1003, 112),  # an override that was not obeyed for 20 s, as the load was damped on the way
         (2000, 1007, 1110),  # no fault: fSensorScale was judged in the cycle of bReset
         (2000, 1002, 725),  # damped 4.5 s late, as the last 5 mm took the axis 6 s
+    ],
+}
+
+
+def numbering(histories: Histories, count: int, seed: int) -> Numbering:
+    """Draw histories: those of the search, too, as nothing is known to climb from."""
+    drawn = Numbering.of(histories, count, seed)
+    return attrs.evolve(drawn, parents=((),) * len(drawn.rounds))
+
+
+def histories_apart(name: str, histories: Histories) -> list[History]:
+    """Give those that a machine of `mutants.MACHINES` once failed, and others that are seldom drawn."""
+    former = [
+        numbering(histories, count, seed).history(number) for count, seed, number in FORMER.get(name, ())
+    ]
+    corner = numbering(histories, 8, 1).history(0)
+    return [*former, *(attrs.evolve(corner, **parts) for parts in SELDOM.get(name, ()))]
+
+
+def _positions(*places, time=0.0):
+    return Command(time=time, command="position", values=places)
+
+
+def _by_hand(begin, lasts, fastest, *, cycle=0.01, every=0.1):
+    """Disable, and move the first axis at the velocities that it states; it stands as it is enabled."""
+    speeds = [fastest * sin(np.pi * k * every / lasts) for k in range(round(lasts / every))]
+    moves = (
+        Change(
+            time=begin + k * every,
+            lasts=every,
+            inputs={"fActPosition_x": speed * cycle, "fActVelocity_x": speed},
+        )
+        for k, speed in enumerate(speeds)
+    )
+    return (Change(time=begin, lasts=lasts + every, inputs={"bEnable": 0.0}), *moves)
+
+
+SELDOM = {
+    "followed": [  # one axis is moved by hand as it says, which the promise outlasts; a stick waits at 0
+        {
+            "places": (20.0, 6.0),
+            "hoisting": {},
+            "commands": (
+                _positions(20.0, 6.0),
+                Command(time=16.0, command="velocity", values=(0.0, 0.0)),
+                _positions(22.0, 7.0, time=60.0),
+            ),
+            "changes": _by_hand(2.0, 12.0, 0.1),
+        }
+    ],
+    "tight": [  # the load is another by little more than what counts
+        {
+            "commands": (_positions(8.0), _positions(20.0, time=30.0)),
+            "changes": (Change(time=5.0, lasts=inf, inputs={"fm2": (1.0 - 1.5 * STEADY) * 2000.0}),),
+        }
     ],
 }
 

@@ -304,7 +304,8 @@ class _Reader:
     def _gives_up(self, cycle: int) -> bool:
         """Whether the block does, where it may: the axes have stood for so long though they are to move."""
         facts, begin = self._facts, cycle - self._inputs.patience
-        if facts is None or facts.errors[cycle] != NO_MOTION or self.command == STOP or begin < 0:
+        to_move = self.command == POSITION or (self.command == VELOCITY and any(self._goal))
+        if facts is None or facts.errors[cycle] != NO_MOTION or not to_move or begin < 0:
             return False
         return bool(facts.stands[begin:cycle].all()) and min(self._tops) > 0.0
 

@@ -162,7 +162,7 @@ def promises(run: Followed) -> Iterator[Allowance]:
         ends = [*run.rest_reports, *run.enabled[1:], run.cycles]
         until = min(end for end in ends if end >= begin)
         if begin and known < until and (run.guided & ~run.stands)[begin - 1 : known].all():
-            yield from never("kept", promise[known:until])
+            yield from greatest("kept", 1.0 * promise[known:until], 0.0, known)
 
 
 def events(run: Followed) -> Iterator[Allowance]:
@@ -216,7 +216,7 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
         if order.kind == DISABLED:
             at = order.end
             moving |= bool(run.velocity[:, at - 1 : at].any())
-            moved = run.moved(order.begin, at) > 0.0
+            moved = run.moved(order.begin, at) > 0.0 and not (run.reserve and _moves_as_stated(run, order))
             begun = bool(run.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
             refused = bool((run.issued["nErrorId"][: order.begin] == NO_MOTION).any())
             may_be[at:] |= moving or moved or begun or refused
@@ -232,6 +232,15 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
         if sees[order.begin : order.end].any():
             must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
     return may_be | (np.cumsum(run.sensed("nSensorFault")) > 0), must_be
+
+
+def _moves_as_stated(run: Followed, order: TimedOrder) -> bool:
+    """Whether axes that are moved by hand go where their stated velocities lead, from a standstill on."""
+    steps = run.steps[:, order.begin : order.end + 1]
+    speeds = run.speeds[:, order.begin : order.end + 1]
+    led = run.cycle * np.cumsum(speeds - 0.5 * np.diff(speeds, prepend=0.0), axis=1)
+    apart = np.abs(np.cumsum(steps, axis=1) - led).max(axis=1)
+    return all(gap < BARELY * own.velocity for gap, own in zip(apart.tolist(), run.limits, strict=True))
 
 
 def stops(run: Followed) -> Iterator[Allowance]:

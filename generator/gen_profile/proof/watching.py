@@ -40,6 +40,7 @@ STATED = 1.05  # sway by what the block states: between the machines that it wat
 MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 SURELY = 3  # times that the block needs to see a live parameter change
+CLEARLY = 1.01  # of the change from which on it must be seen
 RETOLD = 0.5  # of the change of a live parameter that counts, from which on plans are for another machine
 MEDIAN = 3  # cycles, of which the median of a live parameter counts
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
@@ -276,7 +277,7 @@ class BlockWatch:
             rows = (np.flatnonzero(value[1:] != value[:-1]) + 1).tolist()  # which may be infinite
             ends = [*first[rows[1:]].tolist(), cycles]
             for row, begin, end in zip(rows, first[rows].tolist(), ends, strict=False):
-                good = low <= value[row] <= high and abs(value[row] - value[0]) > SURELY * STEADY * high
+                good = low <= value[row] <= high and abs(value[row] - value[0]) > CLEARLY * STEADY * high
                 if good and value[row - 1] == value[0] and begin + sure < min(end, cycles):
                     yield begin, begin + sure
 
