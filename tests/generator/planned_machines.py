@@ -115,6 +115,11 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (100, 4, 57),  # 2.7 s late, as what half of a long plan leaves was calmed
         (300, 140, 204),  # a setpoint that jumped by 3 mm, as a kernel in work was dropped for a stick
     ],
+    "gyro": [
+        (192, 5, 20),  # no fault: fSwayUncertainty was judged without the sensor's delay and offset
+        (192, 5, 94),  # no fault: likewise, as it was first used
+        (300, 150, 27),  # no fault: fSensorScale was judged by motions before the offset was known
+    ],
     "followed": [
         (128, 5, 20),  # a setpoint that jumped by 0.22 m, as one axis was weighed before calming, one after
     ],

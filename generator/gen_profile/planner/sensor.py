@@ -6,7 +6,7 @@ y = Σ shown z (or of z') + offset. The gains are those of the steady Kalman fil
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import product
+from itertools import accumulate, product
 
 import attrs
 import numpy as np
@@ -52,6 +52,7 @@ SURE = 4.0  # standard deviations of what is estimated, that lie between the fir
 NOISES = 8.0  # standard deviations of the noise that no value is off by
 STUCK = 4.0  # of them, by which what is expected may change while the value stays the same
 MISREAD = 0.5  # share by which what it shows of the axis's own motions may differ from what is expected
+FADES = 0.35  # rate by which fSwayUncertainty declines, by the slowest frequency (sensor.st)
 SURE_OTHERS = 6.0  # standard deviations of the noise that look like own motions
 UPDATE = 0.1  # s between new values at most, from which steps are judged
 POSITION_WEIGHT, PULSE_WEIGHT = 0.2, 3.0  # of the law, beside a weight of 1 of the sway
@@ -206,12 +207,14 @@ def largest_innovation(spec: Spec) -> float:
 
 
 def estimation_error(spec: Spec) -> float:
-    """Find by how much, in m, an estimate of the end load's sway is off in gusts and with wrong frequencies.
+    """Find by how much, in m, an estimate of the end load's sway is off in gusts and by all stated errors.
 
     No acceleration within bounds moves it by more than the integral of the size of what an impulse leaves
     (Desoer and Vidyasagar 1975); wrong frequencies act as an acceleration on the stated swing and on what
-    the axes' own accelerations make of it. As in the filter's design, modes have `LIGHT` damping at least:
-    without any, gusts in time with a faster mode for minutes lead the estimate farther away.
+    the axes' own accelerations make of it, and an unknown delay as an error of what is measured, by the same
+    integral. What is unknown at first, the sensor's offset included, counts where it dies away later than
+    `fSwayUncertainty` does. As in the filter's design, modes have `LIGHT` damping at least: without any,
+    gusts in time with a faster mode for minutes lead the estimate farther away.
     """
     points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
     own = 2.0 * max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
@@ -221,16 +224,29 @@ def estimation_error(spec: Spec) -> float:
 
 
 def _estimation_error_at(spec: Spec, one: SensedModes, own: float) -> float:
-    assert spec.planner.sensor is not None
-    state, measured, gain = _filter(spec.planner.sensor, one)
-    estimated, pushed = np.zeros((2, len(state)))
-    estimated[:-1:2], pushed[1:-1:2] = one.end_load, one.push
+    sensor = spec.planner.sensor
+    assert sensor is not None
+    state, measured, gain = _filter(sensor, one)
+    slowest, push = float(one.frequencies[0]), abs(float(one.push[0]))
+    estimated, kicks = np.zeros(len(state)), np.zeros((len(state), 5))
+    estimated[:-1:2] = one.end_load
+    unknown, kicks[1:-1:2, 0], kicks[:, 1] = kicks[:, 2:], one.push, gain
+    unknown[0, 0], unknown[1, 1], unknown[-1, 2] = one.swing, slowest * one.swing, sensor.offset
     step = IMPULSE_STEP / float(one.frequencies[-1])
-    transition, sizes = expm((state - np.outer(gain, measured[0])) * step), list[float]()
-    for _ in range(round(IMPULSE_PHASE / (step * float(one.frequencies[0])))):
-        sizes.append(abs(float(estimated @ pushed)))
-        pushed = transition @ pushed
-    return float(np.sum(sizes) * step * (_unknown_acceleration(spec, one) + _stiffness_error(spec) * own))
+    transition = expm((state - np.outer(gain, measured[0])) * step)
+    steps = range(round(IMPULSE_PHASE / (step * slowest)))
+    left = np.array([*accumulate(steps, lambda row, _: row @ transition, initial=estimated)]) @ kicks
+    pushed, measured_wrong = np.abs(left[:, :2]).sum(axis=0) * step
+    stated = one.swing * np.exp(-FADES * slowest * step * np.arange(len(left)))
+    late = np.hypot(left[:, 2], left[:, 3]) + np.abs(left[:, 4]) - stated
+    turn = slowest * 0.5 * (sensor.delay[1] - sensor.delay[0])
+    shown = abs(float(one.shown[0])) * slowest ** int(sensor.quantity == "rate")
+    swings = one.swing + push * own / slowest**2
+    return float(
+        pushed * (_unknown_acceleration(spec, one) + _stiffness_error(spec) * own)
+        + measured_wrong * shown * swings * turn
+        + max(0.0, late.max())
+    )
 
 
 def _unknown_acceleration(spec: Spec, one: SensedModes) -> float:

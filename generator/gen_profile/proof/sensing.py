@@ -345,8 +345,9 @@ def _misread(
     first = one.fails if fault else 0.0
     rate, since = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
     swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
-    since_first = (cycles * cycle > first)[:, None]
-    moved = issued[axis.of("fAcceleration")][:, None] * np.hstack([since_first, np.ones_like(since_first)])
+    # before, what swung at first and the offset are not known yet
+    since_first = (cycles * cycle > first) & (since * cycle > period)
+    moved = issued[axis.of("fAcceleration")][:, None] * np.transpose([since_first, np.ones_like(since_first)])
     share = cycle / period
     own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
     before = sway[max(0, round((first - period) / cycle)) : round(first / cycle)]  # shown otherwise later
