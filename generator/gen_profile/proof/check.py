@@ -38,7 +38,8 @@ class BlockJudgement:
     manifest : str
         ``"matches"``, ``"differs"`` (the file is not the one that was written), or ``"none"`` for this spec.
     companions : mapping of str to str
-        Of all other files of its export: ``"matches"``, ``"differs"`` or ``"missing"``.
+        Of all other files of its export: ``"matches"``, ``"differs"`` or ``"missing"``; and ``"earlier"`` of
+        those that only an earlier export of it had.
     history : int or None
         Number of the only one.
     """
@@ -147,7 +148,9 @@ def check_block(
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec), count, seed, parents)
         replayed = replay(spec, text, numbering, history, progress)
-    check = attrs.evolve(replayed, faults=(*alterations(path, agreement), *strays(path, companions)))
+    check = attrs.evolve(
+        replayed, faults=(*alterations(path, agreement, manifest), *strays(path, companions))
+    )
     return BlockJudgement(
         path=path,
         text=text,
