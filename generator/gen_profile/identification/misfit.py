@@ -206,7 +206,7 @@ def explanations(fit: Fit, more: Sequence[str], progress: Progress = no_progress
     for count in range(1, min(TRIED, len(more)) + 1):
         longer = [(*freed, name) for freed in begun for name in more if name not in freed]
         sets = {frozenset(freed): freed for freed in longer}
-        stage, tried = f"looking for {count} more to explain it", {}
+        stage, tried = f"looking for parameters that explain it, {count} at once", {}
         for number, freed in enumerate(sets.values()):
             progress(stage, number, len(sets), joined(AND, freed))
             tried[freed] = _of_small_swings(rough.freed(freed), freed[-1])
