@@ -1,10 +1,11 @@
 """Dask workers: processes of this computer, or those of a scheduler that runs elsewhere."""
 
 import logging
+import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import resource_tracker
 from typing import Any
 
@@ -54,7 +55,12 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
             raise SpecError(f"{silent} ({error}).") from error
         if scheduler is None:
             client.run(_ignore_interrupts)  # a terminal sends Ctrl-C to them, too; this process ends them
-        yield client
+        try:
+            yield client
+        except BaseException:
+            if isinstance(cluster, LocalCluster):
+                _end_at_once(cluster)
+            raise
     finally:
         with interrupts_collected():
             stack.close()
@@ -96,6 +102,15 @@ def _keep_up(cluster: LocalCluster, workers: int, stack: ExitStack) -> None:
     renewal = PeriodicCallback(lambda: cluster.scale(workers), RENEWAL)
     cluster.loop.add_callback(renewal.start)
     stack.callback(cluster.loop.add_callback, renewal.stop)
+
+
+def _end_at_once(cluster: LocalCluster) -> None:
+    """End processes that may be at work, for whose cases Dask would wait four seconds."""
+    for nanny in cluster.workers.values():
+        nanny.auto_restart = False
+        if nanny.pid:
+            with suppress(OSError):  # it has just ended
+                os.kill(nanny.pid, signal.SIGTERM)
 
 
 def _ignore_interrupts() -> None:

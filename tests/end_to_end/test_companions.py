@@ -122,6 +122,48 @@ def test_a_missing_companion_is_noted_and_one_of_another_delivery_fails(folder, 
     assert "no manifest of this spec" in named.out and named.code == 4
 
 
+def test_two_motions_whose_files_changed_places_fail_the_check(tmp_path):
+    """Each was found in the manifest by its content, and passed as the other."""
+    other = preset_spec("paper", ["export.cycle_time=0.01", "move.distance=0.31", "name='other'"])
+    for spec in (SPEC, other):
+        design(spec, ["csv"], tmp_path, check=False)
+    paths = [tmp_path / f"{name}.csv" for name in ("paper", "other")]
+    assert all(check_artefact(path, row=0).passed for path in paths)
+    contents = [path.read_bytes() for path in paths]
+    for path, content in zip(paths, reversed(contents), strict=True):
+        path.write_bytes(content)
+    for path in paths:
+        judged = check_artefact(path, row=0)
+        assert (judged.manifest, judged.spec.name, judged.passed) == ("differs", path.stem, False)
+        due = f"{path.name} is not what manifest.json beside it lists"
+        assert any(fault.startswith(due) for fault in judged.check.faults)
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(contents[1])
+    assert check_artefact(copy, row=0).spec.name == "other"
+    copy.write_bytes(contents[1] + b"\n")
+    *_, fault = check_artefact(copy, row=0).check.faults
+    assert fault.startswith(
+        "copy.csv is none of the files that manifest.json beside it lists, which is of the motion other.csv"
+    )
+
+
+def test_a_companion_that_only_an_earlier_export_wrote_is_noted(tmp_path):
+    """It was neither compared nor mentioned."""
+    for node in (1, 2):
+        design(
+            preset_spec("paper", ["export.cycle_time=0.01", f"can.node={node}"]),
+            ["can"],
+            tmp_path,
+            check=False,
+        )
+    outcome = run_here("check", tmp_path / "paper.log", "--scenario", 0)
+    assert outcome.code == 0
+    assert "; paper.node1.cdcf NOT of this export but left over from an earlier one" in outcome.out
+    assert "paper.node2.cdcf as exported" in outcome.out
+    (tmp_path / "paper.node1.cdcf").unlink()
+    assert "paper.node1" not in run_here("check", tmp_path / "paper.log", "--scenario", 0).out
+
+
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory):
     """A planner block in all forms that take it, as if it were proved."""

@@ -3,6 +3,7 @@
 import json
 import multiprocessing
 import os
+import time
 from types import SimpleNamespace
 
 import attrs
@@ -49,6 +50,24 @@ def test_a_process_that_is_given_up_is_started_anew(monkeypatch):
 
 
 # Cases
+
+
+@pytest.mark.slow
+def test_an_interruption_waits_for_no_process_at_work(tmp_path):
+    """Dask let each work on for four seconds."""
+    begun, ended = tmp_path / "begun", tmp_path / "ended"
+
+    def long_work():
+        begun.touch()
+        time.sleep(2.0)
+        ended.touch()
+
+    with pytest.raises(KeyboardInterrupt), cluster.client_of(None, 1) as client:
+        future = client.submit(long_work)
+        while not begun.exists():
+            time.sleep(0.01)
+        raise KeyboardInterrupt
+    assert future.status != "finished" and not ended.exists()
 
 
 @pytest.mark.slow

@@ -11,8 +11,8 @@ from gen_profile.identification.estimation import estimate
 from gen_profile.identification.fit import fit_of
 from gen_profile.identification.identify import identify
 from gen_profile.identification.measurements import Period, SwingLog, parse_reading
-from gen_profile.identification.misfit import Explanation, likeliest, spectrum
-from gen_profile.identification.swing_model import SwingingMachine, swing_model
+from gen_profile.identification.misfit import Explanation, elsewhere, likeliest, spectrum
+from gen_profile.identification.swing_model import SwingingMachine, SwingModel, swing_model
 from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.reading import preset_spec
@@ -174,3 +174,28 @@ def test_what_a_stopwatch_rests_on_is_told():
     )
     moved = estimate(longer, ["L1"], watched).values["L1"] - estimate(crane, ["L1"], watched).values["L1"]
     assert found == pytest.approx(moved, rel=0.02)
+
+
+def test_large_swings_that_differ_little_from_small_ones_are_not_tried(monkeypatch):
+    """Fitting them took minutes for the log of another machine, before it was refused."""
+    monkeypatch.setattr(misfit, "nothing_left", lambda *_, **__: pytest.fail("large swings were tried"))
+    own = swing(HOIST.nominal(), TIMES, [0.02, 0.0])
+    log = log_of(own + 0.005 * np.sin(3.1 * TIMES) + 0.1 * NOISE)
+    assert elsewhere(fit_of(hoist(), ["L0"], [], [swing_model(hoist(), log)])) is None
+
+
+def test_a_machine_whose_other_load_swings_too_far_explains_nothing(monkeypatch):
+    """Its damping may be endless, so that each look at it took half a minute."""
+    monkeypatch.setattr(SwingModel, "_outputs", lambda *_: pytest.fail("it was integrated"))
+    machine = SwingingMachine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    seen = log_of(NOISE, load="hook")
+    fit = fit_of(machine, ["L1"], [], [swing_model(machine, seen)])
+    assert not misfit._may_explain(fit, np.array([1.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+
+
+def test_a_log_that_nothing_explains_is_said_to_be_of_another_machine():
+    """It was said to determine the rope to ± 3466 % only, and to be measured better."""
+    foreign = log_of(0.05 * np.cos(3.1 * TIMES) + 0.012 * np.cos(5.3 * TIMES + 1.0) + 0.1 * NOISE)
+    expected = r"^The log of payload is not of this machine: a swing of .* which no parameter explains; look"
+    with pytest.raises(InfeasibleProblem, match=expected):
+        identify(preset_spec("single-pendulum-crane"), foreign, "L0", (0.0, 4.0))

@@ -6,7 +6,7 @@ import json
 import attrs
 import pytest
 
-from gen_profile.artefacts.manifest import Artefact, Manifest, parse_manifest, sha256
+from gen_profile.artefacts.manifest import PLANNER, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.errors import OutputError
 
 ARTEFACT = Artefact(format="csv", path="brücke.csv", sha256="00", bytes=3, payload_sha256="11")
@@ -50,6 +50,35 @@ def test_of_two_exports_of_the_same_bytes_a_file_belongs_to_that_of_its_name():
         assert (found.name, found.companions(name, "00")) == (due, {f"{due}.dbc": due})
     assert both.covering("a.log", "altered").companions("a.log", "altered") == {"a.dbc": "a"}
     assert both.companions("brücke.csv", "00") == {} == both.companions("unknown", "altered")
+
+
+def test_a_file_by_the_name_of_another_is_of_that_name():
+    """Two motions whose files had changed places were taken for each other."""
+
+    def export(name, format_="csv"):
+        return attrs.evolve(
+            MANIFEST, name=name, artefacts=(attrs.evolve(ARTEFACT, path=name, sha256=name, format=format_),)
+        )
+
+    both = export("b").after(export("a"))
+    assert both.covering("a", "b").name == "a" and both.covering("b", "a").name == "b"
+    assert both.covering("copy", "a").name == "a"
+    block = export("b", PLANNER).after(export("a"))
+    assert block.covering("a", "b", planner=True) is None and block.covering("b", "a") is None
+
+
+def test_what_only_an_earlier_export_of_a_name_wrote_is_left_over():
+    def export(name, *files, format_="can"):
+        made = (Artefact(format=format_, path=one, sha256=one, bytes=1) for one in files)
+        return attrs.evolve(MANIFEST, name=name, artefacts=tuple(made))
+
+    first, other = export("a", "a.log", "a.dbc", "a.csv"), export("b", "b.log", "b.dbc")
+    table = export("a", "a.st", format_="plc")
+    latest = export("a", "a.log", "a.csv").after(table.after(other.after(first)))
+    assert latest.left_over("a.log", "altered") == ["a.dbc"]
+    assert latest.companions("a.log", "altered") == {"a.csv": "a.csv"}
+    assert latest.covering("b.log", "b.log").left_over("b.log", "b.log") == []
+    assert latest.left_over("unknown", "unknown") == []
 
 
 def test_says_unverified_without_a_check():

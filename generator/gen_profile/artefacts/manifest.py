@@ -102,24 +102,33 @@ class Manifest:
         return attrs.evolve(self, earlier=tuple(one for one in remaining if one.artefacts))
 
     def covering(self, name: str, digest: str, *, planner: bool = False) -> Manifest | None:
-        """Find the export that a file comes from: by its SHA-256 (of several by its name), else by its name.
+        """Find the export that a file comes from: by its name or, where no export has that, by its SHA-256.
 
         A motion's file that was altered and renamed is taken for one of the latest motion.
         """
         listed = [(one, known) for one in (self, *self.earlier) for known in one.artefacts]
         alike = [(one, known) for one, known in listed if (known.format == PLANNER) == planner]
-        same = [(one, known) for one, known in listed if known.sha256 == digest]
-        by_content = [one for one, _ in sorted(same, key=lambda found: found[1].path != name)]
-        by_name = [one for one, known in alike if known.path == name]
+        if any(known.path == name for _, known in listed):  # or files of two motions could change places
+            return next((one for one, known in alike if known.path == name), None)
+        by_content = [one for one, known in listed if known.sha256 == digest]
         latest = [] if planner else [one for one, _ in alike]
-        return next(iter(by_content or by_name or latest), None)
+        return next(iter(by_content or latest), None)
 
     def companions(self, name: str, digest: str) -> dict[str, str]:
         """List what was exported with a file in its format, SHA-256 by name; it is found as by `covering`."""
-        found = [known for known in self.artefacts if known.sha256 == digest or known.path == name]
-        own = min(found, key=lambda known: (known.sha256 != digest, known.path != name), default=None)
+        own = self._own(name, digest)
         of_format = [known for known in self.artefacts if own is not None and known.format == own.format]
         return {known.path: known.sha256 for known in of_format if known is not own}
+
+    def left_over(self, name: str, digest: str) -> list[str]:
+        """List what earlier exports of the same name and format as a file's wrote, and its own did not."""
+        own, alike = self._own(name, digest), [one for one in self.earlier if one.name == self.name]
+        known = [known for one in alike for known in one.artefacts]
+        return [one.path for one in known if own is not None and one.format == own.format]
+
+    def _own(self, name: str, digest: str) -> Artefact | None:
+        found = [known for known in self.artefacts if known.sha256 == digest or known.path == name]
+        return min(found, key=lambda known: (known.path != name, known.sha256 != digest), default=None)
 
     def words(self) -> str:
         """Tell what it is of: the kind and the names of the latest export's files."""

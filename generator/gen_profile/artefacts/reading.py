@@ -124,8 +124,16 @@ def _compared(folder: Path, name: str, digest: str) -> str:
 
 
 def companions_of(manifest: Manifest | None, path: Path, content: bytes) -> dict[str, str]:
-    """Tell as `compared` does of each file that was exported with one, as its wrapper."""
-    return compared(path.parent, manifest.companions(path.name, sha256(content)) if manifest else {})
+    """Tell as `compared` does of each file that was exported with one, as its wrapper.
+
+    Files beside it that only an ``"earlier"`` export of it had are among them.
+    """
+    if manifest is None:
+        return {}
+    own = (path.name, sha256(content))
+    left_over = (name for name in manifest.left_over(*own) if PureWindowsPath(name).name == name)
+    earlier = {name: "earlier" for name in left_over if (path.parent / name).is_file()}
+    return {**compared(path.parent, manifest.companions(*own)), **earlier}
 
 
 def strays(path: Path, companions: Mapping[str, str]) -> tuple[str, ...]:

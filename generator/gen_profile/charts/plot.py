@@ -106,7 +106,7 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
         case Comparison(spec=spec):
             return [comparison_figure(result, every)], spec.name, f"{spec.name}: {spec.plant.type}"
         case Robustness(spec=spec):
-            load = spec.machine().end_load_name
+            load = "loads" if len(result.errors) > 1 else spec.machine().end_load_name  # a map is of all
             title = f"{spec.name}: residual sway of the {load} on machines that are not as specified"
             return [robustness_figure(result)], spec.name, title
         case Identification(logs=()):

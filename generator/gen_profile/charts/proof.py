@@ -177,20 +177,20 @@ def _remains_figure(spec: Spec, proof: Proof) -> Figure:
 
 def map_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw the worst share of the limit in cells of two live parameters, or of every history over one."""
-    live = spec.planner.live
+    live, judged = spec.planner.live, [one for one in proof.judged if one.promise] or proof.judged
     names = [*live] if len(live) == 2 else [*live][:1]
-    places = [[one.history.live[name] for one in proof.judged] for name in names]
+    places = [[one.history.live[name] for one in judged] for name in names]
     panel = _shares_panel(
         "Worst residual sway",
         [_labelled(spec, name) for name in names] or ["history"],
-        np.array(places or [[one.number for one in proof.judged]]),
+        np.array(places or [[one.number for one in judged]]),
         [live[name] for name in names],
-        [proof.fraction(one) for one in proof.judged],
+        [proof.fraction(one) for one in judged],
     )
     captions = (
-        "Every history.",
-        "Every history, over what the block is given.",
-        "Over what the block is given; white: no history there.",
+        "Every history with a promise.",
+        "Every history with a promise, over what the block is given.",
+        "Over what the block is given; white: no history with a promise there.",
     )
     return Figure(captions[len(names)], [panel], columns=1)
 

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from gen_profile.certificate.document import certificate_path
-from gen_profile.evaluation.phrases import MANIFEST_WORDS, companions, mm, named, number
+from gen_profile.evaluation.phrases import MANIFEST_WORDS, UNPROMISED, companions, mm, named, number
 from gen_profile.units import RATES
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gen_profile.identification.identify import Identification
     from gen_profile.identification.learning import Learning
     from gen_profile.proof.check import BlockJudgement
-    from gen_profile.proof.verdict import Proof
+    from gen_profile.proof.verdict import JudgedHistory, Proof
     from gen_profile.report.build import Report
     from gen_profile.report.planner import PlannerReport
     from gen_profile.spec.model import Spec
@@ -160,7 +160,7 @@ def block_judgement(judged: BlockJudgement) -> str:
         ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
         ("given", worst.history.reported(judged.spec.machine().units)),
         ("commands", "; ".join(commands)),
-        ("residual sway", _by_load(worst.residual)),
+        ("residual sway", _remains(worst)),
         ("sway on the way", _by_load(worst.on_the_way)),
         ("history kept", "passed" if judged.check.passed else "FAILED"),
     ]
@@ -183,9 +183,13 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
     return [
         *groups,
         ("limits", limits),
-        ("worst history", f"{proof.worst.number}: residual sway {_by_load(proof.worst.residual)}"),
+        ("worst history", f"{proof.worst.number}: residual sway {_remains(proof.worst)}"),
         ("proof", f"{verdict}: {100.0 * document['share']:.3g} % of the limit"),
     ]
+
+
+def _remains(judged: JudgedHistory) -> str:
+    return _by_load(judged.residual) + ("" if judged.promise else UNPROMISED)
 
 
 def _groups(check: Check) -> list[tuple[str, str]]:

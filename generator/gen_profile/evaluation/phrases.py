@@ -11,7 +11,13 @@ MANIFEST_WORDS = {
     "differs": "the file is NOT the one that was exported",
     "none": "no manifest of this spec beside the file",
 }
-COMPANION_WORDS = {"matches": "as exported", "differs": "NOT as exported", "missing": "missing, not compared"}
+COMPANION_WORDS = {
+    "matches": "as exported",
+    "differs": "NOT as exported",
+    "missing": "missing, not compared",
+    "earlier": "NOT of this export but left over from an earlier one",
+}
+UNPROMISED = ", and nothing is promised"  # of sway that remains
 SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
 
 

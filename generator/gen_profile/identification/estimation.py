@@ -110,8 +110,7 @@ def estimate(
         misfit_of_logs = misfits(again.fit, again.unknowns)
     if not any(misfit_of_logs):
         return _estimate(around, noise, misfit_of_logs, noise, progress)
-    progress("looking for parameters that explain it")
-    _require_unexplained(fit, misfit_of_logs)
+    _require_unexplained(fit, misfit_of_logs, progress)
     effective = [
         sigma if one is None else one.widened(sigma, len(model.log.times))
         for one, sigma, model in zip(misfit_of_logs, noise.tolist(), fit.models, strict=True)
@@ -174,12 +173,12 @@ def taken_as_exact(fit: Fit) -> list[str]:
     return [q.name for q in fit.machine.plant.parameters if q.name not in (*fit.names, GRAVITY)]
 
 
-def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> None:
+def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None], progress: Progress) -> None:
     """Refuse to identify some parameters by a log that tells that others are wrong.
 
     The range of a wrong model holds nothing.
     """
-    explained = explanations(fit, taken_as_exact(fit))
+    explained = explanations(fit, taken_as_exact(fit), progress)
     if not explained:
         return
     model, left = next((m, one) for m, one in zip(fit.models, misfit_of_logs, strict=True) if one is not None)

@@ -271,7 +271,7 @@ def identify(
         estimated = estimate(machine, names, readings, logs, progress)
     return Identification(
         given=spec,
-        spec=_identified(spec, estimated),
+        spec=_identified(spec, estimated, logs),
         readings=readings,
         logs=logs,
         estimate=estimated,
@@ -343,7 +343,7 @@ def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], ask
         raise SpecError(*faults)
 
 
-def _identified(spec: Spec, estimated: Estimate) -> Spec:
+def _identified(spec: Spec, estimated: Estimate, logs: Sequence[SwingLog]) -> Spec:
     """Put the parameters and their ranges into a spec."""
     known = {name: abs(value) for name, value in estimated.values.items() if value != 0.0}
     shares = {name: estimated.half_range[name] / size for name, size in known.items()}
@@ -352,6 +352,15 @@ def _identified(spec: Spec, estimated: Estimate) -> Spec:
         template = "{name} to ±{percent:.0f} % only"
         each = [Phrase(template, name=name, percent=100.0 * share) for name, share in wide.items()]
         words = joined(AND, each)
+        rows = zip(logs, estimated.misfits, strict=True)
+        if foreign := [(log, left) for log, left in rows if left is not None]:
+            log, left = max(foreign, key=lambda one: one[1].rms / one[1].noise)
+            template = (
+                "The log of {log.load} is not of this machine: a swing of {left.rms:.2g} {log.unit} RMS at "
+                "{left.frequency:.3g} rad/s, {ratio:.2g} times the noise, is left of it, which no parameter "
+                "explains; look at which machine was logged, and at the log's columns, unit and signal."
+            )
+            raise InfeasibleProblem(template, log=log, left=left, ratio=left.rms / left.noise)
         if estimated.contradiction > 1.0:
             template = (
                 "The measurements contradict one another by {contradiction:.2g} times their "

@@ -7,6 +7,7 @@ the periodogram (N. R. Lomb, 1976), whose ordinates are distributed exponentiall
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import attrs
 import numpy as np
@@ -14,9 +15,11 @@ from scipy.ndimage import median_filter
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.fit import Fit
-from gen_profile.identification.swing_model import SwingModel, shortened
+from gen_profile.identification.swing_model import WIDEST_SWING, SwingModel, shortened
 from gen_profile.identification.uncertainty import WIDEST, uncertainty
 from gen_profile.motion.profile import Array
+from gen_profile.phrase import AND, joined
+from gen_profile.progress import Progress, no_progress
 
 HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
 MOST_LINES = 2000
@@ -33,6 +36,7 @@ STARTS = (1.0, 0.5, 0.7, 1.4, 2.0)  # times a parameter of the spec, where it is
 ROUGHLY = 1200  # samples, four of each of the fastest swings, by which parameters are chosen
 TRIED = 2  # parameters at once that may explain what is left
 GROSS = 0.5  # of a log's standard deviation: a machine that leaves more of it explains nothing
+BENT = 0.5  # of what small swings leave, by which large ones must differ to explain it
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -166,8 +170,9 @@ def elsewhere(fit: Fit) -> Explanation | None:
     """Find a fit that leaves nothing but noise, by large swings, or begun at another value of a parameter."""
     if not fit.models:
         return None
-    begun_small = fit.as_of_small_swings() is not None
-    if begun_small and (patiently := nothing_left(fit, (), small_first=False)) is not None:
+    near = fit.as_of_small_swings()
+    tried = near is not None and _may_explain(fit, near)
+    if tried and (patiently := nothing_left(fit, (), small_first=False)) is not None:
         return patiently
     rough, read = _rough(fit), {getattr(reading, "parameter", "") for reading in fit.readings}
     begun = (_of_small_swings(rough, name) for name in fit.names if name not in read)
@@ -181,7 +186,7 @@ def _rough(fit: Fit) -> Fit:
     return attrs.evolve(fit, models=tuple(models))
 
 
-def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
+def explanations(fit: Fit, more: Sequence[str], progress: Progress = no_progress) -> tuple[Explanation, ...]:
     """Find which parameters, identified as well, leave nothing but noise of every log.
 
     As few as will do are taken up, first those with which small swings fit best, which is fast to find out.
@@ -193,19 +198,25 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
     fit : Fit
     more : sequence of str
         Parameters that were taken as known.
+    progress : callable
+        Told what is being done.
     """
     rough = _rough(fit)
     begun: list[tuple[str, ...]] = [()]
-    for _ in range(min(TRIED, len(more))):
+    for count in range(1, min(TRIED, len(more)) + 1):
         longer = [(*freed, name) for freed in begun for name in more if name not in freed]
         sets = {frozenset(freed): freed for freed in longer}
-        tried = {freed: _of_small_swings(rough.freed(freed), freed[-1]) for freed in sets.values()}
+        stage, tried = f"looking for parameters that explain it, {count} at once", {}
+        for number, freed in enumerate(sets.values()):
+            progress(stage, number, len(sets), joined(AND, freed))
+            tried[freed] = _of_small_swings(rough.freed(freed), freed[-1])
         most = EQUIVALENT * min(one.squares for one in tried.values())
         begun = [freed for freed, one in tried.items() if one.squares <= most < math.inf]
         worthwhile = {freed: tried[freed].fit for freed in begun if tried[freed].explains}
-        found = (
-            nothing_left(attrs.evolve(one, models=fit.models), freed) for freed, one in worthwhile.items()
-        )
+        found = []
+        for number, (freed, one) in enumerate(worthwhile.items()):
+            progress("trying what may explain it", number, len(worthwhile), joined(AND, freed))
+            found.append(nothing_left(attrs.evolve(one, models=fit.models), freed))
         if likely := likeliest([one for one in found if one is not None]):
             return likely
         if not begun:
@@ -233,16 +244,19 @@ class _SmallSwings:
         That begins where it is.
     squares : float
         Left of all logs; infinite where they do not tell the parameters.
+    unknowns : (u,) array
+        There.
     """
 
     fit: Fit
     squares: float = math.inf
+    unknowns: Array = attrs.field(factory=partial(np.empty, 0))
 
     @property
     def explains(self) -> bool:
         """Whether it leaves so little that it is worth its while to try large swings, which takes seconds."""
         squares = (float(np.var(model.log.values)) * len(model.log.times) for model in self.fit.models)
-        return self.squares <= GROSS**2 * sum(squares)
+        return self.squares <= GROSS**2 * sum(squares) and _may_explain(self.fit, self.unknowns)
 
 
 def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
@@ -258,8 +272,32 @@ def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
         except (InfeasibleProblem, np.linalg.LinAlgError):
             continue
         squares = float(sum(residuals @ residuals for residuals in small.left(unknowns)))
-        fits.append(_SmallSwings(fit=fit.beginning(fit.parameters(unknowns)), squares=squares))
+        begun = fit.beginning(fit.parameters(unknowns))
+        fits.append(_SmallSwings(fit=begun, squares=squares, unknowns=unknowns))
     return min(fits, key=lambda one: one.squares)
+
+
+def _may_explain(fit: Fit, unknowns: Array) -> bool:
+    """Tell whether large swings may leave only noise where the best small ones, at these unknowns, did not.
+
+    They cannot where they differ from small ones by far less than what those leave. A machine whose loads,
+    seen by the log or not, would swing farther than any load is let explains nothing; as its damping may be
+    endless, to integrate it once may take half a minute.
+    """
+    small, parameters = fit.small(), fit.parameters(unknowns)
+    ends = np.cumsum([len(fit.names), *(model.unknowns for model in fit.models)])
+    starts = np.split(unknowns, ends)[1:-1]
+    pairs = zip(fit.models, starts, strict=True)
+    if any(model.widest(parameters, start) > WIDEST_SWING for model, start in pairs):
+        return False
+    if not any(misfits(small, unknowns)):
+        return True
+    try:
+        large = np.concatenate(fit.left(unknowns))
+    except CosimulationError:
+        return True
+    left = np.concatenate(small.left(unknowns))
+    return bool(np.linalg.norm(large - left) > BENT * np.linalg.norm(left))
 
 
 def nothing_left(fit: Fit, freed: tuple[str, ...], *, small_first: bool = True) -> Explanation | None:

@@ -88,6 +88,13 @@ class SwingModel:
         start = np.linalg.lstsq(design / size, self.log.values[:count], rcond=1e-8)[0] / size
         return np.asarray(start)
 
+    def widest(self, parameters: Mapping[str, float], start: Array) -> float:
+        """Say how far any load swings from such a start, in rad, were its swings small."""
+        machine, loads = self.machine.of(parameters), self.machine.plant.loads
+        logs = (attrs.evolve(self.log, quantity="angle", load=load) for load in loads)
+        answers = (_linear_answers(machine, log)[:, self.shown] @ start[:-1] for log in logs)
+        return max(float(np.abs(answer).max()) for answer in answers)
+
     def residuals(
         self, parameters: Mapping[str, float], names: Sequence[str], steps: Array, start: Array, until: float
     ) -> tuple[Array, Array]:

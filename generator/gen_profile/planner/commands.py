@@ -9,7 +9,7 @@ import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
-from gen_profile.planner.events import COLUMNS, events_of
+from gen_profile.planner.events import COLUMNS, events_of, require_events
 from gen_profile.planner.execution import BlockInstance, block_inputs
 from gen_profile.planner.interface import SENSED, BlockAxis, block_axes, live_inputs, sensed_axes
 from gen_profile.planner.sensor_log import SensorLog, read_rows, read_sensor_log
@@ -170,6 +170,8 @@ def play(
         raise SpecError(f"commands: the last one comes at {at}, and at most {most} are played in one go.")
     sensed = sensed_axes(inputs, axes)
     log = None if sensor_text is None else read_sensor_log(sensor_text, sensed)
+    if with_events:
+        require_events(text)
     block = BlockInstance(text)  # compiled only for tables that can be played
     columns = _columns(axes) | ({"damping": "bDamping"} if sensed else {})
     columns |= {axis.prefix + name: axis.of(output) for axis in sensed for name, output in SENSED.items()}

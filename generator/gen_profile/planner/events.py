@@ -1,6 +1,7 @@
 """The events that a planner block keeps for an operator's screen: from its outputs, and in words."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -39,6 +40,12 @@ def error_words(number: int) -> str:
     return WORDS.get(NO_ERROR + number, f"error {number}").partition(", at {")[0]
 
 
+def require_events(text: str) -> None:
+    """Refuse, by a `SpecError`, a block that keeps no events."""
+    if not re.search(r"\bnEvents\s*:", text):
+        raise SpecError("events: the block keeps none; state planner.events = true and write it anew.")
+
+
 def events_of(outputs: Sequence[str], issued: Array) -> Iterator[Event]:
     """Find the events in a block's outputs.
 
@@ -48,13 +55,7 @@ def events_of(outputs: Sequence[str], issued: Array) -> Iterator[Event]:
         Their names.
     issued : (cycles, outputs) array
 
-    Raises
-    ------
-    SpecError
-        The block keeps none.
     """
-    if "nEvents" not in outputs:
-        raise SpecError("events: the block keeps none; state planner.events = true and write it anew.")
     places = {
         name: [outputs.index(f"{name}[{k}]") for k in range(KEPT)]
         for name in ("aEventTime", "aEventCode", "aEventValue")

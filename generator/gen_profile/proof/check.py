@@ -128,7 +128,9 @@ def check_block(
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec), count, seed, parents)
         replayed = replay(spec, text, numbering, history, progress)
-    check = attrs.evolve(replayed, faults=(*alterations(path, agreement), *strays(path, companions)))
+    check = attrs.evolve(
+        replayed, faults=(*alterations(path, agreement, manifest), *strays(path, companions))
+    )
     return BlockJudgement(
         path=path,
         text=text,

@@ -212,7 +212,10 @@ class Proof(Summarised, Examination):
             "search_parents": [list(numbers) for numbers in self.parents],
             "share": self.fraction(self.worst),
             "worst": self.described(self.worst),
-            "next_worst": [{"number": one.number, "share": self.fraction(one)} for one in ranked[1:LISTED]],
+            "next_worst": [
+                {"number": one.number, "share": self.fraction(one), "promise": one.promise}
+                for one in ranked[1:LISTED]
+            ],
             "groups": [self._group(name) for name in GROUPS if self._of(name)],
             "limits": {name: max(one.limits[name] for one in self.judged) for name in self.judged[0].limits},
             "longest_rest_s": max((one.rests_after or 0.0 for one in self.judged), default=0.0),

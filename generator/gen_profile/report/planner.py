@@ -11,7 +11,7 @@ import tomli_w
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.charts.proof import damping_figures, history_figure, map_figure, worst_damped
-from gen_profile.evaluation.phrases import MANIFEST_WORDS, companions, mm, number
+from gen_profile.evaluation.phrases import MANIFEST_WORDS, UNPROMISED, companions, mm, number
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.check import BlockJudgement, check_block
 from gen_profile.proof.closed_loop import Trace, trace
@@ -91,18 +91,31 @@ def _verdict(proof: Proof, path: Path) -> Verdict:
     if not proof.passed:
         return Verdict(word="Failed.", passed=False, sentences=[*proof.reasons(), again])
     load = _worst_load(proof, proof.worst)
+    found = (
+        f"After the last command the {load} sways by {mm(proof.worst.residual[load])} at most (history "
+        f"{proof.worst.number} of {proof.count}, drawn with the seed {proof.seed}), and "
+        f"{mm(proof.limit[load])} are allowed."
+    )
     return Verdict(
         word="Passed.",
         passed=True,
         sentences=[
-            f"After the last command the {load} sways by {mm(proof.worst.residual[load])} at most (history "
-            f"{proof.worst.number} of {proof.count}, drawn with the seed {proof.seed}), and "
-            f"{mm(proof.limit[load])} are allowed.",
+            found if proof.worst.promise else "No residual sway is judged.",
             "Every history kept velocity, acceleration, jerk and travel in every cycle, and came to rest.",
+            *_left_swinging(proof),
             again,
             *(f"Warning: {sentence}" for sentence in proof.warnings()),
         ],
     )
+
+
+def _left_swinging(proof: Proof) -> Iterator[str]:
+    """Say in how many histories nothing is promised, so that no sway counts."""
+    if count := sum(not one.promise for one in proof.judged):
+        yield (
+            f"In {count} of {len(proof.judged)} the block promises nothing at the end, as after a quick "
+            "stop: the sway that is left then is not judged."
+        )
 
 
 def _facts(proof: Proof) -> list[tuple[str, str]]:
@@ -112,8 +125,8 @@ def _facts(proof: Proof) -> list[tuple[str, str]]:
     resting = max(one.rests_after or 0.0 for one in proof.judged)
     return [
         ("Histories", f"{len(proof.judged)}"),
-        (f"Residual sway of the {load}, worst", mm(worst.residual[load])),
-        ("Share of its limit", Share(proof.fraction(worst)).percent),
+        (f"Residual sway of the {load}, worst", _residual(worst, load)),
+        ("Share of its limit", Share(proof.fraction(worst)).percent if worst.promise else "not judged"),
         ("Sway on the way, worst", mm(swaying)),
         ("Standstill after the last command", f"{number(resting)} s at most"),
     ]
@@ -160,6 +173,11 @@ def _worst_load(proof: Proof, judged: JudgedHistory) -> str:
     return max(proof.limit, key=lambda load: judged.residual[load] / proof.limit[load])
 
 
+def _residual(judged: JudgedHistory, load: str) -> str:
+    """Say by how much a load sways in the end, and whether that was to be."""
+    return mm(judged.residual[load]) + ("" if judged.promise else UNPROMISED)
+
+
 def _commands(history: History) -> str:
     """Write a history's commands as the table that `planner play` reads."""
     rows = [["time_s", "command", *(axis.of("value") for axis in history.axes.values())]]
@@ -176,8 +194,8 @@ def _ranking(spec: Spec, proof: Proof) -> Table:
     def row(one: JudgedHistory) -> TableRow:
         values = [number(one.history.live[name]) for name in live]
         load = _worst_load(proof, one)
-        residual = f"{load} {mm(one.residual[load])}"
-        cells: list[str | Share] = [f"{one.number}", one.group, *values, residual, Share(proof.fraction(one))]
+        fraction = Share(proof.fraction(one)) if one.promise else "not judged"
+        cells = [f"{one.number}", one.group, *values, f"{load} {_residual(one, load)}", fraction]
         return TableRow(cells=cells, mark="failed" if proof.fraction(one) > 1.0 else "")
 
     live_columns = (f"{name} ({units[name]})" for name in live)
@@ -197,7 +215,10 @@ def _limits(spec: Spec, proof: Proof) -> Table:
             cells = (title, f"{number(fraction * limit)} {unit}", f"{number(limit)} {unit}", Share(fraction))
             rows.append(TableRow(cells=cells, mark="passed" if fraction <= 1.0 + 1e-9 else "failed"))
     for load, limit in proof.limit.items():
-        worst = max(one.residual[load] for one in proof.judged if one.promise) + proof.error_bound
+        promised = [one.residual[load] for one in proof.judged if one.promise]
+        if not promised:
+            continue
+        worst = max(promised) + proof.error_bound
         cells = (f"residual sway of the {load}, error included", mm(worst), mm(limit), Share(worst / limit))
         rows.append(TableRow(cells=cells, mark="passed" if worst <= limit else "failed"))
     return Table(head=("", "takes", "allowed", "share"), rows=rows)

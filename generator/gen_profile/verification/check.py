@@ -107,7 +107,8 @@ class JudgedFile:
     manifest : str
         ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
     companions : mapping of str to str
-        Of each file that was exported with it, as its wrapper: ``"matches"``, ``"differs"`` or ``"missing"``.
+        Of each file that was exported with it, as its wrapper: ``"matches"``, ``"differs"`` or ``"missing"``;
+        and ``"earlier"`` of one that only an earlier export of it had.
     """
 
     path: Path
@@ -215,7 +216,7 @@ def check_artefact(
         check = _verdict(asked, played, rows, progress)
     except CosimulationError as error:  # as of setpoints that no machine can follow
         raise CosimulationError(" ".join([str(error), *implausibilities(asked, played)])) from error
-    faults = (*check.faults, *alterations(path, agreement), *strays(path, companions))
+    faults = (*check.faults, *alterations(path, agreement, manifest), *strays(path, companions))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
     return Judgement(
         path=path,
@@ -377,11 +378,14 @@ def provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
     return "differs"
 
 
-def alterations(path: Path, agreement: str) -> tuple[str, ...]:
+def alterations(path: Path, agreement: str, manifest: Manifest | None) -> tuple[str, ...]:
     """Say that a file is none of those that were exported."""
-    if agreement != "differs":
+    if agreement != "differs" or manifest is None:
         return ()
+    if path.name in (artefact.path for artefact in manifest.artefacts):
+        found = f"not what {FILENAME} beside it lists by this name"
+    else:
+        found = f"none of the files that {FILENAME} beside it lists, which is of {manifest.words()}"
     return (
-        f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its export, "
-        "or comes from another; export it again.",
+        f"{path.name} is {found}: it was altered after its export, or comes from another; export it again.",
     )
