@@ -9,18 +9,17 @@ from pathlib import Path
 import numpy as np
 from exporters.st_interpreter import FunctionBlock
 
-from gen_profile_exporters.st_to_c import translate
+from gen_profile.planner.execution import translated
+from gen_profile_fmu.building.cache import cached
+from gen_profile_fmu.description.fmu_files import digest
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
 @cache
 def compile_counting(text):
-    """The library of a block, its inputs with their initial values, and its outputs.
-
-    Without optimisation, which takes gcc five times as long as these tests then run.
-    """
-    translation = translate(text)
+    """The library of a block, its inputs with their initial values, and its outputs."""
+    translation = translated(text)
     name = translation.name
     taken = "".join(f"fb->{v.name} = *in++; " for v in translation.inputs)
     given = "".join(f"*out++ = fb->{v.name}; " for v in translation.outputs)
@@ -39,20 +38,24 @@ void play({name} *fb, const double *in, long cycles, double *out) {{
     }}
 }}
 """
-    with tempfile.TemporaryDirectory() as folder:
-        for file, content in (
-            (f"{name}.h", translation.header),
-            (f"{name}.c", translation.source),
-            ("loop.c", loop),
-        ):
-            Path(folder, file).write_text(content)
-        options = ["-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-o", "loop.so"]
-        subprocess.run(["gcc", *options, "loop.c", "-lm"], cwd=folder, check=True)
-        library = ctypes.CDLL(str(Path(folder, "loop.so")))
+    files = {f"{name}.h": translation.header, f"{name}.c": translation.source, "loop.c": loop}
+    key = digest(*(content.encode("ascii") for content in files.values()))[:32]
+    entry = cached(f"counted-{key}", lambda _: {"loop.so": _compiled(files)})
+    library = ctypes.CDLL(str(entry / "loop.so"))
     library.size.restype = ctypes.c_long
     initial = {v.name: float({"true": 1, "false": 0}.get(v.initial[0], v.initial[0])) if v.initial else 0.0
                for v in translation.inputs}  # fmt: skip
     return library, initial, [v.name for v in translation.outputs] + ["operations"]
+
+
+def _compiled(files):
+    """Compile without optimisation, which takes gcc five times as long as these tests then run."""
+    with tempfile.TemporaryDirectory() as folder:
+        for file, content in files.items():
+            Path(folder, file).write_text(content)
+        options = ["-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-o", "loop.so"]
+        subprocess.run(["gcc", *options, "loop.c", "-lm"], cwd=folder, check=True)
+        return Path(folder, "loop.so").read_bytes()
 
 
 class CountedBlock:

@@ -26,7 +26,8 @@ CYCLES = 3
 REFUSED = "refused"
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 # of each program
-NAMES = (*"cwe", "sound", "unsound", "within", "turn", "nonzero", "whole", "rounded", "root")
+HELPERS = ("sound", "unsound", "within", "turn", "nonzero", "whole", "rounded", "root")
+NAMES = (*"cwe", *HELPERS, *(f"whole_{name}" for name in ("sum", "difference", "product")))
 
 
 def runner(translation):

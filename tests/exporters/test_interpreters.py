@@ -11,6 +11,7 @@ from exporters.st_programs import DECLARATIONS, FAULT, INPUTS, SHOWN, draw
 from st_interpreter import FunctionBlock, StError
 
 from gen_profile.errors import ExportError
+from gen_profile.planner import execution
 from gen_profile_exporters.st_to_c import translate
 
 COUNT = int(os.environ.get("PROGRAMS", "500"))
@@ -175,6 +176,17 @@ def test_a_number_of_any_length_is_refused_and_leading_zeros_count_for_nothing()
     with pytest.raises(ExportError, match="no DINT is as great as 9999"):
         translate(text_of(f"k := {'9' * 5000};"))
     assert translate(text_of(f"k := {'0' * 5000}7;")) == translate(text_of("k := 7;"))
+
+
+def test_a_translation_is_kept_until_what_makes_it_changes(tmp_path, monkeypatch):
+    text, made = text_of("k := 7;"), []
+    monkeypatch.setenv("GEN_PROFILE_CACHE", str(tmp_path))
+    monkeypatch.setattr(execution, "translate", lambda one: made.append(one) or translate(one))
+    for translator, count in ((execution._translator(), 1), (execution._translator(), 1), ((b"new",), 2)):
+        monkeypatch.setattr(execution, "_translator", lambda known=translator: known)
+        execution.translated.cache_clear()
+        assert execution.translated(text) == translate(text)
+        assert len(made) == count
 
 
 def test_nesting_without_end_is_refused_in_a_sentence():

@@ -1,10 +1,13 @@
 """Executing a written planner block: its own text, translated to C, compiled and called cycle by cycle."""
 
 import ctypes
+import json
 from ctypes import POINTER, c_char_p, c_double, c_int, c_long, c_void_p
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import attrs
 import fmpy
@@ -13,7 +16,10 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import ISSUED, STATES, BlockAxis, block_axes
+from gen_profile.strict_json import parse_json
+from gen_profile_exporters import st_to_c, st_variables, text_parts
 from gen_profile_exporters.st_to_c import FAULTS, Translation, translate
+from gen_profile_exporters.st_variables import StVariable
 from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
@@ -101,7 +107,7 @@ class BlockInstance:
 
 def block_inputs(text: str) -> dict[str, float]:
     """Read initial values of a block's inputs by name, without compiling it; raises as `BlockInstance`."""
-    return {v.name: v.start for v in translate(text).inputs}
+    return {v.name: v.start for v in translated(text).inputs}
 
 
 def require_sound(fault: int) -> None:
@@ -121,8 +127,39 @@ def require_sound(fault: int) -> None:
 
 
 @lru_cache(maxsize=4)
+def translated(text: str) -> Translation:
+    """Translate a block, which takes half a second, or find its translation in the cache.
+
+    Raises
+    ------
+    ExportError
+        It is no text that `translate` takes.
+    CosimulationError
+        There is no folder to keep it in.
+    """
+    file = "block.json"
+    key = digest(text.encode("utf-8", "surrogatepass"), *_translator())[:32]
+    entry = cached(f"translation-{key}", lambda _: {file: json.dumps(translate(text)).encode("ascii")})
+    name, *sections, header, source = parse_json((entry / file).read_bytes())
+    inputs, outputs = (
+        tuple(StVariable(*kind, tuple(initial), lower) for *kind, initial, lower in section)
+        for section in sections
+    )
+    return Translation(name, inputs, outputs, header, source)
+
+
+@cache
+def _translator() -> tuple[bytes, ...]:
+    """Give all that a translation is made by, so that none outlives a change of it."""
+    modules: tuple[Any, ...] = (st_to_c, st_variables, text_parts)  # perhaps in an archive
+    code = (module.__loader__.get_data(module.__file__) for module in modules)
+    texts = (text_parts.FOLDER / name for name in st_to_c.TEXTS)
+    return version("lark").encode("ascii"), *code, *(path.read_bytes() for path in texts)
+
+
+@lru_cache(maxsize=4)
 def _loaded(text: str) -> tuple[Translation, ctypes.CDLL]:
-    translation = translate(text)
+    translation = translated(text)
     return translation, _compiled(translation)
 
 
