@@ -5,7 +5,7 @@ import json
 from ctypes import POINTER, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import cache, lru_cache
 from importlib.metadata import version
-from itertools import chain
+from itertools import chain, starmap
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +142,7 @@ def translated(text: str) -> Translation:
     entry = cached(f"translation-{key}", lambda _: {file: json.dumps(translate(text)).encode("ascii")})
     name, *sections, header, source = parse_json((entry / file).read_bytes())
     inputs, outputs = (
-        tuple(StVariable(*kind, tuple(initial), lower) for *kind, initial, lower in section)
+        tuple(one._replace(initial=tuple(one.initial)) for one in starmap(StVariable, section))
         for section in sections
     )
     return Translation(name, inputs, outputs, header, source)
