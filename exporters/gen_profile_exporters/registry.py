@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     _CONFORMING: tuple[Exporter, ...] = (can, csv_table, rockwell_l5x)
     _CONTAINERS: tuple[BlockContainer, ...] = (codesys, plcopen_xml, siemens_scl, structured_text, twincat)
 
+BESIDE = {  # what else is in a folder of exports
+    ".toml": "a spec; name the file that was exported of it first",
+    ".json": "a manifest or a certificate; name the file that it is of",
+}
+
 Proof = Literal["executed", "read back", "schema-checked", "parsed", "untested"]
 
 
@@ -163,8 +168,8 @@ def format_of(path: PurePath | str) -> str:
         return own
     known = formats()
     name = _longest_suffix(path, known)
-    if name is None and PurePath(path).suffix == ".toml":
-        raise SpecError(f"{path}: this is a spec; name the file that was exported of it first.")
+    if name is None and (beside := BESIDE.get(PurePath(path).suffix)):
+        raise SpecError(f"{path}: this is {beside}.")
     if name is None:
         raise SpecError(
             f"{path}: no format has the suffix {PurePath(path).suffix!r} "

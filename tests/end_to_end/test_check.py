@@ -290,7 +290,7 @@ def test_what_is_no_artefact_is_one_sentence(folder, name, ruin, code):
 
 
 def test_a_suffix_that_no_format_has_is_a_sentence(folder):
-    for name in ("paper.txt", "manifest.json", "paper"):
+    for name in ("paper.txt", "paper"):
         if not (folder / name).exists():
             (folder / name).write_bytes(b"")
         outcome = run_here("check", folder / name)

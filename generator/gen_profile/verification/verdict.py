@@ -175,8 +175,8 @@ class Check(Drawable, Tabled, Examination):
         return max(map(self._end_load, self.groups.get(SEARCH, ())), default=0.0)
 
     def reasons(self) -> tuple[str, ...]:
-        """Say why the check failed, a sentence each; none when it passed."""
-        return (*self._sentences(self.judged), *self.faults)
+        """Say why the check failed, a sentence each; none when it passed: first the file, as the cause."""
+        return (*self.faults, *self._sentences(self.judged))
 
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong without counting: implausible values, faults of timing."""
