@@ -59,12 +59,13 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time
         solver = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
     nominal, worst = (mm(figures[f"sway_residual_{which}_m"]) for which in ("peak", "worst"))
+    load = outcome.spec.machine().end_load_name
     rows = [
         ("move", _move(outcome.spec)),
         ("solver", solver),
         *_peaks(outcome),
-        ("sway on the way", mm(figures["sway_transient_peak_m"])),
-        ("residual sway", f"{nominal} nominal, {worst} at worst"),
+        ("sway on the way", f"{load} {mm(figures['sway_transient_peak_m'])}"),
+        ("residual sway", f"{load} {nominal} nominal, {worst} at worst"),
         *([] if outcome.check is None else (*_groups(outcome.check), *_wind(outcome.check))),
         ("check", _verdict(outcome.check)),
         *(row for path, proof in certificates.items() for row in (("file", path.name), *_proved(proof))),
