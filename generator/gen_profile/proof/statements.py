@@ -270,7 +270,7 @@ def stops(run: Followed) -> Iterator[Allowance]:
         lowest, highest = (
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
-        if not (run.reserve and order.begin in run.enabled):  # what swings as it is taken over is calmed
+        if not (run.reserve and _just_taken_over(run, order.begin)):  # else what swings then is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in run.limits)
             yield from greatest("ends", leaves - _asked(run, order, own), STATED + calms, begin)
@@ -292,6 +292,12 @@ def stops(run: Followed) -> Iterator[Allowance]:
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
+
+
+def _just_taken_over(run: Followed, cycle: int) -> bool:
+    """Whether the axes have not stood since they were taken over, but for the cycle before."""
+    begun = max(at for at in run.enabled if at <= cycle)
+    return not run.stands[begun : max(begun, cycle - 1)].any()
 
 
 def _asked(run: Followed, order: TimedOrder, own: slice) -> Array:
