@@ -187,3 +187,11 @@ def test_what_stands_beside_the_declarations_is_refused(container, tables, place
         )
         with pytest.raises(ExportError, match=f"{re.escape(repr(other))} stands "):
             container.replay(altered.encode(), goal)
+
+
+@BLOCKS
+@TABLES
+def test_a_declaration_that_stands_twice_is_refused(tables, read):
+    text, goal = written(tables, read)
+    with pytest.raises(ExportError):
+        read(text.replace("    nState : DINT;\n", 2 * "    nState : DINT;\n", 1), goal)
