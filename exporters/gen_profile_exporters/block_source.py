@@ -26,6 +26,10 @@ _ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.I
 COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed takes the rest
 _PLANNER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
+# An array's initialiser or an index, a name or hole, a number with its sign, an operator.
+TOKEN = re.compile(
+    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S", re.ASCII
+)
 
 
 @attrs.frozen
@@ -96,8 +100,8 @@ class BlockSource:
 
     def program(self) -> tuple[object, ...]:
         """Give what the block does, however its text is laid out, spelled and commented."""
-        variables = {(v.section, v.name.lower(), bare(v.type), *map(bare, v.values)) for v in self.variables}
-        return variables, COMMENT.sub(" ", self.body).lower().split()
+        variables = [(v.section, v.name.lower(), _pieces(v.type), _pieces(v.initial)) for v in self.variables]
+        return sorted(variables), _pieces(self.body)
 
     def declaration(self) -> str:
         """Everything before the statements, header excepted."""
@@ -115,7 +119,7 @@ def parse_function_block(text: str) -> BlockSource:
     Raises
     ------
     ExportError
-        It is no function block.
+        It is no function block, or holds more than declarations where a playback block declares.
     """
     header = _HEADER.match(text)
     name = _NAME.match(text, header.end() if header else 0)
@@ -124,7 +128,13 @@ def parse_function_block(text: str) -> BlockSource:
     variables: list[BlockVariable] = []
     at = name.end() - 1
     while section := _SECTION.match(text, at):
-        variables += _variables(" ".join(section[1].upper().split()), section[2])
+        kind = " ".join(section[1].upper().split())
+        other = COMMENT.sub(" ", _VARIABLE.sub(" ", section[2])).split()
+        if other and not is_planner(text):  # what that one does is proved, altered or not
+            raise ExportError(
+                f"{kind}: {other[0][:40]!r} stands beside the declarations; export the block again."
+            )
+        variables += _variables(kind, section[2])
         at = section.end()
     body = text[at:].lstrip("\n")
     if not _END.search(body):
@@ -153,6 +163,10 @@ def _variables(section: str, text: str) -> list[BlockVariable]:
         for name, type_, initial, comment in _VARIABLE.findall(text)
         if name
     ]
+
+
+def _pieces(text: str) -> list[str]:
+    return [bare(piece) for piece in TOKEN.findall(COMMENT.sub(" ", text))]
 
 
 def bare(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Every number of an exported block counts: one that is altered stops the block, and replay refuses it."""
+"""All of an exported block counts: an altered number stops the block, and replay refuses any change."""
 
 import re
 
@@ -9,7 +9,9 @@ from st_interpreter import FunctionBlock, StError
 from test_profile_library import started, together
 
 from gen_profile.errors import ExportError
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.library import read_library
 from gen_profile_exporters.vendors import codesys, plcopen_xml, siemens_scl, twincat
 
 LAYOUTS = ["segments", "samples", "counts"]
@@ -19,12 +21,20 @@ CONTAINERS = [codesys, plcopen_xml, siemens_scl, twincat]
 FREE = re.compile(r"fStartTolerance : [^;]*;")
 COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
 CONSTANTS = re.compile(r"VAR CONSTANT\n.*?END_VAR", re.DOTALL)
+PIECE = re.compile(r"\[[^\[\]]*\]|[\w.]+|:=|\S")
 NUMBER = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:E[+-]\d+)?|\d+|TRUE|FALSE)(?!\w)")
 
 
-def goal_of(profile, layout):
+def goal_of(profile, layout, tables="constants"):
     names = ("bridge", "trolley")[: profile.axes]
-    return target(*names, cycle_time=0.1, export={"plc_layout": layout})
+    return target(*names, cycle_time=0.1, export={"plc_layout": layout, "plc_tables": tables})
+
+
+def without_what_is_free(text):
+    """The program at its places, blanks in place of what may be edited."""
+    for left_out in (COMMENT, FREE):
+        text = left_out.sub(lambda found: " " * len(found[0]), text)
+    return text
 
 
 def other(value):
@@ -97,9 +107,7 @@ def test_a_library_refuses_to_start_with_any_altered_constant_of_the_motion_that
 def test_replay_refuses_any_altered_number(layout, profile):
     goal = goal_of(profile, layout)
     text = structured_text.block_text(profile, goal)
-    program = text
-    for left_out in (COMMENT, FREE):
-        program = left_out.sub(lambda found: " " * len(found[0]), program)
+    program = without_what_is_free(text)
     # the statements are the same in all of them
     begin, end = (0, len(text)) if layout == "segments" else CONSTANTS.search(program).span()
     found = list(NUMBER.finditer(program, begin, end))
@@ -123,3 +131,67 @@ def test_a_container_is_refused_with_any_altered_constant(container):
         new = {"TRUE": "FALSE"}.get(number[0], f"9{number[0]}")
         with pytest.raises(ExportError):
             container.replay((text[: number.start()] + new + text[number.end() :]).encode(), goal)
+
+
+def single(text, goal):
+    return [structured_text.read_table(text, goal).motion()]
+
+
+def library(text, goal):
+    return read_library(parse_function_block(text), goal)
+
+
+def written(tables, read):
+    """A block's text, for two axes, and what it is for."""
+    goal = goal_of(TWO, "segments", tables)
+    text = structured_text.block_text(TWO, goal)
+    return (text if read is single else together([text, text], goal)), goal
+
+
+BLOCKS = pytest.mark.parametrize("read", [single, library])
+TABLES = pytest.mark.parametrize("tables", ["constants", "variables"])
+
+
+@pytest.mark.slow
+@BLOCKS
+@TABLES
+def test_replay_refuses_a_block_that_lacks_or_repeats_any_piece(tables, read):
+    text, goal = written(tables, read)
+    for number, piece in enumerate(list(PIECE.finditer(without_what_is_free(text)))[::7]):
+        new = "" if number % 2 else f"{piece[0]} {piece[0]}"
+        with pytest.raises(ExportError):
+            read(text[: piece.start()] + new + text[piece.end() :], goal)
+
+
+@BLOCKS
+@TABLES
+def test_replay_takes_other_white_space_and_comments(tables, read):
+    text, goal = written(tables, read)
+    hashes = [motion.payload_hash() for motion in read(text, goal)]
+    edited = text.replace(" := ", ":=").replace(";", " ;").replace("    ", "\t").replace("\n", "\r\n\r\n")
+    edited = edited.replace("VAR_INPUT", "VAR_INPUT (* 2 * 3 *)")
+    assert [motion.payload_hash() for motion in read(edited, goal)] == hashes
+
+
+@pytest.mark.parametrize("container", [structured_text, twincat, siemens_scl])
+@TABLES
+@pytest.mark.parametrize("place", ["    nState : DINT;", "    bMoving", "VAR_INPUT\n", "    fSum : LREAL;\n"])
+def test_what_stands_beside_the_declarations_is_refused(container, tables, place):
+    """A compiler may take it for a part of one, as RETAIN."""
+    goal = goal_of(ONE, "segments", tables)
+    content = container.encode(ONE, goal)[0].content.decode()
+    assert container.replay(content.encode(), goal)
+    for other in ("RETAIN", ";", "x"):
+        altered = content.replace(
+            place, f"{place} {other} " if place.endswith("\n") else f" {other}{place}", 1
+        )
+        with pytest.raises(ExportError, match=f"{re.escape(repr(other))} stands "):
+            container.replay(altered.encode(), goal)
+
+
+@BLOCKS
+@TABLES
+def test_a_declaration_that_stands_twice_is_refused(tables, read):
+    text, goal = written(tables, read)
+    with pytest.raises(ExportError):
+        read(text.replace("    nState : DINT;\n", 2 * "    nState : DINT;\n", 1), goal)

@@ -15,7 +15,7 @@ from pathlib import Path
 import attrs
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.block_source import COMMENT, bare
+from gen_profile_exporters.block_source import COMMENT, TOKEN, bare
 from gen_profile_exporters.playback.layouts import LAYOUTS
 
 TEMPLATE = (Path(__file__).with_name("text") / "template.st").read_text("ascii")
@@ -28,10 +28,6 @@ _DECLARED = {"LREAL~": "$reals", "BOOL~": "$switches"}
 _HOLE = re.compile(r"@(\w+)")
 _LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
 _PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")
-# An array's initialiser or an index, a name or hole, a number with its sign, an operator.
-_TOKEN = re.compile(
-    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S", re.ASCII
-)
 
 
 @attrs.frozen
@@ -45,7 +41,7 @@ class Token:
     @property
     def line(self) -> int:
         """Line on which it begins, counted from 1."""
-        piece = next(islice(_TOKEN.finditer(self.program), self.number, None), None)
+        piece = next(islice(TOKEN.finditer(self.program), self.number, None), None)
         return 1 + self.program.count("\n", 0, piece.start() if piece else None)
 
 
@@ -63,7 +59,7 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
         The text differs from the template elsewhere, or one value from place to place.
     """
     program, due = _without_comments(text), _due(layout, axes)
-    tokens, values = _TOKEN.findall(program), dict[str, Token]()
+    tokens, values = TOKEN.findall(program), dict[str, Token]()
     for number, (piece, (expected, hole)) in enumerate(zip(tokens, due, strict=False)):
         known = values.setdefault(hole, Token(piece, number, program)).text if hole else expected
         if piece != known and bare(piece) != bare(known):
@@ -108,7 +104,7 @@ def layout_of(text: str) -> str:
 @cache
 def _due(layout: str, axes: int) -> list[tuple[str, str]]:
     """List the pieces of the template, each with the name of the hole that it is, if it is one."""
-    pieces = _TOKEN.findall(_without_comments(_program(layout, axes)))
+    pieces = TOKEN.findall(_without_comments(_program(layout, axes)))
     return [(piece, hole[1] if (hole := _HOLE.fullmatch(piece)) else "") for piece in pieces]
 
 
