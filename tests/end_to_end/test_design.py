@@ -160,7 +160,7 @@ def test_people_get_a_short_table(tmp_path):
     outcome = run_here("--out", tmp_path)
     rows = dict(line.strip().split("  ", 1) for line in outcome.out.splitlines()[1:])
     assert outcome.out.startswith("paper\n")
-    assert rows["sway on the way"].strip() == "19.36 mm"
+    assert rows["sway on the way"].strip() == "payload 19.36 mm"
     assert rows["peak motion"].strip().startswith("0.1803 m/s, 0.703 m/s²")
     assert "passed: hook 2.193 mm at worst (L1 -20 %), 3 mm allowed" in rows["check"]
     assert rows["wrote"].strip() == str(tmp_path / "paper.csv")

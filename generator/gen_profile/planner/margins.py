@@ -123,7 +123,7 @@ def _loop(
         if rate:
             estimated = (velocity * s - position * frequencies[mode] ** 2) / own
         learnt = learnt + shown[mode] * estimated
-    late = np.exp(-s * 0.5 * sum(sensor.delay))
+    late = np.exp(-s * sensor.usual_age)
     answer = _law(spec, written["cDampGain"], (gains[0], gains[modes]), float(push[0]), frequencies)
     closed = answer * late * machine / (1.0 + learnt * late)
     return np.asarray(-closed / (1.0 + closed))

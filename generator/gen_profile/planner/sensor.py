@@ -167,7 +167,7 @@ def _constants(
         unit=f"{unit}/s" if rate else unit,
         load=spec.machine().end_load_name,
         rate=rate,
-        age=_age(sensor),
+        age=sensor.usual_age,
         oldest=sensor.delay[1] + sensor.drop_out,
         drop_out=sensor.drop_out,
         most=2.0 * (disturbed + own(0)) + 2.0 * sensor.offset + NOISES * noise,
@@ -211,10 +211,9 @@ def estimation_error(spec: Spec) -> float:
 
     No acceleration within bounds moves it by more than the integral of the size of what an impulse leaves
     (Desoer and Vidyasagar 1975); wrong frequencies act as an acceleration on the stated swing and on what
-    the axes' own accelerations make of it, and an unknown delay as an error of what is measured, by the same
-    integral. What is unknown at first, the sensor's offset included, counts where it dies away later than
-    `fSwayUncertainty` does. As in the filter's design, modes have `LIGHT` damping at least: without any,
-    gusts in time with a faster mode for minutes lead the estimate farther away.
+    the axes' own accelerations make of it, and an unknown delay as an error of what is measured. What is
+    unknown at first, as the offset, counts where it dies away later than `fSwayUncertainty`. As in the
+    filter's design, modes have `LIGHT` damping at least: gusts in time with a faster one do more in minutes.
     """
     points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
     own = 2.0 * max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
@@ -227,26 +226,20 @@ def _estimation_error_at(spec: Spec, one: SensedModes, own: float) -> float:
     sensor = spec.planner.sensor
     assert sensor is not None
     state, measured, gain = _filter(sensor, one)
-    slowest, push = float(one.frequencies[0]), abs(float(one.push[0]))
-    estimated, kicks = np.zeros(len(state)), np.zeros((len(state), 5))
-    estimated[:-1:2] = one.end_load
-    unknown, kicks[1:-1:2, 0], kicks[:, 1] = kicks[:, 2:], one.push, gain
-    unknown[0, 0], unknown[1, 1], unknown[-1, 2] = one.swing, slowest * one.swing, sensor.offset
+    slowest, estimated, kicks = float(one.frequencies[0]), np.zeros(len(state)), np.zeros((len(state), 5))
+    estimated[:-1:2], kicks[1:-1:2, 0], kicks[:, 1] = one.end_load, one.push, gain
+    kicks[0, 2], kicks[1, 3], kicks[-1, 4] = one.swing, slowest * one.swing, sensor.offset
     step = IMPULSE_STEP / float(one.frequencies[-1])
-    transition = expm((state - np.outer(gain, measured[0])) * step)
     steps = range(round(IMPULSE_PHASE / (step * slowest)))
+    transition = expm((state - np.outer(gain, measured[0])) * step)
     left = np.array([*accumulate(steps, lambda row, _: row @ transition, initial=estimated)]) @ kicks
-    pushed, measured_wrong = np.abs(left[:, :2]).sum(axis=0) * step
-    stated = one.swing * np.exp(-FADES * slowest * step * np.arange(len(left)))
-    late = np.hypot(left[:, 2], left[:, 3]) + np.abs(left[:, 4]) - stated
-    turn = slowest * 0.5 * (sensor.delay[1] - sensor.delay[0])
-    shown = abs(float(one.shown[0])) * slowest ** int(sensor.quantity == "rate")
-    swings = one.swing + push * own / slowest**2
-    return float(
-        pushed * (_unknown_acceleration(spec, one) + _stiffness_error(spec) * own)
-        + measured_wrong * shown * swings * turn
-        + max(0.0, late.max())
-    )
+    pushed, misread = np.abs(left[:, :2]).sum(axis=0) * step
+    fading = one.swing * np.exp(-FADES * slowest * step * np.arange(len(left)))
+    late = np.hypot(left[:, 2], left[:, 3]) + np.abs(left[:, 4]) - fading
+    changes = abs(float(one.shown[0])) * slowest ** (1 + int(sensor.quantity == "rate"))  # in a second
+    changes *= one.swing + abs(float(one.push[0])) * own / slowest**2
+    known = pushed * (_unknown_acceleration(spec, one) + _stiffness_error(spec) * own)
+    return float(known + misread * changes * sensor.unknown_delay + max(0.0, late.max()))
 
 
 def _unknown_acceleration(spec: Spec, one: SensedModes) -> float:
@@ -272,15 +265,11 @@ def _disturbed(sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedMode
     return abs(float(one.shown[0])) * slowest ** int(sensor.quantity == "rate") * swing
 
 
-def _age(sensor: SensorSpec) -> float:
-    return 0.5 * (sensor.delay[0] + sensor.delay[1])
-
-
 def _sensed(spec: Spec, point: Sequence[float], direction: SensedDirection) -> SensedModes:
     at, sensor, disturbance = linearized(spec, point), spec.planner.sensor, spec.planner.disturbance
     assert sensor is not None and disturbance is not None
     slowest, errors = float(at.distinct_frequencies[0]), float(frequency_errors(spec)[0])
-    unknown = slowest * 0.5 * (sensor.delay[1] - sensor.delay[0]) + errors
+    unknown = slowest * sensor.unknown_delay + errors
     sways = at.sway_gain @ driven_modes(at, direction.axis)
     push = np.abs(sways[direction.largest, range(sways.shape[1])])
     by_load = dict(zip(spec.machine().loads, np.abs(sways[:, 0] / push[0]).tolist(), strict=True))
@@ -395,7 +384,7 @@ def _rows(spec: Spec, directions: Mapping[int, SensedDirection], point: Sequence
         if number in directions:
             one = _sensed(spec, point, directions[number])
             state, _, gain = _filter(sensor, one)
-            now = spec.export.cycle_time * expm(state * _age(sensor)) @ gain
+            now = spec.export.cycle_time * expm(state * sensor.usual_age) @ gain
             others = _others(spec, sensor, one)
             rows[-1][:] = *one.push, *one.shown, *one.end_load, *now[:-1:2], *now[1:-1:2], now[-1], others
     return np.concatenate(rows)
@@ -473,7 +462,7 @@ def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
             f"m that gusts make of them would not be seen, and {needed:.2g} m may be; measure another "
             'coordinate, or the sway of a load (quantity = "sway").'
         )
-    late, unknown = slowest * sensor.delay[1], 0.5 * slowest * (sensor.delay[1] - sensor.delay[0])
+    late, unknown = slowest * sensor.delay[1], slowest * sensor.unknown_delay
     if late > LARGEST_DELAY or unknown > UNKNOWN_DELAY:
         most, width = LARGEST_DELAY / slowest, 2.0 * UNKNOWN_DELAY / slowest
         raise SpecError(

@@ -46,6 +46,16 @@ class SensorSpec(Checked, table="planner.sensor"):
         """What is measured, one or several."""
         return (self.of,) if isinstance(self.of, str) else self.of
 
+    @property
+    def usual_age(self) -> float:
+        """Of a value, in s: the middle of `delay`."""
+        return 0.5 * sum(self.delay)
+
+    @property
+    def unknown_delay(self) -> float:
+        """By how much a value may be older or newer than usual, in s."""
+        return 0.5 * (self.delay[1] - self.delay[0])
+
 
 @attrs.frozen(kw_only=True)
 class GustSpec(Checked, table="planner.disturbance.gust"):
