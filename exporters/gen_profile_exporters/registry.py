@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     _CONFORMING: tuple[Exporter, ...] = (can, csv_table, rockwell_l5x)
     _CONTAINERS: tuple[BlockContainer, ...] = (codesys, plcopen_xml, siemens_scl, structured_text, twincat)
 
-BESIDE = {  # what else is in a folder of exports
-    ".toml": "a spec; name the file that was exported of it first",
-    ".json": "a manifest or a certificate; name the file that it is of",
+NO_EXPORTS = {  # what else is in a folder of exports, and what to name in its place
+    ".toml": "this is a spec; name the file that was exported of it first",
+    ".json": "this is no exported file; name one that the manifest lists, or that the certificate is of",
 }
 
 Proof = Literal["executed", "read back", "schema-checked", "parsed", "untested"]
@@ -168,8 +168,8 @@ def format_of(path: PurePath | str) -> str:
         return own
     known = formats()
     name = _longest_suffix(path, known)
-    if name is None and (beside := BESIDE.get(PurePath(path).suffix)):
-        raise SpecError(f"{path}: this is {beside}.")
+    if name is None and (cure := NO_EXPORTS.get(PurePath(path).suffix)):
+        raise SpecError(f"{path}: {cure}.")
     if name is None:
         raise SpecError(
             f"{path}: no format has the suffix {PurePath(path).suffix!r} "

@@ -41,7 +41,7 @@ FAULTS = (
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
 PART = 40  # lines beyond which a branch is a function: one of thousands compiles four times as slowly
-TEXTS = ("structured_text.lark", "c/operations.txt", "c/block.c", "c/block.h")  # of which it is made
+TEXTS = ("structured_text.lark", "c/operations.txt", "c/block.c", "c/block.h")  # files that it reads
 # operator or function and the types that it takes | C | a macro in its place that checks
 _ROWS = [line.split(" | ") for line in (FOLDER / "c/operations.txt").read_text("ascii").splitlines()]
 _PLAIN = {tuple(taken.split()): code for taken, code, *_ in _ROWS}

@@ -81,7 +81,7 @@ def test_unknown_suffixes_are_refused(path):
 
 def test_a_spec_is_no_artefact():
     with pytest.raises(
-        SpecError, match=r"^manifest\.json: this is a manifest or a certificate; name the file"
+        SpecError, match=r"^manifest\.json: this is no exported file; name one that the manifest"
     ):
         format_of("manifest.json")
     with pytest.raises(SpecError, match=r"^bay\.toml: this is a spec; name the file that was exported"):

@@ -17,14 +17,14 @@ long ${name}_operations;
 #define RARE(condition) (condition)
 #endif
 #ifdef CHECKED
-/* What fails is a branch that is foreseen: to select by it in each operation takes twice the time. */
+/* A fault is a branch that is predicted not to be taken: to select a value in each operation takes twice the time. */
 #define BEGIN() int32_t turns_ = fb->turns_, fault_ = fb->fault_
 #define FIRST() (turns_ = 0)
 #define PART(name) (END(), name(fb), turns_ = fb->turns_, fault_ = fb->fault_)
 #define END() (fb->turns_ = turns_, fb->fault_ = fault_)
 #define AT(index, length) within(&fault_, index, length)
 #define TURN() turn(&fault_, &turns_)
-#ifdef __GNUC__ /* by the processor's own flag */
+#ifdef __GNUC__ /* by the processor's overflow flag */
 #define SUM(one, other) whole_sum(&fault_, one, other)
 #define DIFFERENCE(one, other) whole_difference(&fault_, one, other)
 #define PRODUCT(one, other) whole_product(&fault_, one, other)
