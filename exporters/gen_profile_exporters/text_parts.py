@@ -32,6 +32,13 @@ def filled(path: str, **values: object) -> str:
     return Template((FOLDER / path).read_text("ascii")).substitute(values)
 
 
+def put_in(text: str, **values: str) -> str:
+    """Put in what stands in Structured Text as ``@name``; alone on its line, it is whole lines, or none."""
+    lines = {name: f"{value}\n" if value else "" for name, value in values.items()}
+    text = re.sub(r"(?m)^@(\w+)\n", lambda hole: lines.get(hole[1], hole[0]), text)
+    return re.sub(r"@(\w+)", lambda hole: values.get(hole[1], hole[0]), text)
+
+
 def indented(lines: Iterable[str]) -> str:
     """Put lines of C between braces."""
     return indent("\n".join(lines), "    ")
