@@ -1,4 +1,8 @@
-"""Texts for controllers in files of their own, where they can be read as what they are."""
+"""Texts for controllers in files of their own, where they can be read as what they are.
+
+What a text leaves open stands in it as ``$name`` (C, XML, HTML, the playback block), as ``@name`` (buffers
+and planner blocks) or as ``{name}`` (libraries and what wraps a block).
+"""
 
 import re
 from collections.abc import Iterable
