@@ -1,4 +1,8 @@
-"""Texts for controllers in files of their own, where they can be read as what they are."""
+"""Texts for controllers in files of their own, where they can be read as what they are.
+
+What a text leaves open stands in it as ``$name`` (C, XML, HTML, the playback block), as ``@name`` (buffers
+and planner blocks) or as ``{name}`` (libraries and what wraps a block).
+"""
 
 import re
 from collections.abc import Iterable
@@ -30,6 +34,13 @@ def names_by_type(part: str) -> dict[str, tuple[str, ...]]:
 def filled(path: str, **values: object) -> str:
     """Read a program of this package, and put in what stands there as ``$name``."""
     return Template((FOLDER / path).read_text("ascii")).substitute(values)
+
+
+def put_in(text: str, **values: str) -> str:
+    """Put in what stands in Structured Text as ``@name``; alone on its line, it is whole lines, or none."""
+    lines = {name: f"{value}\n" if value else "" for name, value in values.items()}
+    text = re.sub(r"(?m)^@(\w+)\n", lambda hole: lines.get(hole[1], hole[0]), text)
+    return re.sub(r"@(\w+)", lambda hole: values.get(hole[1], hole[0]), text)
 
 
 def indented(lines: Iterable[str]) -> str:

@@ -1,6 +1,7 @@
 """JSON from outside: finite numbers only, every key once, and nested no deeper than Python takes."""
 
 import json
+from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
@@ -17,6 +18,20 @@ def parse_json(text: str | bytes) -> Any:
         return json.loads(text, parse_constant=_finite, parse_float=_finite, object_pairs_hook=_once)
     except RecursionError as error:
         raise ValueError("arrays or objects nested too deeply") from error
+
+
+def parse_document(text: str | bytes, head: Mapping[str, object]) -> dict[str, Any]:
+    """Read a JSON document of a format: an object that has the values of a head.
+
+    Raises
+    ------
+    ValueError
+        As `parse_json`; or it is of another format.
+    """
+    document = parse_json(text)
+    if not isinstance(document, dict) or {key: document.get(key) for key in head} != head:
+        raise ValueError("another format")
+    return document
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -253,4 +253,4 @@ def test_plans_of_fewest_and_most_slots_stay_within_the_block(spec, seed, number
     histories = Histories.of(spec)
     history = Numbering.of(histories, 100, seed).history(number)
     with ClosedLoop(spec, planner_block(spec).text, histories) as loop:
-        assert loop.watched(history, *loop.known(history)).run.fault == 0  # a division by 0, an array's end
+        assert loop.watched(history, loop.known(history)).run.fault == 0  # a division by 0, an array's end

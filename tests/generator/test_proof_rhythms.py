@@ -75,7 +75,7 @@ def thrown_over(spec):
 def left(spec, text, thrown_over):
     histories, history = thrown_over
     with ClosedLoop(spec, text, histories) as loop:
-        return loop.watched(history, *loop.known(history))
+        return loop.watched(history, loop.known(history))
 
 
 @pytest.mark.slow

@@ -176,7 +176,7 @@ def test_a_jump_that_counts_as_an_offset_leaves_the_axis_at_rest(spec, text, jum
                     one.sensed, fault="jump", fails=1.0, innovation=2.0 * jump / JUMP, seed=half, gusts=()
                 )
                 alone = attrs.evolve(one, commands=one.commands[-1:], changes=(), sensed=failing)
-                watched = loop.watched(alone, *loop.known(alone))
+                watched = loop.watched(alone, loop.known(alone))
                 assert not watched.faults
                 assert watched.run.stands >= 0
 

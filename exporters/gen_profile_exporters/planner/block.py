@@ -303,7 +303,7 @@ def _constants(c: PlannerConstants) -> str:
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in _arrays(c).items()]
     exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
-    lines += of_sensor.other(c.sensor)
+    lines += of_sensor.other_constants(c.sensor)
     before = np.cumsum(np.sign(c.second_order)) - 1.0
     lines.append(_array("cSecond", "DINT", [str(int(number)) for number in before]))
     lines.append(_array("cReachSlots", "DINT", [str(v) for v in _reach_slots(c)]))
@@ -345,10 +345,10 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cWork": _work(c),
         **(of_search.zoned(left, FUTURE, len(c.axes), _shortest_slot(c)) if c.zones else {}),
         "cHoldCycles": round(HOLD / c.cycle),
-        **of_search.whole(),
+        **of_search.whole_constants(),
         "cColumnWork": _column_work(c),
         "cReaches": len(_reach_slots(c)),
-        **of_sensor.whole(c.sensor, modes, len(c.axes), c.cycle),
+        **of_sensor.whole_constants(c.sensor, modes, len(c.axes), c.cycle),
     }
 
 
@@ -396,7 +396,7 @@ def _fine(c: PlannerConstants) -> int:
 def _watched(c: PlannerConstants) -> dict[str, int]:
     """On how many machines what errors leave is watched, if it is."""
     sizes = _fine(c), _shortest_slot(c), c.modes * len(c.axes)
-    return of_errors.whole(*sizes) if c.stated_error and not c.rates else {"cVariations": 0}
+    return of_errors.whole_constants(*sizes) if c.stated_error and not c.rates else {"cVariations": 0}
 
 
 def _shortest_slot(c: PlannerConstants) -> int:
@@ -451,7 +451,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
                 "cSwayLimit": c.sway_limit,
                 # m of an axis, that a plan from rest may leave by its slope, however much is left already
                 "cLeastAdded": 0.02 * c.sway_limit / len(c.axes),
-                **of_errors.real(_fine(c), c.least_decay),
+                **of_errors.real_constants(_fine(c), c.least_decay),
             }
         ),
         "cRampLeast": 0.05,  # of full speed: a change of the stick that is planned for
@@ -460,8 +460,8 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         # over a motion, up to which its halves mirror each other until the last projection
         "cMirrorDecay": 0.2,
         "cAgainst": 0.1,  # share of full speed, below which a tap of the stick ends by itself
-        **of_search.real(robust=not c.sway_share),
-        **of_sensor.real(c.sensor, c.cycle),
+        **of_search.real_constants(robust=not c.sway_share),
+        **of_sensor.real_constants(c.sensor, c.cycle),
     }
 
 

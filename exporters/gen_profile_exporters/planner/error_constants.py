@@ -18,7 +18,7 @@ def finer(operations: int, slot: int, modes: int) -> int:
     return max(LEAST_FINE, min(MOST_FINE, int(FINE_WORK * operations / FINE_STEP * (slot - 1) / modes)))
 
 
-def whole(fine: int, slot: int, modes: int) -> dict[str, int]:
+def whole_constants(fine: int, slot: int, modes: int) -> dict[str, int]:
     """Give the constants that count; each cycle takes so many finer machines on that a slot is enough."""
     return {
         "cVariations": len(VARIATIONS),
@@ -38,7 +38,7 @@ def rest_work(constants: Mapping[str, int], modes: int) -> int:
     return (16 * constants["cVariations"] + 20) * modes if constants["cVariations"] else 0
 
 
-def real(fine: int, least_decay: float) -> dict[str, float]:
+def real_constants(fine: int, least_decay: float) -> dict[str, float]:
     """Give the others."""
     return {
         "cBetween": 1.02,  # of the sway on the machines watched and halfway: those between

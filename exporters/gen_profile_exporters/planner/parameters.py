@@ -22,7 +22,7 @@ from gen_profile_exporters.block_source import BlockSource, BlockVariable, initi
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.playback.block import TEMPLATE
-from gen_profile_exporters.text_parts import names_by_type, text_parts
+from gen_profile_exporters.text_parts import names_by_type, put_in, text_parts
 
 OURS = "OfBuffer"  # behind names that the block has already
 _WORD = re.compile(r"\w+")
@@ -148,16 +148,16 @@ def _around(
     check = "\n".join(
         (_SHARED["checked_value"], _FRACTION.findall(TEMPLATE)[0].rstrip(), _ROUND, _SHARED["checked_end"])
     )
-    text = buffers.filled(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
-    text = distinct(text + buffers.filled(f"{_SHARED['planner_check']}\n", checked=check))
-    text = buffers.filled(
-        text.replace("@moves", f"(bEnable OR (nState <> cDisabled){moving})")
-        .replace("@plays", "(nState <> cDisabled)")
-        .replace("cCycleTime", "cCycle"),
+    text = put_in(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
+    text = distinct(text + put_in(f"{_SHARED['planner_check']}\n", checked=check))
+    text = put_in(
+        text.replace("cCycleTime", "cCycle"),
+        moves=f"(bEnable OR (nState <> cDisabled){moving})",
+        plays="(nState <> cDisabled)",
         taken="\n".join(f"        {line}" for line in _taken(numbers, *map(distinct, ("nBase", "nCheck")))),
         begun="\n".join(f"            {line}" for line in _begun(source, distinct("nCheck"))),
     )
-    state = distinct(_SHARED["planner_state"]).replace("@last", str(buffers.state_length(axes) - 1))
+    state = put_in(distinct(_SHARED["planner_state"]), last=str(buffers.state_length(axes) - 1))
     return narrow(with_while_loops(text)), narrow(with_while_loops(f"{state}\n"))
 
 

@@ -29,7 +29,7 @@ def zoned(left: int, future: int, axes: int, slot: int) -> dict[str, int]:
     return {"cZones": ZONES, "cZoneChunk": chunk, "cZoneCycles": cycles}
 
 
-def whole() -> dict[str, int]:
+def whole_constants() -> dict[str, int]:
     """Give the constants that count."""
     return {
         "cIterations": 6,  # from rest
@@ -39,7 +39,7 @@ def whole() -> dict[str, int]:
     }
 
 
-def real(*, robust: bool) -> dict[str, float]:
+def real_constants(*, robust: bool) -> dict[str, float]:
     """Give the others: plans may leave a slope, or are robust and leave none."""
     return {
         "cCentre": 0.15,  # of an iteration: the complementarity it aims at, relative to that of now

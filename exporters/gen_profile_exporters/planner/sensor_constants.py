@@ -148,7 +148,7 @@ def lengths(sensor: SensorConstants | None, modes: int, axes: int, cycle: float)
     return {"expected": expected, "own": 6 * axes, "damp_row": rows, "damp_gram": rows**2}
 
 
-def whole(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -> dict[str, int]:
+def whole_constants(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -> dict[str, int]:
     """Give the constants that are whole numbers."""
     if sensor is None:
         return {}
@@ -162,7 +162,7 @@ def whole(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -
     }
 
 
-def real(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
+def real_constants(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
     """Give the other constants."""
     if sensor is None:
         return {}
@@ -202,7 +202,7 @@ def cycle_work(sensor: SensorConstants | None, modes: int) -> int:
     return 0 if sensor is None else 120 + 40 * modes
 
 
-def other(sensor: SensorConstants | None) -> list[str]:
+def other_constants(sensor: SensorConstants | None) -> list[str]:
     """Declare the constants that are no single numbers."""
     if sensor is None:
         return []

@@ -33,7 +33,7 @@ from gen_profile_exporters.playback.block import fill, layout_of
 from gen_profile_exporters.playback.layouts import LAYOUTS
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
-from gen_profile_exporters.text_parts import names_by_type, text_parts
+from gen_profile_exporters.text_parts import names_by_type, put_in, text_parts
 
 INTERFACE = 2  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
@@ -382,23 +382,14 @@ def _prelude(layout: str, axes: int, *, library: bool) -> str:
     lines += ["FOR nAxis := 1 TO cAxes DO", *own, "END_FOR;"] if axes > 1 else own
     place = _PARTS["place"] if library else f"    nMotion := nBase + {len(HEAD)};"
     taken_over = "\n".join(f"        {line}" for line in lines)
-    return (
-        filled(
-            f"{_PARTS['requests']}\n",
-            selection=_PARTS["selection"] if library else "",
-            forgotten="    bLeft := FALSE;",
-            loads=filled(f"{_PARTS['motion']}\n", place=place, taken=taken_over).removesuffix("\n"),
-        )
-        .replace("@moves", MOVES)
-        .replace("@plays", MOVES)
+    return put_in(
+        f"{_PARTS['requests']}\n",
+        selection=_PARTS["selection"] if library else "",
+        forgotten="    bLeft := FALSE;",
+        loads=put_in(_PARTS["motion"], place=place, taken=taken_over),
+        moves=MOVES,
+        plays=MOVES,
     )
-
-
-def filled(text: str, **parts: str) -> str:
-    """Put parts in that are whole lines."""
-    for name, part in parts.items():
-        text = text.replace(f"@{name}\n", f"{part}\n" if part else "")
-    return text
 
 
 def _shown_state(axes: int, *, library: bool) -> str:
@@ -409,5 +400,5 @@ def _shown_state(axes: int, *, library: bool) -> str:
         f"{indent_}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(AXIS_STATE)
     ]
     lines = ["FOR nAxis := 1 TO cAxes DO", *lines, "END_FOR;"] if axes > 1 else lines
-    text = _STATE.replace("@axes", "\n".join(lines)).replace("@last", str(state_length(axes) - 1))
-    return text.replace("@motion", "DINT_TO_LREAL(nSelected)" if library else "0.0")
+    motion = "DINT_TO_LREAL(nSelected)" if library else "0.0"
+    return put_in(_STATE, axes="\n".join(lines), last=str(state_length(axes) - 1), motion=motion)

@@ -81,11 +81,7 @@ def library_source(entries: Sequence[LibraryEntry], target: Target) -> BlockSour
         They differ in more than their motions, were altered, or are too much to compile.
     """
     variables = any(is_buffered(entry.source) for entry in entries)
-    sources = [
-        one
-        for entry in entries
-        for one in (constant_sources(entry.source, target) if is_buffered(entry.source) else [entry.source])
-    ]
+    sources = [one for entry in entries for one in singles_of(entry.source, target)]
     for number, source in enumerate(sources):
         if _common(source) != _common(sources[0]):
             raise ExportError(
@@ -120,8 +116,10 @@ def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, 
     return tuple(read_table(single.text(), target).motion() for single in singles)
 
 
-def constant_singles(source: BlockSource) -> list[BlockSource]:
-    """Take a block of constants apart that plays one motion, or any of several; raises as `read_library`."""
+def singles_of(source: BlockSource, target: Target) -> list[BlockSource]:
+    """Give the block of constants of each motion that a block plays; raises as `read_library`."""
+    if is_buffered(source):
+        return constant_sources(source, target)
     return _singles(source) if is_library(source) else [source]
 
 

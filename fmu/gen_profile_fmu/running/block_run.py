@@ -104,6 +104,11 @@ class Script:
     watch: int
     measured: Measurement | None = None
 
+    @property
+    def last(self) -> int:
+        """Last cycle that there may be."""
+        return self.start_cycles[-1] + self.longest + self.settle + self.watch
+
 
 @attrs.frozen(kw_only=True)
 class Hoist:

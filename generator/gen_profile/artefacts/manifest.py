@@ -13,11 +13,10 @@ import attrs
 from attrs.validators import instance_of
 
 from gen_profile.errors import OutputError
-from gen_profile.strict_json import parse_json
+from gen_profile.strict_json import parse_document
 
 FILENAME = "manifest.json"
-FORMAT = "gen-profile manifest"
-FORMAT_VERSION = 1
+HEAD = {"format": "gen-profile manifest", "format_version": 1}
 UNVERIFIED = "unverified"
 PLANNER = "planner"  # format of every file that is a planner block
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")  # that shape the numbers
@@ -146,7 +145,7 @@ class Manifest:
 
     def to_json(self) -> bytes:
         """Render, UTF-8."""
-        document = {"format": FORMAT, "format_version": FORMAT_VERSION, **self.to_dict()}
+        document = {**HEAD, **self.to_dict()}
         document[SEAL] = seal_of(document)
         return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
 
@@ -166,11 +165,9 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
         It is none, of another version, or was altered.
     """
     try:
-        document = parse_json(content.decode("utf-8"))
+        document = parse_document(content.decode("utf-8"), HEAD)
         seal, computed = document.pop(SEAL, None), seal_of(document)
-        if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
-            raise ValueError("another format")
-        manifest = _from_dict(document)
+        manifest = _from_dict({key: value for key, value in document.items() if key not in HEAD})
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise OutputError(
             f"{source}: not a manifest of this version of gen-profile; export again."

@@ -42,10 +42,7 @@ class _Artefact:
 
 
 def certify_artefact(
-    path: Path | str,
-    spec: Spec | Path | str | None = None,
-    *,
-    progress: Progress = lambda _, __: None,
+    path: Path | str, spec: Spec | Path | str | None = None, *, progress: Progress = lambda _, __: None
 ) -> Certificate:
     """Prove that no machine of a spec's ranges sways more than a bound after a file's motion.
 

@@ -12,6 +12,7 @@ from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.closed_loop import Trace, trace
+from gen_profile.proof.followed import runs_of
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.verdict import JudgedHistory, Proof
 from gen_profile.spec.model import Spec
@@ -59,7 +60,7 @@ def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     few = slice(None, None, -(-len(trace.times) // SAMPLES))
     times, limit = trace.times[few], 1e3 * list(proof.limit.values())[-1]
     arrival = _arrival(trace)
-    bands = [*_unpromised(trace)]
+    bands = _unpromised(trace)
     panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
     for name, corners in trace.history.hoisting.items():
         line = Line("command", times, np.interp(times, *np.transpose(corners)), COMMAND)
@@ -127,7 +128,7 @@ def damping_figures(spec: Spec, proof: Proof, trace: Trace) -> list[Figure]:
     few, end_load = slice(None, None, -(-len(trace.times) // SAMPLES)), spec.machine().end_load_name
     times, cycle = trace.times[few], float(trace.times[1])
     edges = cycle * np.arange(-1.0, len(trace.times) + 1.0, dtype=np.float64)
-    bands, limit = [*_unpromised(trace)], 1e3 * list(proof.limit.values())[-1]
+    bands, limit = _unpromised(trace), 1e3 * list(proof.limit.values())[-1]
     unit = next((one.unit for one in spec.machine().unactuated if one.name in sensor.names), "m")
     outputs = [axis.of("fSwayEstimated") for axis in axes]
     estimates = [trace.issued[output] for output in outputs if output in trace.issued]
@@ -200,13 +201,11 @@ def _labelled(spec: Spec, name: str) -> str:
     return f"{name} ({spec.machine().units[name]})"
 
 
-def _unpromised(trace: Trace) -> Iterator[Band]:
+def _unpromised(trace: Trace) -> list[Band]:
     """Find when the block is busy and does not promise."""
     unkept = (trace.issued["bPromise"] == 0.0) & (trace.issued["bBusy"] != 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], unkept, [False]])))
-    last = len(trace.times) - 1
-    for begin, end in edges.reshape(-1, 2):
-        yield Band(float(trace.times[begin]), float(trace.times[min(end, last)]))
+    times = [*trace.times.tolist(), float(trace.times[-1])]
+    return [Band(times[begin], times[end]) for begin, end in runs_of(unkept)]
 
 
 def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:

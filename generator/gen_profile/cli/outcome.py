@@ -105,10 +105,7 @@ def print_error(error: Exception, as_json: bool) -> int:
         case click.ClickException():
             code, message = error.exit_code, error.format_message()
         case click.Abort(__cause__=None, __context__=EOFError()):
-            code, message = (
-                INTERRUPTED,
-                "Standard input ended before an answer; give it by an option.",
-            )
+            code, message = INTERRUPTED, "Standard input ended before an answer; give it by an option."
         case click.Abort():
             code, message = INTERRUPTED, "Interrupted."
         case _:

@@ -10,10 +10,10 @@ from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import deliver
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import OutputError
-from gen_profile.strict_json import parse_json
+from gen_profile.strict_json import parse_document
 
 RECORD = "deployments.json"
-FORMAT, FORMAT_VERSION = "gen-profile deployments", 1
+HEAD = {"format": "gen-profile deployments", "format_version": 1}
 
 
 def read_record(folder: Path) -> list[dict[str, Any]]:
@@ -28,9 +28,7 @@ def read_record(folder: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     try:
-        document = parse_json(read_artefact(path, DOCUMENT).decode("utf-8"))
-        if (document["format"], document["format_version"]) != (FORMAT, FORMAT_VERSION):
-            raise ValueError("another format")
+        document = parse_document(read_artefact(path, DOCUMENT).decode("utf-8"), HEAD)
         return [dict(one) for one in document["deployments"]]
     except (ValueError, KeyError, TypeError) as error:
         raise OutputError(f"{path}: is no record of deployments; move it away.") from error
@@ -42,11 +40,7 @@ def append_record(
     """Write a deployment behind those that are recorded already, and give its entry."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     entry = {"at": now, "by": by, "controller": dict(server), **done}
-    document = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "deployments": [*read_record(folder), entry],
-    }
+    document = {**HEAD, "deployments": [*read_record(folder), entry]}
     deliver(folder / RECORD, (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode("utf-8"))
     return entry
 

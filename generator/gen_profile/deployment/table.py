@@ -10,13 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.manifest import SEAL, artefact_of, seal_of, sha256
-from gen_profile.artefacts.reading import (
-    compared,
-    manifest_beside,
-    read_artefact,
-    require_companions,
-    strays,
-)
+from gen_profile.artefacts.reading import compared, manifest_beside, read_artefact, require_companions, strays
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.deployment.block_state import BlockState, MotionState, PlannerState
 from gen_profile.errors import CheckFailed, ExportError, OutputError
@@ -48,7 +42,7 @@ from gen_profile_exporters.playback.buffers import (
     is_library,
     with_buffer,
 )
-from gen_profile_exporters.playback.library import constant_singles
+from gen_profile_exporters.playback.library import singles_of
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_exporters.playback.structured_text import read_table as read_playback
 from gen_profile_exporters.playback.table import PlaybackTable
@@ -193,7 +187,7 @@ def _played(path: Path, source: BlockSource, specs: Sequence[Spec]) -> tuple[Blo
     target = target_of(specs[0])
     if any(one.section == "VAR_IN_OUT" for one in source.variables):
         raise ExportError(f"{path}: is a wrapper; name the file of the playback block.")
-    constants = constant_sources(source, target) if is_buffered(source) else constant_singles(source)
+    constants = singles_of(source, target)
     motions = [read_playback(one.text(), target).motion() for one in constants]
     if len(motions) != len(specs):
         raise ExportError(f"{path}: is a library, and nothing beside it tells its specs; make it again.")

@@ -64,8 +64,8 @@ class LogTable:
     source: str
 
     def cell(self, row: int, place: int) -> str:
-        """Text of a cell; empty where the row ends before."""
-        cells = self.rows[row]
+        """Text of a cell; empty where the row, or the table, ends before."""
+        cells = self.rows[row] if row < len(self.rows) else ()
         return cells[place] if place < len(cells) else ""
 
     def number(self, row: int, place: int) -> float:
@@ -129,10 +129,9 @@ class LogTable:
         """Read a column's unit off its name or off the cell below that; empty where neither tells one."""
         if not self.is_head(head):
             return ""
-        below = self.cell(head + 1, place) if head + 1 < len(self.rows) else ""
         name = self.cell(head, place)
         match = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
-        unit = _spelt(match[1] if match else below)
+        unit = _spelt(match[1] if match else self.cell(head + 1, place))
         return unit if _UNIT.fullmatch(unit) else ""
 
     def is_head(self, row: int) -> bool:

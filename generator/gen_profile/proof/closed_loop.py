@@ -22,6 +22,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.planner.sensor import estimation_error
 from gen_profile.progress import Progress, no_progress
+from gen_profile.proof.followed import GivenMachine
 from gen_profile.proof.histories import SHIFT, SLOWEST, Histories, History
 from gen_profile.proof.judging import WatchedRun, judge_run
 from gen_profile.proof.numbering import Numbering
@@ -96,11 +97,10 @@ class ClosedLoop:
     @contextmanager
     def runs(self, histories: Iterable[History]) -> Iterator[Iterator[WatchedRun]]:
         """Run histories on all workers, in their order; those not begun when it closes are left out."""
-        pool = ThreadPoolExecutor(self._workers)
+        pool, listed = ThreadPoolExecutor(self._workers), list(histories)
         try:
             # linearised here, as that is not for several threads
-            known = [(one, *self.known(one)) for one in histories]
-            yield pool.map(self.watched, *zip(*known, strict=True)) if known else iter(())
+            yield pool.map(self.watched, listed, [self.known(one) for one in listed])
         finally:
             pool.shutdown(cancel_futures=True)
 
@@ -119,28 +119,24 @@ class ClosedLoop:
                     progress("proving", number, numbering.count)
         return judged
 
-    def known(self, history: History) -> tuple[float, GivenModes | None, GivenModes | None]:
-        """Tell the slowest period in s and, where known, modes of the machine as given, first and last."""
+    def known(self, history: History) -> GivenMachine:
+        """Tell what is known of the machine that the block is given."""
         spec = self._spec
         steady = not (history.hoisting or history.sensed or spec.planner.live_noise or spec.planner.live_rate)
         modes = GivenModes.of(spec, history.live, history.commands[-1].time) if steady else None
         lasting = [one.inputs for one in history.changes if math.isinf(one.lasts)]
         live = {name: given[f"f{name}"] for given in lasting for name in history.live if f"f{name}" in given}
         last = GivenModes.of(spec, {**history.live, **live}) if steady and live else None
-        return self._histories.slowest(history), modes, last
+        return GivenMachine(self._histories.slowest(history), modes, last)
 
-    def watched(
-        self, history: History, period: float, modes: GivenModes | None = None, last: GivenModes | None = None
-    ) -> WatchedRun:
+    def watched(self, history: History, given: GivenMachine) -> WatchedRun:
         """Let the machine of a history follow the block, and see whether the block obeys.
 
         Parameters
         ----------
         history : History
-        period : float
-            s, of the slowest swing that the block is given.
-        modes, last : GivenModes, optional
-            Of the machine that it is given, and where that is another, of that in the end.
+        given : GivenMachine
+            As `known` tells it.
 
         Raises
         ------
@@ -154,11 +150,9 @@ class ClosedLoop:
         run = self._followed(history, block, script, rows=orders[-1].end, marks=marks)
         if run.fault:
             return WatchedRun(run=run)
-        faults, left, later = self._watch.faults((period, modes, last), script, orders, block, run)
-        faults = (*faults, *self._sensor_faults(history, period, run))
-        return WatchedRun(
-            run=attrs.evolve(run, trace=None, copies=None), faults=faults, left=left, later=later
-        )
+        judged = self._watch.judged(given, script, orders, block, run)
+        faults = (*judged.faults, *self._sensor_faults(history, given.period, run))
+        return attrs.evolve(judged, run=attrs.evolve(run, trace=None, copies=None), faults=faults)
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.
@@ -269,7 +263,7 @@ class ClosedLoop:
         )
         if history.sensed is None:
             return script
-        found = history.sensed.measurement(self._spec, list(values), self.cycle, _cycles(script))
+        found = history.sensed.measurement(self._spec, list(values), self.cycle, script.last + 1)
         return attrs.evolve(script, measured=found)
 
     def _until_calm(
@@ -398,11 +392,6 @@ def _rows_at(start_cycles: Sequence[int], inputs: Array, cycles: Sequence[int] |
     """Give the rows that hold in some cycles."""
     rows: Array = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
     return rows
-
-
-def _cycles(script: Script) -> int:
-    """How many there may be."""
-    return script.start_cycles[-1] + script.longest + script.settle + script.watch + 1
 
 
 @attrs.frozen(kw_only=True, eq=False)

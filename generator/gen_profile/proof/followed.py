@@ -63,6 +63,15 @@ class Zone:
     number: int = 1
 
 
+@attrs.frozen
+class GivenMachine:
+    """Slowest period in s of the machine that a block is given, and where known, its first and last modes."""
+
+    period: float
+    modes: GivenModes | None = None
+    last_modes: GivenModes | None = None
+
+
 @attrs.frozen(kw_only=True)
 class Followed:
     """A history as the block saw it, and what it issued.

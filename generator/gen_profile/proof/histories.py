@@ -310,7 +310,7 @@ class Histories:
         commands = habits.commands_in(given)
         found = None
         if is_sensed:
-            found = SensedHistory.of(self.spec, sensor.tolist(), commands[-1].time, (parameters, places))
+            found = SensedHistory.of(self.spec, sensor.tolist(), commands[-1].time, parameters, places)
         return History(
             live=live_values,
             parameters=parameters,

@@ -103,7 +103,8 @@ class SensedHistory:
         spec: Spec,
         choices: Sequence[float],
         last: float,
-        machine: tuple[Mapping[str, float], Sequence[float]],
+        parameters: Mapping[str, float],
+        places: Sequence[float],
     ) -> Self:
         """Make what some choices say of a history.
 
@@ -113,13 +114,14 @@ class SensedHistory:
         choices : (CHOICES,) sequence of float
         last : float
             When its last command comes, in s.
-        machine : (parameters, places of its axes)
+        parameters, places
+            Of the machine and its axes.
         """
         sensor, disturbance = _stated(spec)
         kind, swing, phase, delay, offset, seed, lost, fails, *others = choices
         random, directions = np.random.default_rng([int(seed * 2**32), 1]), sensed_directions(spec)
         more = random.random((3, len(directions) - 1)).tolist()  # of the second sensor, and so on
-        places = [list(planned_axes(spec)).index(number) for number in directions]
+        columns = [list(planned_axes(spec)).index(number) for number in directions]
         fault = ""
         if kind >= SOUND:
             fault = FAULTS[min(int((kind - SOUND) / (1.0 - SOUND) * len(FAULTS)), len(FAULTS) - 1)]
@@ -134,18 +136,17 @@ class SensedHistory:
                 begin = gusts[-1].time + gusts[-1].lasts if gusts else 0.0  # no two push at once
                 start = begin + share * (latest - (lasts if fault else 0.0) - begin)  # likewise
                 acceleration = _stretched(2.0 * strong - 1.0) * disturbance.gust.acceleration
-                along = random.standard_normal(len(places)) if len(places) > 1 else np.ones(1)
+                along = random.standard_normal(len(columns)) if len(columns) > 1 else np.ones(1)
                 shares = np.zeros(len(planned_axes(spec)))
-                shares[places] = along / np.linalg.norm(along)
+                shares[columns] = along / np.linalg.norm(along)
                 if start >= begin:
                     gusts.append(
                         Gust(time=start, lasts=lasts, acceleration=acceleration, along=tuple(shares.tolist()))
                     )
         shares_and_phases = zip([swing, *more[0]], [phase, *more[1]], strict=True)
+        swings = [(max(0.0, _stretched(a)), 2.0 * np.pi * b) for a, b in shares_and_phases]
         return cls(
-            starts=stated_swing(
-                spec, [(max(0.0, _stretched(a)), 2.0 * np.pi * b) for a, b in shares_and_phases], *machine
-            ),
+            starts=stated_swing(spec, swings, parameters, places),
             gusts=tuple(gusts),
             delay=sensor.delay[0] + min(1.0, 1.1 * delay) * (sensor.delay[1] - sensor.delay[0]),
             offsets=tuple(_stretched(2.0 * each - 1.0) * sensor.offset for each in (offset, *more[2])),
@@ -284,13 +285,24 @@ def sensor_faults(
         axis, fault = axes[number], one.fault if place == one.failing else ""
         sway = run.trace[:, len(outputs) + direction.end_load]
         if not one.fault:
-            yield from _misestimated((axis, issued, sway), estimation_error, cycle)
+            yield from _misestimated(axis, issued, sway, estimation_error, cycle)
         if fault in SHOWS and disturbance.gust is not None:
-            yield from _misread(disturbance.gust, one, fault, (axis, issued, sway), (cycle, period, resets))
+            yield from _misread(
+                axis,
+                issued,
+                sway,
+                fault=fault,
+                since=one.fails if fault else 0.0,
+                gust=disturbance.gust,
+                cycle=cycle,
+                period=period,
+                resets=resets,
+            )
         noticed = issued[axis.of("nSensorFault")]
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
-            yield from _faults_of_a_faulty_one(spec, one, run, (at if noticed.any() else None, sway), cycle)
+            found = at if noticed.any() else None
+            yield from _faults_of_a_faulty_one(spec, one, run, sway, noticed=found, cycle=cycle)
             if fault == "away" and noticed[-1]:
                 yield f"a sensor that is back is not used again, from {one.fails:.2f} s"
         elif noticed.any():
@@ -317,10 +329,9 @@ def sensor_faults(
 
 
 def _misestimated(
-    given: tuple[BlockAxis, Mapping[str, Array], Array], estimation_error: float, cycle: float
+    axis: BlockAxis, issued: Mapping[str, Array], sway: Array, estimation_error: float, cycle: float
 ) -> Iterator[str]:
     """Say whether the estimated sway is off by more than is stated."""
-    axis, issued, sway = given
     uncertainty = axis.of("fSwayUncertainty")
     off = np.abs(issued[axis.of("fSwayEstimated")] - sway) - issued[uncertainty] - estimation_error
     off *= issued[axis.of("bSensorUsed")] != 0.0
@@ -330,30 +341,33 @@ def _misestimated(
 
 
 def _misread(
-    gust: GustSpec,
-    one: SensedHistory,
+    axis: BlockAxis,
+    issued: Mapping[str, Array],
+    sway: Array,
+    *,
     fault: str,
-    given: tuple[BlockAxis, Mapping[str, Array], Array],
-    times: tuple[float, float, Sequence[float]],
+    since: float,
+    gust: GustSpec,
+    cycle: float,
+    period: float,
+    resets: Sequence[float],
 ) -> Iterator[str]:
-    """Say whether what a sensor is found to show of the axis's own motions is wrong."""
-    (axis, issued, sway), (cycle, period, resets) = given, times
+    """Say whether what a sensor is found to show of the axis's own motions is wrong since it has a fault."""
     used = issued[axis.of("bSensorUsed")] != 0.0
     from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
 
     cycles = np.arange(len(used))
-    first = one.fails if fault else 0.0
-    rate, since = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
+    rate, used_for = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
     swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
     # before, what swung at first and the offset are not known yet
-    since_first = (cycles * cycle > first) & (since * cycle > period)
-    moved = issued[axis.of("fAcceleration")][:, None] * np.transpose([since_first, np.ones_like(since_first)])
+    counts = (cycles * cycle > since) & (used_for * cycle > period)
+    moved = issued[axis.of("fAcceleration")][:, None] * np.transpose([counts, np.ones_like(counts)])
     share = cycle / period
     own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
-    before = sway[max(0, round((first - period) / cycle)) : round(first / cycle)]  # shown otherwise later
+    before = sway[max(0, round((since - period) / cycle)) : round(since / cycle)]  # shown otherwise later
     others = gust.acceleration + rate**2 * np.abs(before).max(initial=0.0)
     strength = rate**2 * np.sqrt(own[:, 0]) / others
-    strength *= (since * cycle > 2.0 * period) & (cycles * cycle > first + 2.0 * period)
+    strength *= (used_for * cycle > 2.0 * period) & (cycles * cycle > since + 2.0 * period)
     strength *= cycles < min((round(time / cycle) for time in resets), default=len(used))  # when it forgets
     at = int(np.argmax(strength))
     scale = axis.of("fSensorScale")
@@ -364,10 +378,10 @@ def _misread(
 
 
 def _faults_of_a_faulty_one(
-    spec: Spec, one: SensedHistory, run: BlockRun, found: tuple[float | None, Array], cycle: float
+    spec: Spec, one: SensedHistory, run: BlockRun, sway: Array, *, noticed: float | None, cycle: float
 ) -> Iterator[str]:
     """Say what is wrong where a sensor is: noticed too late, or the load made to sway."""
-    (sensor, disturbance), (noticed, sway) = _stated(spec), found
+    sensor, disturbance = _stated(spec)
     late = (noticed if noticed is not None else np.inf) - one.fails - sensor.drop_out
     if one.fault in NOTICED and late > sensor.drop_out:  # as much later, where news failed to come before
         yield f"the sensor's fault is not noticed ({one.fault}, at {one.fails:.2f} s)"

@@ -15,9 +15,17 @@ from numpy.typing import NDArray
 from gen_profile.motion.profile import Array
 from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of, standing
+from gen_profile.proof.followed import (
+    LEAST_REACTION,
+    REACTION,
+    Followed,
+    GivenMachine,
+    Zone,
+    runs_of,
+    standing,
+)
 from gen_profile.proof.histories import Histories
+from gen_profile.proof.judging import WatchedRun
 from gen_profile.proof.obedience import LATER, faults, measured
 from gen_profile.proof.orders import (
     DISABLED,
@@ -106,8 +114,7 @@ class BlockWatch:
     def orders(self, script: Script) -> tuple[TimedOrder, ...]:
         """Read what a script tells the block."""
         start_cycles, rows = self._changes(script)
-        last = script.start_cycles[-1] + script.longest + script.settle + script.watch
-        return read_orders(start_cycles, rows, self.known, last).orders
+        return read_orders(start_cycles, rows, self.known, script.last).orders
 
     def _changes(self, script: Script) -> tuple[list[int], Array]:
         """Leave out rows in which but live parameters change, within their ranges."""
@@ -125,20 +132,19 @@ class BlockWatch:
         held = [one for one in guided if one.end - one.begin > self.reaction / self.cycle]
         return [one.begin for one in held if 0 < one.begin == one.edge][:MOST_COPIES]
 
-    def faults(
+    def judged(
         self,
-        given: tuple[float, GivenModes | None, GivenModes | None],
+        given: GivenMachine,
         script: Script,
         expected: Sequence[TimedOrder],
         block: CalledBlock,
         run: BlockRun,
-    ) -> tuple[tuple[str, ...], float, dict[str, list[float]]]:
-        """Say what is wrong, each in words that end a sentence; how much errors leave at most; and lateness.
+    ) -> WatchedRun:
+        """Hold what a block did in a run against what it was commanded.
 
         Parameters
         ----------
-        given : (float, GivenModes or None, GivenModes or None)
-            Slowest period in s, and modes, of the machine that the block is given: first and last.
+        given : GivenMachine
         script : Script
             Of a history.
         expected : sequence of TimedOrder
@@ -147,12 +153,12 @@ class BlockWatch:
         run : BlockRun
             With its trace, and copies of the block before `marks`.
         """
-        followed, reactions = self.followed(given[0], script, expected, block, run)
-        followed = attrs.evolve(followed, modes=given[1], last_modes=given[2])
+        followed, reactions = self.followed(given, script, expected, block, run)
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
         later = {kind: [one.needed for one in met if one.what == what] for kind, what in LATER.items()}
-        return (*faults(met, followed.cycle), *self._understated(run, followed)), left, later
+        wrong = (*faults(met, followed.cycle), *self._understated(run, followed))
+        return WatchedRun(run=run, faults=wrong, left=left, later=later)
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""
@@ -166,7 +172,12 @@ class BlockWatch:
             yield f"a load sways by {left:.3g} m, where fSwayLeft states {stated:.3g} m"
 
     def followed(
-        self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
+        self,
+        given: GivenMachine,
+        script: Script,
+        expected: Sequence[TimedOrder],
+        block: CalledBlock,
+        run: BlockRun,
     ) -> tuple[Followed, dict[int, int | None]]:
         """Give what is to be judged."""
         assert run.trace is not None
@@ -174,14 +185,14 @@ class BlockWatch:
         issued = dict(zip(self.outputs, run.trace.T, strict=False))
         start_cycles, rows = self._changes(script)
         now = np.searchsorted(script.start_cycles, np.arange(run.cycles), side="right") - 1
-        given = dict(zip(self.inputs, script.inputs.T, strict=False))
+        inputs = dict(zip(self.inputs, script.inputs.T, strict=False))
         steps, speeds = (
-            np.stack([given.get(axis.of(name), np.zeros(len(rows)))[now] for axis in self.known.axes])
+            np.stack([inputs.get(axis.of(name), np.zeros(len(rows)))[now] for axis in self.known.axes])
             for name in ("fActPosition", "fActVelocity")
         )
         followed = Followed(
             cycle=self.cycle,
-            period=period,
+            **attrs.asdict(given, recurse=False),
             reaction=self.reaction,
             axes=self.known.axes,
             limits=self.known.limits,
@@ -205,7 +216,9 @@ class BlockWatch:
         ends = {order.begin: order.end for order in followed.orders}
         places = [self.outputs.index(name) for axis in block.axes for name in axis]
         reactions = {
-            mark: self._first_difference(script, (mark, ends[mark]), block, memory, run.trace[:, places])
+            mark: self._first_difference(
+                script, block, memory, run.trace[:, places], begin=mark, end=ends[mark]
+            )
             for mark, memory in zip(self.marks(expected), run.copies, strict=True)
             if mark in ends
         }
@@ -288,10 +301,9 @@ class BlockWatch:
         return [begin for row in rows if (begin := script.start_cycles[row]) < cycles]
 
     def _first_difference(
-        self, script: Script, cycles: tuple[int, int], block: CalledBlock, memory: Any, issued: Array
+        self, script: Script, block: CalledBlock, memory: Any, issued: Array, *, begin: int, end: int
     ) -> int | None:
         """Call a copy of a block as if an order had not come, until it issues other setpoints than it did."""
-        begin, end = cycles
         play, places = _PLAY(block.play), [self.outputs.index(name) for axis in block.axes for name in axis]
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
         actual = list(script.actual)

@@ -260,8 +260,8 @@ def _head(table: LogTable, chosen: Collection[str]) -> int:
 
 def _with_unit(table: LogTable, head: int, place: int) -> str:
     """Read a column's name, with the unit that stands in the row below behind it, where the name has none."""
-    name, below = table.cell(head, place), head + 1 < len(table.rows)
-    match, unit = _COLUMN.fullmatch(name), table.cell(head + 1, place).strip("[]() ") if below else ""
+    name, unit = table.cell(head, place), table.cell(head + 1, place).strip("[]() ")
+    match = _COLUMN.fullmatch(name)
     if match is None or match["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
         return name
     return f"{name}_{unit}"

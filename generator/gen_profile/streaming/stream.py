@@ -16,7 +16,6 @@ from gen_profile.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_motion, require_companions
 from gen_profile.errors import CheckFailed, SpecError, StreamAborted
 from gen_profile.progress import Progress, no_progress
-from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Source, StreamOutcome
@@ -298,32 +297,28 @@ def drive_bank(
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
     from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive  # noqa: PLC0415
 
-    target = target_of(source_spec)
+    target, stated = target_of(source_spec), source_spec.can
     scales = [axis.counts_per_si for axis in target.axes]
     own = {axis.name: magnitude_counts(LEAST_USEFUL, axis) for axis in target.axes} | dict(windows or {})
     axes = zip(target.axes, frames.nodes(target), source_spec.move.start, strict=True)
     drives = [
         SimulatedDrive(
             node,
-            attrs.evolve(_of_identity(make, target.can, axis.name), following_error=own[axis.name]),
+            attrs.evolve(
+                make,
+                vendor=stated.vendor or make.vendor,
+                product=stated.product or make.product,
+                serial=stated.serial.get(axis.name, make.serial),
+                fixed_pdos=stated.fixed_pdos,
+                following_error=own[axis.name],
+            ),
             round(at * axis.counts_per_si),
         )
         for axis, node, at in axes
     ]
-    channels = frames.channels(target) if target.can.channels else ()
+    channels = frames.channels(target) if stated.channels else ()
     others = load.sensor_frames
     return DriveBank(bus, clock or SystemClock(), drives, scales, load, channels=channels, others=others)
-
-
-def _of_identity(make: DriveVariant, can: CanSpec, axis: str) -> DriveVariant:
-    """Give a make the identity and the fixed mapping that a spec asks for."""
-    return attrs.evolve(
-        make,
-        vendor=can.vendor or make.vendor,
-        product=can.product or make.product,
-        serial=can.serial.get(axis, make.serial),
-        fixed_pdos=can.fixed_pdos,
-    )
 
 
 @attrs.define

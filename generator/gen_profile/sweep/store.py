@@ -30,13 +30,13 @@ from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import overridden, spec_from_dict
-from gen_profile.strict_json import parse_json
+from gen_profile.strict_json import parse_document, parse_json
 from gen_profile.sweep.archive import Archive, is_archive, read_archive, written_archive
 from gen_profile.sweep.case import CaseOutcome, Recipe
 from gen_profile.sweep.grid import Grid, GridAxis
 from gen_profile.sweep.table import Table, case_path, columns_of, read_table, write_table
 
-FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
+HEAD = {"format": "gen-profile sweep", "format_version": 1}
 WORDS = {"vary": "values", "spec_sha256": "spec"}  # for keys of a description
 DESCRIPTION, RECORD = "sweep.json", "case.json"
 RECORD_TYPES = {
@@ -139,8 +139,7 @@ class Store:
         recipe = attrs.asdict(self.recipe)
         del recipe["source"], recipe["folder"]
         return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
+            **HEAD,
             "name": self.name,
             "vary": {axis.key: list(axis.values) for axis in self.grid.axes},
             "spec_sha256": self.spec_sha256,
@@ -259,16 +258,14 @@ def grid_of(path: Path) -> Grid:
 def _parsed(path: Path, description: bytes | str) -> dict[str, Any]:
     place = path if is_archive(path) else path / DESCRIPTION
     try:
-        document = parse_json(description)
-        if (document["format"], document["format_version"]) != (FORMAT, FORMAT_VERSION):
-            raise ValueError("another format")
-    except (ValueError, KeyError, TypeError) as error:
+        document = parse_document(description, HEAD)
+    except ValueError as error:
         raise OutputError(f"{place}: not a sweep of this version of gen-profile.") from error
     vary = document.get("vary")
     values = vary.values() if isinstance(vary, dict) else ()
     if not values or not all(isinstance(listed, list) and listed for listed in values):
         raise OutputError(f"{place}: damaged; sweep again.")
-    return dict(document)
+    return document
 
 
 def _json(document: dict[str, Any]) -> bytes:

@@ -50,7 +50,7 @@ def watch(
         With what is not as proved as its `fault`.
     """
     judge: Judge[Any] = PlannerJudge(table) if isinstance(table, PlannerTable) else MotionJudge(table)
-    course = _Course(table, link, judge, (now, pause), report)
+    course = _Course(table, link, judge, report, now=now, pause=pause)
     try:
         with interrupts_collected() as came:
             while not came and (seconds is None or course.elapsed() < seconds):
@@ -76,10 +76,12 @@ class _Course:
         table: BlockTable,
         link: MailboxLink,
         judge: Judge[Any],
-        clock: tuple[Callable[[], float], Callable[[float], None]],
         report: Report,
+        *,
+        now: Callable[[], float],
+        pause: Callable[[float], None],
     ) -> None:
-        self._link, self._judge, (self._now, self._pause), self._report = link, judge, clock, report
+        self._link, self._judge, self._report, self._now, self._pause = link, judge, report, now, pause
         self._table, self._cycle = table, table.spec.export.cycle_time
         self._began = self._changed = self._now()
         self._calls = -1
