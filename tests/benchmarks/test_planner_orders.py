@@ -43,6 +43,7 @@ class Axis:
             rates,
             *np.split(left_by_errors(spec, point), [modes.modes]),
             spec.planner.sway_share * min(spec.check.residual_sway.values()),
+            min(spec.check.residual_sway.values()),
             (limits.velocity, limits.acceleration, limits.jerk),
         )
         inputs = {f"f{name}": value for name, value in live.items()}

@@ -1,7 +1,8 @@
 """The quickest motion that keeps a planner block's promise, by linear programs of SciPy's: an oracle.
 
 The jerk is constant over pieces. A mode swings by ∫ v exp(iωt) dt times a gain: nought in the end,
-whatever was before, and its slope by the frequency's error within a bound.
+whatever was before, its slope by the frequency's error within a bound, and all modes together, each
+at its worst error, within what is allowed.
 """
 
 import attrs
@@ -10,17 +11,24 @@ from scipy.optimize import linprog
 
 ANGLES = np.exp(-1j * np.pi / 8 * np.arange(16))  # a bound of a modulus as that of 16 shadows
 STEP = 1e-5  # relative, for the slope by a frequency
+SHARES = np.array([0.0, -1.0, -0.75, -0.5, 0.5, 0.75, 1.0])  # of the errors
 
 
 @attrs.frozen(eq=False)
 class Promise:
-    """What a motion must keep: the allowed sum of slopes, each by a mode's error and gain, and limits."""
+    """What a motion must keep: sums over modes of slopes (by errors and gains) and of sways, and limits."""
 
     frequencies: np.ndarray
     errors: np.ndarray
     gains: np.ndarray
+    slopes: float
     sway: float
     limits: tuple[float, float, float]
+
+    @property
+    def rates(self):
+        """Frequencies of each mode at its errors."""
+        return self.frequencies[:, None] * (1.0 + np.outer(self.errors, SHARES))
 
     @property
     def period(self):
@@ -29,7 +37,7 @@ class Promise:
 
 @attrs.frozen(eq=False)
 class State:
-    """Of an axis now, and of each mode ∫ v exp(iωt) dt of the past, and its slope by the frequency."""
+    """Of an axis now, and of each mode ∫ v exp(iωt) dt of the past at its errors, and its slope by them."""
 
     place: float
     velocity: float
@@ -47,7 +55,7 @@ class State:
             place[-1],
             velocity[-1],
             acceleration[-1],
-            np.exp(phases) @ weighed,
+            np.array([np.exp(1j * np.outer(rates, past)) @ weighed for rates in promise.rates]),
             (phases * np.exp(phases)) @ weighed * promise.errors,
         )
 
@@ -87,11 +95,12 @@ def _motion(promise, state, pieces, step, target, speed, travel):
     equal, due = [accelerations[-1], velocities[-1]], [-a, speed - drift[-1]]
     if target is not None:
         equal, due = [*equal, places[-1]], [*due, target - state.place - drifted[-1]]
-    above, most = [], []
+    above, most, sways = [], [], []
     total = float(promise.gains @ promise.errors)
     for mode, (rate, error) in enumerate(zip(promise.frequencies, promise.errors, strict=True)):
-        row, rest = _wave(rate, starts, step, v, a)
-        equal, due = [*equal, row.real, row.imag], [*due, *(-c for c in _parts(rest + state.waves[mode]))]
+        rows, rests = zip(*(_wave(rate, starts, step, v, a) for rate in promise.rates[mode]), strict=True)
+        left = np.array(rests) + state.waves[mode]
+        equal, due = [*equal, rows[0].real, rows[0].imag], [*due, *(-c for c in _parts(left[0]))]
         (up, rest_up), (down, rest_down) = (
             _wave(rate * (1.0 + way * STEP), starts, step, v, a) for way in (1.0, -1.0)
         )
@@ -100,7 +109,11 @@ def _motion(promise, state, pieces, step, target, speed, travel):
         )
         for angle in ANGLES:
             above.append((slope * angle).real)
-            most.append(promise.sway * error / total - ((rest + state.slopes[mode]) * angle).real)
+            most.append(promise.slopes * error / total - ((rest + state.slopes[mode]) * angle).real)
+        turned = [
+            (angle * row, angle * rest) for angle in ANGLES for row, rest in zip(rows, left, strict=True)
+        ]
+        sways.append([(row.real, rest.real) for row, rest in turned])
     fastest, greatest, jerk = promise.limits
     for rows, now, limits in (
         (accelerations, a + 0.0 * ends, (-greatest, greatest)),
@@ -108,15 +121,22 @@ def _motion(promise, state, pieces, step, target, speed, travel):
         (places, state.place + drifted, travel),
     ):
         above, most = [*above, *rows, *-rows], [*most, *(limits[1] - now), *(now - limits[0])]
+    shortest = np.sign(v or 1.0) * places[-1] if target is None else np.zeros(pieces)
+    modes = len(sways)  # as many unknowns more, each the most that a mode is left with
+    above = [*(np.append(row, np.zeros(modes)) for row in above), np.append(np.zeros(pieces), promise.gains)]
+    most.append(promise.sway)
+    for mode, swings in enumerate(sways):
+        above.extend(np.append(row, -np.eye(modes)[mode]) for row, _ in swings)
+        most.extend(-rest for _, rest in swings)
     found = linprog(
-        np.sign(v or 1.0) * places[-1] if target is None else np.zeros(pieces),
+        np.append(shortest, np.zeros(modes)),
         A_ub=np.array(above),
         b_ub=np.array(most),
-        A_eq=np.array(equal),
+        A_eq=np.pad(np.array(equal), ((0, 0), (0, modes))),
         b_eq=np.array(due),
-        bounds=(-jerk, jerk),
+        bounds=[(-jerk, jerk)] * pieces + [(0.0, None)] * modes,
     )
-    return float(places[-1] @ found.x + drifted[-1]) if found.status == 0 else None
+    return float(places[-1] @ found.x[:pieces] + drifted[-1]) if found.status == 0 else None
 
 
 def _wave(rate, starts, step, velocity, acceleration):
