@@ -282,6 +282,20 @@ def test_what_is_not_as_it_should_be_is_told_in_a_sentence(changes, code, words,
     assert re.search(words, found.err), found.err
 
 
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("paper.csv", "csv carries no playback block; the suffixes of those that do are"),
+        ("absent.st", "absent.st"),
+    ],
+)
+@pytest.mark.parametrize("options", [(), ("--verify",), ("--watch",)])
+def test_a_file_that_cannot_be_deployed_is_named_before_the_access(file, words, options, files):
+    """A certificate was asked for first, and made, for nothing."""
+    found = run_here("deploy", files / "old" / file, "--to", "opc.tcp://127.0.0.1:9", *options)
+    assert found.code == 2 and words in found.err and "--certificate" not in found.err, found.err
+
+
 def test_a_wrapper_has_no_table(files, access):
     found = run_here("deploy", files / "old" / "FB_paper_Axis.TcPOU", *access)
     assert found.code == 5 and "is a wrapper; name the file of the playback block" in found.err

@@ -8,6 +8,7 @@ import pytest
 from command_line import run_here
 from pictures import colours
 
+from gen_profile.charts.picture import drawn
 from gen_profile.charts.robustness import robustness_figure
 from gen_profile.comparison.robustness import Robustness, error_grid, robustness
 from gen_profile.errors import SpecError
@@ -127,13 +128,16 @@ def test_a_map_is_drawn_and_told(tmp_path):
     assert len(colours(tmp_path / "map.png")[0]) > 50
 
 
-@pytest.mark.parametrize(("most", "headroom"), [(0.01, 1.0), (1.7, 1.7), (40.0, 3.0)])
-def test_the_colours_of_maps_go_as_far_as_there_is_something_to_see(most, headroom):
+@pytest.mark.parametrize(("most", "headroom", "step"), [(0.01, 1.0, 20), (1.062, 1.062, 20), (40.0, 3.0, 50)])
+def test_the_colours_of_maps_go_as_far_as_there_is_something_to_see(most, headroom, step):
+    """Their scale was labelled at odd places, as 35.4 and 70.8."""
     errors = dict.fromkeys(("L1", "m2"), np.linspace(-0.1, 0.1, 3))
     left = np.zeros((3, 3, 2))
     left[2, 0] = most * 0.003
     figure = robustness_figure(Robustness(spec=SPEC, errors=errors, residual={"x": left}))
     assert figure.panels[0].headroom == pytest.approx(headroom)
+    _, scale = drawn([figure], "").axes
+    np.testing.assert_allclose(np.diff(scale.get_yticks()), step)
 
 
 def test_nothing_is_drawn_where_no_method_has_a_motion(tmp_path):

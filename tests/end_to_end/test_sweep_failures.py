@@ -53,13 +53,16 @@ def test_a_process_that_is_given_up_is_started_anew(monkeypatch):
 
 
 @pytest.mark.slow
-def test_an_interruption_waits_for_no_process_at_work(tmp_path):
-    """Dask let each work on for four seconds."""
-    begun, ended = tmp_path / "begun", tmp_path / "ended"
+def test_an_interruption_waits_for_no_process_at_work(tmp_path, monkeypatch):
+    """Dask let each work on for four seconds, while it closed."""
+    begun, closing, ended = (tmp_path / name for name in ("begun", "closing", "ended"))
+    close = cluster.Client.close
+    monkeypatch.setattr(cluster.Client, "close", lambda *words: (closing.touch(), close(*words)))
 
     def long_work():
         begun.touch()
-        time.sleep(2.0)
+        while not closing.exists():
+            time.sleep(0.01)
         ended.touch()
 
     with pytest.raises(KeyboardInterrupt), cluster.client_of(None, 1) as client:

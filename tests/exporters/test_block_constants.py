@@ -189,6 +189,28 @@ def test_what_stands_beside_the_declarations_is_refused(container, tables, place
             container.replay(altered.encode(), goal)
 
 
+@pytest.mark.parametrize("container", [plcopen_xml, codesys])
+@TABLES
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ("<localVars>", '<localVars retain="true">', "localVars retain"),
+        ('constant="true"', 'constant="true" nonretain="true"', "localVars constant nonretain"),
+        ("<inputVars>", '<inputVars constant="true">', "inputVars constant"),
+        ("<localVars>", "<globalVars/><localVars>", "globalVars"),
+        ('name="nState"', 'name="nState" address="%MW0"', "address"),
+        ("<value>", '<value repetitionValue="2">', "repetitionValue"),
+    ],
+)
+def test_what_an_attribute_changes_is_refused(container, tables, old, new, word):
+    """It passed unseen, though a retained state goes on where it was after a restart."""
+    goal = goal_of(ONE, "segments", tables)
+    content = container.encode(ONE, goal)[0].content.decode()
+    assert container.replay(content.replace("<localVars>", '<localVars retain="false">').encode(), goal)
+    with pytest.raises(ExportError, match=f"^line [0-9]+: '{word}' stands beside the declarations"):
+        container.replay(content.replace(old, new, 1).encode(), goal)
+
+
 @BLOCKS
 @TABLES
 def test_a_declaration_that_stands_twice_is_refused(tables, read):

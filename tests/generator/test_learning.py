@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.identification import learning
 from gen_profile.identification.learning import LEAST, Machines, learn
 from gen_profile.identification.measurements import DirectReading, SwingLog, parse_reading
 from gen_profile.motion.profile import Profile, SampledProfile, sample
@@ -131,6 +132,17 @@ def test_a_log_of_another_run_is_refused():
             PLAYED,
             [log_of(after=7.0, move=lambda time, order: 0.4 * np.sin(2.2 * time) * (time < 9.0))],
         )
+
+
+@pytest.mark.slow
+def test_where_no_machine_shows_half_of_a_log_none_is_fitted(monkeypatch):
+    """It took eight minutes to refuse the log of another machine, as damping may be endless."""
+    monkeypatch.setattr(learning, "nothing_left", lambda *_, **__: pytest.fail("one was fitted"))
+    times = np.arange(0.0, 30.0, 0.02)
+    values = np.cumsum(np.random.default_rng(0).normal(0.0, 1e-3, times.size))
+    log = SwingLog(times=times, values=values, quantity="rate", load="payload")
+    with pytest.raises(InfeasibleProblem, match=r"of no whole run of this motion from rest, or of another"):
+        learn(SPEC, PLAYED, [log])
 
 
 @pytest.mark.slow

@@ -20,13 +20,14 @@ from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_
 
 XHTML = "http://www.w3.org/1999/xhtml"
 ELEMENTARY = ("BOOL", "INT", "DINT", "LREAL", "DWORD")
-SECTIONS = {
-    "VAR_IN_OUT": "inOutVars",
-    "VAR_INPUT": "inputVars",
-    "VAR_OUTPUT": "outputVars",
-    "VAR": "localVars",
-    "VAR CONSTANT": "localVars",
+SECTIONS = {  # elements and their attributes
+    "VAR_IN_OUT": ("inOutVars", {}),
+    "VAR_INPUT": ("inputVars", {}),
+    "VAR_OUTPUT": ("outputVars", {}),
+    "VAR": ("localVars", {}),
+    "VAR CONSTANT": ("localVars", {"constant": "true"}),
 }
+DECLARING = {"name", "lower", "upper", "value"}  # attributes of what a group holds
 
 
 @attrs.frozen(kw_only=True)
@@ -60,9 +61,7 @@ class XmlDialect:
         groups: dict[str, etree._Element] = {}
         for variable in source.variables:
             if variable.section not in groups:
-                group = groups[variable.section] = self._append(interface, SECTIONS[variable.section])
-                if variable.section == "VAR CONSTANT":
-                    group.set("constant", "true")
+                groups[variable.section] = self._append(interface, *SECTIONS[variable.section])
             self._variable(groups[variable.section], variable)
         self._formatted(self._append(self._append(element, "body"), "ST"), source.body)
         self._formatted(self._append(element, "documentation"), _uncommented(source.header))
@@ -171,11 +170,9 @@ def _uncommented(comment: str) -> str:
 def _source(element: etree._Element) -> BlockSource:
     """Read a function block back."""
     variables: list[BlockVariable] = []
-    for section, group_name in SECTIONS.items():
-        for group in element.findall(f"{{*}}interface/{{*}}{group_name}"):
-            constant = group.get("constant") == "true"
-            if group_name != "localVars" or constant == (section == "VAR CONSTANT"):
-                variables += [_read_variable(section, item) for item in group.findall("{*}variable")]
+    for group in element.iterfind("{*}interface/{*}*"):
+        section = _section(group)
+        variables += [_read_variable(section, item) for item in group.findall("{*}variable")]
     body = child(element, "{*}body/{*}ST/*")
     return BlockSource(
         header=f"(*\n    {_text(element)}\n*)\n",
@@ -183,6 +180,23 @@ def _source(element: etree._Element) -> BlockSource:
         variables=tuple(variables),
         body=body.text or "",
     )
+
+
+def _section(group: etree._Element) -> str:
+    """Tell which section a group of variables is; refuse what changes them, such as ``retain``."""
+    name = etree.QName(group).localname
+    marks = {str(key): value for key, value in group.items() if value != "false"}
+    section = next((key for key, kind in SECTIONS.items() if kind == (name, marks)), None)
+    inner = group.iterdescendants("{*}*")
+    others = [(item, key) for item in inner for key, _ in item.items() if key not in DECLARING]
+    if section is None:
+        others = [(group, " ".join((name, *marks)))]
+    if others:
+        where, word = others[0]
+        raise ExportError(
+            f"line {where.sourceline}: {word!r} stands beside the declarations; export the block again."
+        )
+    return str(section)
 
 
 def _read_variable(section: str, element: etree._Element) -> BlockVariable:

@@ -161,6 +161,8 @@ def _bars(axis: Any, panel: parts.Bars) -> None:
 
 
 def _map(part: Any, axis: Any, panel: parts.Map) -> None:
+    from matplotlib.ticker import AutoLocator  # noqa: PLC0415  # an extra
+
     end = panel.headroom * panel.limit
     if panel.cells:
         coloured = axis.pcolormesh(panel.x, panel.y, panel.values, cmap="viridis_r", vmin=0.0, vmax=end)
@@ -175,7 +177,7 @@ def _map(part: Any, axis: Any, panel: parts.Map) -> None:
             corners = ([-width, width, width, -width, -width], [-height, -height, height, height, -height])
             axis.plot(*corners, color=colour, linestyle=dash, linewidth=1.2)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
-    part.colorbar(coloured, ax=axis, label=panel.unit)
+    part.colorbar(coloured, ax=axis, label=panel.unit, ticks=AutoLocator())  # else at ends of shades
 
 
 def _ink(style: parts.Style) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import click
 
 from gen_profile.cli import options
 from gen_profile.cli.commands import cli
-from gen_profile.cli.deployment.access import Access, controller_options
+from gen_profile.cli.deployment.access import controller_options
 from gen_profile.cli.options import Count, PathType, option
 from gen_profile.cli.outcome import as_json
 from gen_profile.cli.progress import progress
@@ -43,7 +43,6 @@ def studio(
 
     if (artefact is None) != (controller["url"] is None):
         raise SpecError("--watch, --to: go together: name the file, and the controller that uses its table.")
-    access = None if artefact is None else Access(**controller)
     text, source, folder = chosen.text()
     called = ("--preset", source) if chosen.path is None else (source,)
     start = changed_start(called, text, chosen.overrides, folder)
@@ -66,7 +65,7 @@ def studio(
         click.echo(f"The code was used. Another browser that asks for one: {code}", err=True)
 
     with ExitStack() as stack:
-        watching = None if artefact is None or access is None else _watching(artefact, access, stack)
+        watching = None if artefact is None else _watching(artefact, controller, stack)
         try:
             pages = serve(start, port, browser=not no_browser, ready=ready, renew=renew, watching=watching)
             asyncio.run(pages)
@@ -74,11 +73,11 @@ def studio(
             click.echo("The studio is closed.", err=True)
 
 
-def _watching(artefact: Path, access: Access, stack: ExitStack) -> Watching:
+def _watching(artefact: Path, controller: dict[str, Any], stack: ExitStack) -> Watching:
     """Watch a controller until the context ends."""
     from gen_profile.cli.deployment.commands import verified
     from gen_profile.studio.watching import Watching
 
     with progress() as tell:
-        table, link = verified(artefact, access, stack, tell)
+        table, link = verified(artefact, controller, stack, tell)
     return stack.enter_context(Watching(table, link))

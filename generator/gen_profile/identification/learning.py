@@ -256,7 +256,9 @@ def _explained(
         values = np.clip(parameters[name] * WIDE, *bounds[name])
         begun += [{**parameters, name: value} for value in values.tolist()]
     _, left = model.guesses(begun)
-    found = nothing_left(fit.freed(freed).beginning(begun[int(np.argmin(left))]), freed)
+    if left.min() > GROSS:  # even of the variance; fits from so far off may take minutes, by endless damping
+        return []
+    found = nothing_left(fit.freed(freed).beginning(begun[int(np.argmin(left))]), freed, small_first=False)
     return [] if found is None else [found]
 
 

@@ -75,21 +75,20 @@ def deploy(
         )
     if not watch and (seconds is not None or log is not None):
         raise SpecError("--for, --log: are for --watch; add that, or leave them out.")
-    access = Access(**given)
     key = signing_key(key_path)
     require_signature(artefact, public_path)
     if watch:
-        _watch(artefact, access, seconds, log)
+        _watch(artefact, given, seconds, log)
     elif verify:
-        _verify(artefact, access)
+        _verify(artefact, given)
     else:
-        document = _deploy(artefact, access, by or _user(), rollback=rollback)
+        document = _deploy(artefact, given, by or _user(), rollback=rollback)
         print_outcome(document, _words(artefact, document))
         if key is not None:
             _sign(artefact, document, key)
 
 
-def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[str, Any]:
+def _deploy(artefact: Path, given: dict[str, Any], by: str, *, rollback: bool) -> dict[str, Any]:
     """Have the table used, and record it."""
     from gen_profile.artefacts.writing import require_place
     from gen_profile.deployment.deploy import deploy as run
@@ -102,6 +101,7 @@ def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[
         table = read_table(artefact)
         read_record(artefact.parent)
         require_place(artefact.parent / RECORD)
+        access = Access(**given)  # after the file, whose fault no access cures
         tell("connecting")
         with closing(access.opened(table)) as link:
             done = run(table, Mailbox(link), rollback=rollback, progress=tell)
@@ -112,27 +112,28 @@ def _deploy(artefact: Path, access: Access, by: str, *, rollback: bool) -> dict[
                 raise OutputError(str(error), words) from error
 
 
-def _verify(artefact: Path, access: Access) -> None:
+def _verify(artefact: Path, given: dict[str, Any]) -> None:
     """Tell whether the controller uses the table."""
     from gen_profile.deployment.record import recorded
 
     with ExitStack() as stack, progress() as tell:
-        table, link = verified(artefact, access, stack, tell)
+        table, link = verified(artefact, given, stack, tell)
         entry = recorded(artefact.parent, table.hashes["table_sha256"], link.server)
         document = {"action": "verified", "controller": link.server, **table.hashes, "record": entry}
     print_outcome(document, _words(artefact, document))
 
 
 def verified(
-    artefact: Path, access: Access, stack: ExitStack, tell: Progress
+    artefact: Path, given: dict[str, Any], stack: ExitStack, tell: Progress
 ) -> tuple[BlockTable, ControllerLink]:
-    """Connect to a controller that uses a file's table."""
+    """Connect to a controller, by what `Access` takes, that uses a file's table."""
     from gen_profile.deployment.deploy import verify
     from gen_profile.deployment.mailbox import Mailbox
     from gen_profile.deployment.table import read_table
 
     tell("reading the artefact")
     table = read_table(artefact)
+    access = Access(**given)
     tell("connecting")
     link = stack.enter_context(closing(access.opened(table)))
     tell("reading the table")
@@ -140,14 +141,14 @@ def verified(
     return table, link
 
 
-def _watch(artefact: Path, access: Access, seconds: float | None, log: Path | None) -> None:
+def _watch(artefact: Path, given: dict[str, Any], seconds: float | None, log: Path | None) -> None:
     """Hold what the block issues to what was proved, and end with what differs."""
     from gen_profile.cli.deployment.watching import reporting, words
     from gen_profile.deployment.watching.watch import watch
 
     with ExitStack() as stack:
         with progress() as tell:
-            table, link = verified(artefact, access, stack, tell)
+            table, link = verified(artefact, given, stack, tell)
         if seconds is None:
             click.echo(f"{link.server['instance']} is watched. Ctrl-C ends it.", err=True)
         with reporting(table, log) as report:
