@@ -206,6 +206,9 @@ def test_what_an_attribute_changes_is_refused(container, tables, old, new, word)
     """It passed unseen, though a retained state goes on where it was after a restart."""
     goal = goal_of(ONE, "segments", tables)
     content = container.encode(ONE, goal)[0].content.decode()
+    added = '<addData><data name="text" handleUnknown="discard"/></addData>'  # as CODESYS does beside
+    for place in ("</variable>", "</interface>"):
+        assert container.replay(content.replace(place, added + place).encode(), goal)
     assert container.replay(content.replace("<localVars>", '<localVars retain="false">').encode(), goal)
     with pytest.raises(ExportError, match=f"^line [0-9]+: '{word}' stands beside the declarations"):
         container.replay(content.replace(old, new, 1).encode(), goal)

@@ -27,6 +27,7 @@ SECTIONS = {  # elements and their attributes
     "VAR": ("localVars", {}),
     "VAR CONSTANT": ("localVars", {"constant": "true"}),
 }
+BESIDE = {"addData", "documentation"}  # CODESYS adds its own to what it exports
 DECLARING = {"name", "lower", "upper", "value"}  # attributes of what a group holds
 
 
@@ -170,7 +171,7 @@ def _uncommented(comment: str) -> str:
 def _source(element: etree._Element) -> BlockSource:
     """Read a function block back."""
     variables: list[BlockVariable] = []
-    for group in element.iterfind("{*}interface/{*}*"):
+    for group in _declaring(child(element, "{*}interface")):
         section = _section(group)
         variables += [_read_variable(section, item) for item in group.findall("{*}variable")]
     body = child(element, "{*}body/{*}ST/*")
@@ -182,12 +183,18 @@ def _source(element: etree._Element) -> BlockSource:
     )
 
 
+def _declaring(element: etree._Element) -> list[etree._Element]:
+    return [one for one in element.iterchildren("{*}*") if etree.QName(one).localname not in BESIDE]
+
+
 def _section(group: etree._Element) -> str:
     """Tell which section a group of variables is; refuse what changes them, such as ``retain``."""
     name = etree.QName(group).localname
     marks = {str(key): value for key, value in group.items() if value != "false"}
     section = next((key for key, kind in SECTIONS.items() if kind == (name, marks)), None)
-    inner = group.iterdescendants("{*}*")
+    inner = _declaring(group)
+    for item in inner:  # which grows
+        inner += _declaring(item)
     others = [(item, key) for item in inner for key, _ in item.items() if key not in DECLARING]
     if section is None:
         others = [(group, " ".join((name, *marks)))]
