@@ -192,7 +192,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(swept, tmp_path):
         process.wait()
         finished = stamps(tmp_path)
     assert not (tmp_path / "sweep.parquet").exists()
-    resumed = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "2", "--json")
+    resumed = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1", "--json")
     assert resumed.document["finished_before"] == len(finished)
     assert finished.items() <= stamps(tmp_path).items()
     assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()

@@ -335,9 +335,10 @@ def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
 
 @pytest.mark.slow
 def test_damaged_cases_are_worked_out_again(tmp_path):
-    words = ["sweep", "--preset", "paper", "--vary", "move.duration=3,4", "--out", tmp_path, "--json"]
+    words = ["sweep", *QUICK, "--vary", "move.duration=3,4", "--workers", "1", "--out", tmp_path, "--json"]
     first = run_here(*words)
-    lost, garbled = (tmp_path / "cases" / "0000" / name for name in ("000/paper.csv", "001/manifest.json"))
+    folder = tmp_path / "cases" / "0000"
+    lost, garbled = folder / "000" / "paper-beta0.csv", folder / "001" / "manifest.json"
     before = [file.read_bytes() for file in (lost, garbled)]
     lost.unlink()
     garbled.write_bytes(b"garbage")
