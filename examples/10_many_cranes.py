@@ -1,4 +1,4 @@
-"""Five thousand cranes, each a little off: the compiled loop over an FMU's own functions.
+"""Two thousand cranes, each a little off: the compiled loop over an FMU's own functions.
 
 python examples/10_many_cranes.py
 """
@@ -7,7 +7,7 @@ import numpy as np
 
 import gen_profile as gp
 
-RUNS = 5_000
+RUNS = 2_000
 
 spec = gp.preset_spec("paper")
 setpoints = gp.sample(gp.plan(spec).command, cycle_time=0.01)

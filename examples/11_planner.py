@@ -12,7 +12,7 @@ import numpy as np
 
 import gen_profile as gp
 
-HISTORIES = 24  # in a second; the command line tries 200, and before a crane moves there should be thousands
+HISTORIES = 12  # the command line tries 200, and before a crane moves there should be thousands
 
 
 def main(folder: Path) -> None:

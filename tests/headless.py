@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,6 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
-from selenium.webdriver.support.wait import WebDriverWait
 from system_parts import missing, program
 
 ARGUMENTS = (
@@ -66,10 +66,12 @@ class Browser:
         return self._driver.execute_async_script(script, *arguments)
 
     def wait(self, script: str, *arguments: object) -> None:
-        """Wait until a function's body gives something true."""
-        WebDriverWait(self._driver, PATIENCE, poll_frequency=0.05).until(
-            lambda _: self.run(script, *arguments)
-        )
+        """Wait until a function's body gives something true, asking less and less often."""
+        until, pause = time.monotonic() + PATIENCE, 0.05
+        while not self.run(script, *arguments):
+            assert time.monotonic() < until, script
+            time.sleep(pause)
+            pause = min(1.2 * pause, 0.4)
 
     def find(self, selector: str) -> WebElement:
         """Find the first element of a CSS selector."""
@@ -88,16 +90,19 @@ class Browser:
         """What the console said since the last call: errors, warnings, what the page's policy refused."""
         return [entry["message"] for entry in self._driver.get_log("browser")]
 
-    def violations(self, *rules: str) -> list[tuple[str, list[str]]]:
+    def violations(self, *rules: str, colours: bool = True) -> list[tuple[str, list[str]]]:
         """What axe-core finds wrong: rules, and elements that break them.
 
-        By the rules named, or all of its usual ones and the sizes of touch targets.
+        By the rules named, or all of its usual ones (those of colours take most of the time) and the sizes of
+        touch targets.
         """
         if self.run("return window.axe === undefined"):
             path = os.environ.get("AXE_CORE") or missing("AXE_CORE, the path of axe-core's axe.min.js")
             self.run(Path(path).read_text("utf-8"))
         self.run("for (const part of document.querySelectorAll('details')) part.open = true")
-        how = {"runOnly": rules} if rules else {"rules": {"target-size": {"enabled": True}}}
+        usual = {"target-size": True, **dict.fromkeys(COLOURS, colours)}
+        switched = {rule: {"enabled": enabled} for rule, enabled in usual.items()}
+        how = {"runOnly": rules} if rules else {"rules": switched}
         found = self.run_async("axe.run(arguments[0]).then((found) => arguments[1](found.violations))", how)
         return [(one["id"], [node["html"][:200] for node in one["nodes"]][:3]) for one in found]
 

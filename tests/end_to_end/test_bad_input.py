@@ -175,7 +175,7 @@ def test_what_a_target_cannot_take_is_refused_with_the_cure(tmp_path, monkeypatc
 @pytest.mark.slow
 def test_an_impossible_move_is_refused_with_the_cure(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    refused = run_here("--set", "move.duration=0.2")
+    refused = run_here("--preset", "flexible-joint", "--set", "move.duration=0.1")
     assert refused.code == 3
     assert all(line.startswith("Error: ") for line in refused.errors)
     assert "move." in refused.err

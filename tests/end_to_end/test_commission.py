@@ -32,8 +32,9 @@ def site(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_options_answer_everything(site):
-    settings = ("--set", "export.plc_tables=variables", "--export", "plc")
-    assert run_here("--preset", "bay-crane", *settings, "--no-check", "--out", "first").code == 0
+    settings = ("--set", "export.plc_tables=variables", "--set", "export.cycle_time=0.02")
+    made = run_here("--preset", "bay-crane", *settings, "--export", "plc", "--no-check", "--out", "first")
+    assert made.code == 0
     port = free_port()
     controller = SimulatedOpcUaController(
         read_table(site / "first" / "bay-crane.st"), PlcSimOptions(port=port, secure=False)
@@ -43,7 +44,7 @@ def test_options_answer_everything(site):
     with serving(controller):
         outcome = run_here(
             "commission", "hall.toml", "--preset", "bay-crane", *identified, *deployed,
-            "--set", "move.distance=5", "--export", "plc", "--yes", "--json",
+            *settings, "--set", "move.distance=5", "--export", "plc", "--yes", "--json",
         )  # fmt: skip
         assert outcome.code == 0, outcome.err
         again = run_here("commission", "hall.toml", *deployed, "--export", "plc", "--yes")

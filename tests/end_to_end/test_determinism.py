@@ -28,17 +28,12 @@ def first(tmp_path_factory):
     return outputs(folder, PYTHONHASHSEED="0", LC_ALL="C.UTF-8", TZ="UTC")
 
 
-def test_a_second_run_in_another_folder_and_time_zone_with_another_hash_seed(first, tmp_path):
-    folder = tmp_path / "anderer Ort, weit weg ‒ très loin"
-    assert outputs(folder, PYTHONHASHSEED="4242", LC_ALL="C.UTF-8", TZ="Asia/Kathmandu") == first
-
-
-def test_a_locale_without_letters_beyond_ascii(first, tmp_path):
+def test_a_second_run_with_another_time_zone_hash_seed_and_letters_of_ascii_alone(first, tmp_path):
     environment = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
-    assert outputs(tmp_path / "run", **environment) == first
+    assert outputs(tmp_path / "run", PYTHONHASHSEED="4242", TZ="Asia/Kathmandu", **environment) == first
 
 
-def test_a_german_locale_with_its_decimal_comma(first, tmp_path):
+def test_a_german_locale_with_its_decimal_comma_in_a_folder_elsewhere(first, tmp_path):
     before = locale.setlocale(locale.LC_ALL)
     try:
         locale.setlocale(locale.LC_ALL, GERMAN)
@@ -47,7 +42,8 @@ def test_a_german_locale_with_its_decimal_comma(first, tmp_path):
         missing(f"the locale {GERMAN} (localedef -i de_DE -f UTF-8 {GERMAN})")
     finally:
         locale.setlocale(locale.LC_ALL, before)
-    assert outputs(tmp_path / "run", LC_ALL=GERMAN, LANG=GERMAN, LANGUAGE="de") == first
+    folder = tmp_path / "anderer Ort, weit weg ‒ très loin"
+    assert outputs(folder, LC_ALL=GERMAN, LANG=GERMAN, LANGUAGE="de") == first
 
 
 def test_artefacts_name_neither_machine_nor_clock(first, tmp_path):

@@ -32,7 +32,7 @@ def test_the_first_blocks_install_and_test():
 @pytest.mark.parametrize("page", [page for page in PAGES if tour(page)], ids=lambda page: page.stem)
 def test_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(prove, "HISTORIES", 24)  # what the pages' commands do is the same
+    monkeypatch.setattr(prove, "HISTORIES", 8)  # what the pages' commands do is the same
     monkeypatch.setattr(sweep, "CPU_COUNT", 1)
     scope = {}
     for block in tour(page):

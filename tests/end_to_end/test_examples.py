@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from gen_profile.sweep import run as sweep
+
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
@@ -27,6 +29,7 @@ def test_runs(example, tmp_path, monkeypatch, capsys):
     """In this process, which has loaded the libraries; a warning is an error here, too."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(example), *SOME.get(example.stem, [])])
+    monkeypatch.setattr(sweep, "CPU_COUNT", 1)  # a second process takes longer to start than it saves
     runpy.run_path(str(example), run_name="__main__")
     printed_here, complaints = capsys.readouterr()
     assert complaints == ""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from command_line import run_here
-from sweeps import archived
+from sweeps import archived, scheduler
 
 from gen_profile.deployment.table import read_table as read_block_table
 from gen_profile.errors import CheckFailed, ExportError
@@ -34,9 +34,9 @@ AXES = (
 
 
 def sweep(folder, *arguments):
-    one = ("--workers", "1")  # a second process takes longer to start than it saves
-    words = ("sweep", "--preset", "paper-beta0", "--set", CYCLE, *arguments, *one, "--out", folder)
-    outcome = run_here(*words)
+    words = ("sweep", "--preset", "paper-beta0", "--set", CYCLE, *arguments, "--out", folder)
+    with scheduler() as address:
+        outcome = run_here(*words, "--scheduler", address)
     assert outcome.code == 0, outcome.err
     return folder
 

@@ -8,7 +8,7 @@ import pyarrow
 import pytest
 from command_line import run_here
 from pyarrow import parquet
-from sweeps import archived
+from sweeps import archived, scheduler
 
 from gen_profile.spec.reading import preset_spec
 from gen_profile.sweep.store import grid_of
@@ -22,20 +22,9 @@ AXES = ("--vary", "solver.method=auto,zv", "--vary", "move.distance=0.3,0.4", "-
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
     folder = tmp_path_factory.mktemp("library")
-    arguments = (
-        "--preset",
-        "paper",
-        "--set",
-        CYCLE,
-        *AXES,
-        "--export",
-        "csv",
-        "--workers",
-        "1",
-        "--out",
-        folder,
-    )
-    assert run_here("sweep", *arguments).code == 0
+    arguments = ("--preset", "paper", "--set", CYCLE, *AXES, "--export", "csv", "--out", folder)
+    with scheduler() as address:
+        assert run_here("sweep", *arguments, "--scheduler", address).code == 0
     return folder
 
 

@@ -34,7 +34,7 @@ MEASURED = preset_spec(
         "move={start=10.0, target=18.0, duration=14.0}",
     ],
 )
-SWINGING = "time_s,command,value\n0.1,velocity,0.5\n4,quick-stop,\n26,stop,\n"
+SWINGING = "time_s,command,value\n0.1,velocity,0.5\n3,quick-stop,\n18,stop,\n"
 
 
 def deployed(folder, check, text=None, *, spec=PLANNED, commands=COMMANDS):
@@ -84,7 +84,7 @@ def test_a_sensor_on_the_bus_lets_the_block_damp_what_a_quick_stop_left(tmp_path
     options = deployed(tmp_path, {"passed": True}, spec=spec, commands=SWINGING)
     outcome = run_here("stream", *options, "--simulate-drive", "--json")
     assert outcome.code == 0, outcome.err
-    assert outcome.document["drive"]["sway_residual_peak_m"] < 0.05  # without, 0.43 m
+    assert outcome.document["drive"]["sway_residual_peak_m"] < 0.05  # without, 0.41 m
 
 
 @pytest.mark.slow

@@ -102,7 +102,7 @@ def played(spec, command, form):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("move", MOVES.values(), ids=MOVES)
-@settings(max_examples=12)
+@settings(max_examples=5)
 @given(
     form=st.sampled_from(list(FORMS)),
     cycle_time=st.sampled_from([0.002, 0.004, 0.0075, 0.01, 0.02, 0.05]),
@@ -131,7 +131,7 @@ def quintic(distance, duration):
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(
     distance=st.floats(1e-3, 50.0),
     cycles=st.floats(1.0, 500.0),

@@ -74,11 +74,12 @@ def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_notebook_shows_what_a_file_holds_whenever_it_is_drawn(plain, tmp_path, monkeypatch):
+def test_a_notebook_shows_what_a_file_holds_whenever_it_is_drawn(tmp_path, monkeypatch):
+    plan = gp.plan(preset_spec("paper", FEW[1::2]))
     monkeypatch.setattr("time.time", lambda: 1e9)
-    shown = gp.plot(plain)
+    shown = gp.plot(plan)
     monkeypatch.setattr("time.time", lambda: 1.1e9)
-    gp.plot(plain, tmp_path / "picture.svg")
+    gp.plot(plan, tmp_path / "picture.svg")
     assert shown._repr_svg_() == (tmp_path / "picture.svg").read_text("utf-8")
 
 

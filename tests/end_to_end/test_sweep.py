@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import PROGRAM, run_here, run_process
 from distributed import Client
-from sweeps import archived
+from sweeps import archived, scheduler
 
 from gen_profile.designs.design import design
 from gen_profile.spec.reading import preset_spec, preset_text
@@ -112,7 +112,8 @@ def test_goes_on_in_its_folder_and_repeats_nothing(swept):
 def test_one_file_takes_up_and_holds_the_same(swept, tmp_path):
     folder, outcome = swept
     path = archived(folder, tmp_path / "swept.sqlite", leave_out=(1, 6))
-    done = run_here("sweep", *QUICK, *AXES, "--out", path, "--workers", "1", "--json")
+    with scheduler() as address:
+        done = run_here("sweep", *QUICK, *AXES, "--out", path, "--scheduler", address, "--json")
     assert done.code == 0, done.err
     assert done.document["finished_before"] == 6
     assert done.document["statuses"] == outcome.document["statuses"]
@@ -192,7 +193,8 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(swept, tmp_path):
         process.wait()
         finished = stamps(tmp_path)
     assert not (tmp_path / "sweep.parquet").exists()
-    resumed = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "2", "--json")
+    with scheduler() as address:
+        resumed = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--scheduler", address, "--json")
     assert resumed.document["finished_before"] == len(finished)
     assert finished.items() <= stamps(tmp_path).items()
     assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()
@@ -202,13 +204,13 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(swept, tmp_path):
 def test_a_signal_ends_it_quietly(tmp_path, number):
     """Ctrl-C while it works; SIGTERM while its processes start, which Dask cannot stop then."""
     process = subprocess.Popen(
-        [PROGRAM, "sweep", *QUICK, "--vary", "plant.L1=0.4:0.5:10000", "--out", tmp_path, "--workers", "1"],
+        [PROGRAM, "sweep", *QUICK, "--vary", "plant.L1=0.4:0.5:1000", "--out", tmp_path, "--workers", "1"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
-    assert process.stderr.readline() == "designing cases, 0 of 10000 …\n"
+    assert process.stderr.readline() == "designing cases, 0 of 1000 …\n"
     if number == signal.SIGINT:
         wait_for(lambda: stamps(tmp_path))
     os.killpg(process.pid, number)  # as a terminal and a service manager do, to all of them

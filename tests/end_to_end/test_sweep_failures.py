@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import run_here
 from distributed import KilledWorker, LocalCluster
+from sweeps import LOOPBACK, scheduler
 
 from gen_profile import cluster
 from gen_profile.errors import OutputError, SpecError
@@ -24,7 +25,6 @@ from gen_profile.sweep.run import prepare
 from gen_profile.sweep.store import opened
 from gen_profile.sweep.table import read_table, write_table
 
-LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
 
 
@@ -232,8 +232,8 @@ def test_a_case_that_kills_its_process_costs_none_of_those_worked_at_with_it(tmp
 
     monkeypatch.setattr(workflow, "run_cases", deadly)
     store = prepared(tmp_path, "move.duration=3:4:9")
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **LOOPBACK) as cluster:
-        swept = workflow.sweep(store, scheduler=cluster.scheduler_address)
+    with scheduler() as address:
+        swept = workflow.sweep(store, scheduler=address)
     assert swept.statuses == {"passed": 0, "infeasible": 8, "crashed": 1}
     assert swept.reasons["crashed"].startswith("case 4: Every process that worked at it ended")
 
@@ -250,11 +250,8 @@ def test_workers_that_cannot_work_stop_the_sweep(tmp_path, monkeypatch, raised, 
         raise raised
 
     monkeypatch.setattr(workflow, "run_cases", unable)
-    with (
-        LocalCluster(n_workers=1, processes=False, **LOOPBACK) as cluster,
-        pytest.raises(seen, match=sentence),
-    ):
-        workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler=cluster.scheduler_address)
+    with scheduler() as address, pytest.raises(seen, match=sentence):
+        workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler=address)
 
 
 # Its table
@@ -338,13 +335,15 @@ def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
 
 @pytest.mark.slow
 def test_damaged_cases_are_worked_out_again(tmp_path):
-    words = ["sweep", "--preset", "paper", "--vary", "move.duration=3,4", "--out", tmp_path, "--json"]
-    first = run_here(*words)
-    lost, garbled = (tmp_path / "cases" / "0000" / name for name in ("000/paper.csv", "001/manifest.json"))
-    before = [file.read_bytes() for file in (lost, garbled)]
-    lost.unlink()
-    garbled.write_bytes(b"garbage")
-    again = run_here(*words)
+    words = ["sweep", *QUICK, "--vary", "move.duration=3,4", "--out", tmp_path, "--json"]
+    folder = tmp_path / "cases" / "0000"
+    lost, garbled = folder / "000" / "paper-beta0.csv", folder / "001" / "manifest.json"
+    with scheduler() as address:
+        first = run_here(*words, "--scheduler", address)
+        before = [file.read_bytes() for file in (lost, garbled)]
+        lost.unlink()
+        garbled.write_bytes(b"garbage")
+        again = run_here(*words, "--scheduler", address)
     assert (first.code, again.code) == (0, 0)
     assert [file.read_bytes() for file in (lost, garbled)] == before
     assert run_here("lookup", tmp_path, "--move.duration", "4").code == 0
