@@ -140,7 +140,7 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
 
     monkeypatch.setattr(ClosedLoop, "watched", watched)
     histories = Histories.of(spec)
-    many = [histories.history(choices) for choices in histories.drawn(4, seed=0)] * 1000
+    many = [histories.history(choices) for choices in histories.drawn(4, seed=0)] * 100
     with ClosedLoop(spec, text, histories) as loop, pytest.raises(KeyboardInterrupt), loop.runs(many) as runs:
         next(runs)
         raise KeyboardInterrupt
