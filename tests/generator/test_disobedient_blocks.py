@@ -41,7 +41,7 @@ def shown():
     """
     spec = parse_spec(BAY)
     histories = Histories.of(spec)
-    drawn = [histories.history(choices) for choices in histories.drawn(24, seed=4)]
+    drawn = [histories.history(choices) for choices in histories.drawn(12, seed=2)]
     text = disobedient(planner_block(spec).text)
 
     def kinds_by_history(wrong=None, count=None):

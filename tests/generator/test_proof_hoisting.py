@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from generator.mutants import MACHINES
 from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, swing
 
 from gen_profile.charts.proof import history_figure
@@ -13,7 +12,7 @@ from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.planner import Planner
 from gen_profile.proof.closed_loop import ClosedLoop, trace
-from gen_profile.proof.histories import Change, Histories, History
+from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import prove
 from gen_profile.spec.reading import parse_spec, preset_spec
@@ -147,30 +146,6 @@ def test_much_sway_is_calmed_before_the_axis_goes_elsewhere():
 
 
 @pytest.mark.slow
-def test_an_axis_comes_to_rest_where_there_is_no_room_to_calm_its_load():
-    """Beyond its travel it moved on for 270 s by calming pulses of 1e-16, which rounding admitted."""
-    spec = MACHINES["followed"]
-    goes = {"command": "position", "values": (3.67, 4.78), "live": {}, "override": 0.99}
-    ropes = (6.77, 7.22, 7.04, 7.39, 7.82, 7.54, 7.5, 7.77, 7.5)
-    times = (0.0, 4.47, 6.23, 11.68, 15.89, 18.67, 20.15, 22.77, 25.47)
-    history = History(
-        live={"L": 6.77},
-        parameters=dict(spec.plant.parameters) | {"L": 6.77},
-        places=(22.57, -0.29),
-        commands=(
-            Command(time=0.16, **goes),
-            Command(time=13.14, **goes),
-            Command(time=13.37, command="stop", values=(), live={}),
-        ),
-        hoisting={"L": tuple(zip(times, ropes, strict=True))},
-        changes=(Change(time=2.26, lasts=4.83, inputs={"bEnable": 0.0}),),
-    )
-    with ClosedLoop(spec, planner_block(spec).text, Histories.of(spec)) as loop:
-        run = loop.run(history)
-        assert 0 < run.stands * loop.cycle < 120.0
-
-
-@pytest.mark.slow
 def test_a_rope_that_changes_faster_than_stated_ends_the_promise(hoisting):
     run, out = followed(*hoisting, corners=((0.0, 6.0), (2.0, 6.0), (22.0, 8.2)))
     assert not run.promise
@@ -183,14 +158,14 @@ def test_a_rope_that_changes_faster_than_stated_ends_the_promise(hoisting):
     ("written", "changes"),
     [
         (HOIST, ["planner.live_rate={hoist=0.1}"]),
-        (GANTRY, ["planner.live_rate={L=0.1}", "robustness.uncertain={L=0.01}", "export.cycle_time=0.004"]),
+        (GANTRY, ["planner.live_rate={L=0.1}", "export.cycle_time=0.004"]),
     ],
 )
 def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     """At the stated speed throughout, in corners, up and down, and with starts and stops in the others."""
     spec = parse_spec(written, changes)
     text = planner_block(spec).text
-    proof = prove(spec, text, histories=12)
+    proof = prove(spec, text, histories=8)
     assert proof.reasons() == ()
     assert proof.fraction(proof.worst) < 0.2
     ((name, rate),) = spec.planner.live_rate.items()
@@ -212,10 +187,11 @@ def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
 
 
 @pytest.mark.slow
-def test_hoisting_too_fast_for_the_allowed_sway_is_refused_with_its_number():
-    changes = ["planner.live_rate={L1=0.1}", "robustness.uncertain={L1=0.05}", "check.residual_sway=0.001"]
-    spec = parse_spec(BAY, changes)
-    reason, *_ = prove(spec, planner_block(spec).text, histories=12).reasons()
+def test_hoisting_too_fast_for_the_allowed_sway_is_refused_with_its_number(hoisting):
+    spec = hoisting[0].changed(
+        {"check.uncertain": {"L1": 0.05}, "check.residual_sway": {"hook": 0.001, "payload": 0.001}}
+    )
+    reason, *_ = prove(spec, hoisting[1], histories=4).reasons()
     assert re.search(r"The payload sways by [0-9.]+ mm after history [0-9]+, and 1 mm are allowed", reason)
 
 

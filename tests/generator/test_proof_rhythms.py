@@ -7,6 +7,7 @@ from generator.planned_machines import BAY
 
 from gen_profile.planner.design import planner_block
 from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.habits import Change
 from gen_profile.proof.histories import SHIFT, Histories
 from gen_profile.proof.numbering import DRAWS, LONG, RHYTHMS, SEARCH, Numbering
 from gen_profile.spec.reading import parse_spec, preset_spec
@@ -72,18 +73,18 @@ def thrown_over(spec):
     return histories, histories.history(choices, 32.0 * histories.period)
 
 
-def left(spec, text, thrown_over):
-    histories, history = thrown_over
-    with ClosedLoop(spec, text, histories) as loop:
-        return loop.watched(history, loop.known(history))
-
-
 @pytest.mark.slow
 def test_a_block_that_forgets_what_was_left_is_found_by_a_rhythm(spec, thrown_over):
-    text = planner_block(spec).text
-    sound = left(spec, text, thrown_over)
+    """It forgets where an input is 1, so that one block is compiled."""
+    histories, history = thrown_over
+    text, knows = planner_block(spec).text, "nForgotten := 0;"
+    assert knows in text
+    text = text.replace(knows, f"{knows} IF fForgets = 1.0 THEN nForgotten := cModes; END_IF;")
+    text = text.replace("\nVAR_INPUT\n", "\nVAR_INPUT\n    fForgets : LREAL;\n", 1)
+    forgets = Change(time=0.0, lasts=np.inf, inputs={"fForgets": 1.0})
+    forgetful = attrs.evolve(history, changes=(forgets, *history.changes))
+    with ClosedLoop(spec, text, histories) as loop:
+        sound, found = (loop.watched(one, loop.known(one)) for one in (history, forgetful))
     assert sound.faults == ()
     assert 0.01 < sound.left < 0.05
-    forgets = text.replace("nForgotten := 0;", "nForgotten := cModes;")
-    assert forgets != text
-    assert any("fSwayLeft states" in fault for fault in left(spec, forgets, thrown_over).faults)
+    assert any("fSwayLeft states" in fault for fault in found.faults)

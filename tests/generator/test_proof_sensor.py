@@ -31,7 +31,7 @@ MEASURED = [
     'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}',
     "planner.disturbance={swing={payload=0.5}, gust={acceleration=0.1, longest=5.0}, settle=12.0}",
 ]
-HISTORIES = 32
+HISTORIES = 16
 CYCLE = 0.004
 
 
@@ -288,7 +288,7 @@ def test_sensors_of_a_gantry_are_given_by_axis(gantry):
 
 @pytest.mark.slow
 def test_a_gantry_with_two_sensors_passes_its_proof(gantry):
-    proof = prove(gantry, planner_block(gantry).text, histories=12, workers=2)
+    proof = prove(gantry, planner_block(gantry).text, histories=8, workers=2)
     assert proof.passed, proof.reasons()
     assert proof.apart <= 1e-9  # FMPy pushes both axes alike
     drawn = map(Histories.of(gantry).history, Numbering.of(Histories.of(gantry), 60, 0).drawn)

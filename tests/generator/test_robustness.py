@@ -82,7 +82,7 @@ def mode_amplitude(problem, profile, which):
 
 
 @pytest.mark.slow
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(problems())
 def test_every_crane_comes_to_rest(drawn):
     problem, phase = drawn
