@@ -185,9 +185,7 @@ def test_a_plan_that_leaves_too_much_is_not_made_longer_than_what_can_be_committ
 def test_a_little_damping_keeps_the_promise_for_hours():
     """What is left has decayed after a few minutes, so that a longer time adds nothing."""
     spec = preset_spec("bay-crane", [f"export.cycle_time={CYCLE}", *DAMPED])
-    out = (
-        Crane(planner_block(spec).text, 6.0, 1500.0).works(np.random.default_rng(3), 5400.0, 30.0).outputs
-    )
+    out = Crane(planner_block(spec).text, 6.0, 1500.0).works(np.random.default_rng(3), 5400.0, 30.0).outputs
     assert out["bPromise"][200:].all()
     ends = rests(out)
     assert len(ends) > 75
