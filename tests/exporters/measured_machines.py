@@ -29,7 +29,7 @@ class MeasuredMachine:
         if age is not None:
             self.inputs["fSensorAge"] = age
         self.block.inputs |= self.inputs
-        outputs = {name: float(values[0]) for name, values in self.block.play_on(1).items()}
+        outputs = self.block.step()
         push = (outputs["fVelocity"] - self.velocity) / self.cycle + self.gust
         self.velocity, h, x = outputs["fVelocity"], self.cycle, self.state
         k1 = self._rates(x, push)
@@ -170,7 +170,7 @@ class MeasuredGantry:
             for axis, value in self.shows().items():
                 self.inputs |= {f"fSensor_{axis}": sensor(axis, value), f"bSensorValid_{axis}": 1.0}
             self.block.inputs |= self.inputs
-            outputs = {name: float(values[0]) for name, values in self.block.play_on(1).items()}
+            outputs = self.block.step()
             velocity = np.array([outputs["fVelocity_x"], outputs["fVelocity_y"]])
             push = np.array([*(self.velocity - velocity) / self.cycle - self.gust, -G])
             self.velocity, steps = velocity, 4

@@ -26,7 +26,7 @@ class Compiled:
     def call(self, **inputs):
         self.block.inputs |= {self.names[name]: float(value) for name, value in inputs.items()}
         kinds = {"b": bool, "n": int}
-        issued = {name: values[0] for name, values in self.block.play_on(1).items()}
+        issued = self.block.step()
         self.outputs = {name.lower(): kinds.get(name[0], float)(value) for name, value in issued.items()}
 
     def __getitem__(self, name):

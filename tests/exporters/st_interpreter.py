@@ -424,8 +424,9 @@ class FunctionBlock:
         self.types, self.sections = declarations.types, declarations.sections
         functions = {}
         self._space = RUNTIME | {
-            "_function": lambda name: functions.setdefault(
-                name, FunctionBlock(_text_of(name, library), library)
+            "_function": lambda name: (
+                functions.get(name)
+                or functions.setdefault(name, FunctionBlock(_text_of(name, library), library))
             )
         }
         for name, value in declarations.initial.items():

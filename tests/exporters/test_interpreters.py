@@ -14,7 +14,7 @@ from gen_profile.errors import ExportError
 from gen_profile.planner import execution
 from gen_profile_exporters.st_to_c import translate
 
-COUNT = int(os.environ.get("PROGRAMS", "500"))
+COUNT = int(os.environ.get("PROGRAMS", "200"))
 LAST = DECLARATIONS.count("\n") + 1  # line, of a body
 GIVEN = {"which": 0} | dict(zip(INPUTS, (2.5, -0.5, 7, -2, True, False), strict=True))
 LEAST = "(-2147483647 - 1)"

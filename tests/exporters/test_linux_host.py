@@ -21,14 +21,14 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files
 from gen_profile.spec.reading import parse_spec
 
-CYCLES = 6_000
-LOOKS = 0.02  # s between calls for rows; without a pause each would be for one, and take a processor
+CYCLES = 4_500
+LOOKS = 0.1  # s between calls for rows; without a pause each would be for one, and take a processor
 SPEC = parse_spec(BAY.replace("bay 3", "host 3").replace("0.004", "0.001"))
 COMMANDS = (  # cycle, inputs from there on
     (50, {"fL1": 5.5, "bEnable": True}),
     (200, {"fTarget": 3.0, "bExecute": True}),
-    (3000, {"bExecute": False}),
-    (3200, {"fTarget": 6.0, "bExecute": True}),
+    (2000, {"bExecute": False}),
+    (2200, {"fTarget": 6.0, "bExecute": True}),
 )
 
 

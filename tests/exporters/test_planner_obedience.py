@@ -77,7 +77,7 @@ def test_a_stop_comes_soon_where_the_axis_is_to_turn_round_anyway(text, away, ba
     assert (last(driver, "bBusy"), last(driver, "fVelocity")) == (0, 0.0)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("kind", ["text", "hoisting"])
 def test_no_stop_passes_the_ends_that_were_stated(request, kind, seed):
     """Not even where the load is calmed afterwards, while the rope goes on changing."""

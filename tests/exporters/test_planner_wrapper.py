@@ -31,6 +31,7 @@ y = {{ velocity = 0.5, acceleration = 0.4, jerk = 1.0, travel = [0.0, 12.0] }}
 OFF, WORK, AWAY, ASTRAY = 21, 22, 23, 24
 BLOCK_OFF, POWERING, TAKING, GUIDING, STOPPING = range(5)
 VELOCITY_STEP = VELOCITY * CYCLE * 1.0001
+SPEEDING = 3.0  # s, after which an axis is fast
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +59,7 @@ def two(vendor, gantry):
     return PlannerBench(VENDORS[vendor], gantry, {"_x": UNITS, "_y": UNITS}, [START, 2.0])
 
 
-def under_way(bench, seconds=6.0, **target):
+def under_way(bench, seconds=SPEEDING, **target):
     bench.guided(bExecute=False)
     for _ in range(round(seconds / CYCLE)):
         outputs = bench.cycle(**ON, bExecute=True, **(target or {"fTarget": 12.0}))
@@ -89,8 +90,8 @@ class TestOneAxis:
         bench.until(lambda row: stages.append(row["nstage"]) or row["benabled"], most=40, **ON)
         assert sorted(set(stages)) == [POWERING, TAKING, GUIDING] and stages == sorted(stages)
         assert {at for (at,) in bench.commanded} == {START * UNITS}
-        bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=9.0)
-        assert bench.commanded[-1] == [pytest.approx(9.0 * UNITS, abs=1e-9)]
+        bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=6.0)
+        assert bench.commanded[-1] == [pytest.approx(6.0 * UNITS, abs=1e-9)]
         require_smooth(bench.positions())
 
     def test_it_gets_the_setpoints_of_the_block_alone(self, bench, bay):
@@ -126,8 +127,8 @@ class TestOneAxis:
         outputs = bench.guided(bExecute=False)
         assert {at for (at,) in bench.commanded[count:]} == {stands}
         assert (outputs["bpromise"], outputs["npromise"]) == (False, 2)
-        outputs = bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=12.0)
-        assert bench.commanded[-1] == [pytest.approx(12.0 * UNITS, abs=1e-9)]
+        outputs = bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=7.0)
+        assert bench.commanded[-1] == [pytest.approx(7.0 * UNITS, abs=1e-9)]
         require_smooth(bench.positions()[count:])
 
     def test_an_axis_that_is_taken_away_or_loses_its_power_is_an_error_with_its_number(self, bench):
@@ -161,7 +162,7 @@ class TestOneAxis:
         alone = CountedBlock(compile_counting(bay.text()), bEnable=0.0, fActPosition=START)
         alone.hold(100)
         alone.hold(1, bEnable=1.0)
-        alone.hold(round(6.0 / CYCLE), bExecute=1.0, fTarget=30.0)
+        alone.hold(round(SPEEDING / CYCLE), bExecute=1.0, fTarget=30.0)
         stopped = alone.hold(len(bench.commanded) - moved, bStop=1.0)["fPosition"]
         np.testing.assert_allclose(bench.positions()[moved:, 0], stopped, rtol=0, atol=1e-9)
         assert stopped[-1] < 20.0
@@ -172,14 +173,14 @@ class TestOneAxis:
             assert not bench.cycle(**left)["berror"]
 
     def test_a_disable_with_a_quick_stop_takes_less_time_and_one_taken_back_goes_on(self, bench):
-        under_way(bench)
+        under_way(bench, fTarget=7.0)
         for _ in range(50):
             bench.cycle(bPower=True, bEnable=False)
         outputs = bench.cycle(**ON)
         assert (outputs["nstage"], outputs["benabled"]) == (GUIDING, True)
         bench.until(quiet, most=9000, **ON)
         bench.cycle(**ON, bExecute=False)
-        bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=20.0)
+        bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=9.0)
         bench.cycle(**ON, bExecute=False)
         under_way(bench, fTarget=4.0)
         bench.until(lambda row: row["nstage"] == BLOCK_OFF, most=600, bEnable=False, bQuickStop=True)

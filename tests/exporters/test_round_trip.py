@@ -19,6 +19,7 @@ MOVES = {1: quintic((0.1, 0.4)), 2: quintic((0.1, 0.4), (1.2, -0.7))}
 UNITS = ["m", "mm", "um", "deg", "counts"]
 
 bounded = settings(max_examples=30, deadline=None, derandomize=True)
+fewer = settings(bounded, max_examples=12)
 
 
 class Contract(NamedTuple):
@@ -142,7 +143,7 @@ def test_file_name_has_the_formats_suffix(contract):
 
 
 @pytest.mark.slow
-@bounded
+@fewer
 @given(
     start=st.floats(-30, 30),
     end=st.floats(-30, 30),
@@ -174,7 +175,7 @@ def test_any_bytes_are_refused_or_read_never_a_crash(contract, content):
 
 
 @pytest.mark.slow
-@bounded
+@fewer
 @given(data=st.data())
 def test_a_mutated_file_is_refused_or_read_never_a_crash(contract, data):
     exporter = find_exporter(contract.format)

@@ -28,7 +28,7 @@ from gen_profile_fmu.description.fmu_files import Version
 
 pytestmark = pytest.mark.slow
 
-SYSTEM = model_of("system", find_plant("double-pendulum-crane"))
+SYSTEM, PROFILE = (model_of(kind, find_plant("double-pendulum-crane")) for kind in ("system", "profile"))
 WINE = "/usr/lib/wine/wine64"
 WINE_LIBRARIES = "/usr/lib/x86_64-linux-gnu/wine/x86_64-windows"
 
@@ -39,9 +39,9 @@ def lief():
     return import_module("lief")
 
 
-def binaries(version, *names):
+def binaries(version, *names, model=SYSTEM):
     """Files below binaries/ of an FMU for some platforms."""
-    with zipfile.ZipFile(io.BytesIO(build_fmu(SYSTEM, version, names))) as archive:
+    with zipfile.ZipFile(io.BytesIO(build_fmu(model, version, names))) as archive:
         return {
             name.removeprefix("binaries/"): archive.read(name)
             for name in archive.namelist()
@@ -69,9 +69,9 @@ def test_linux_on_arm(lief):
 
 def test_macos_for_both_processors(lief):
     names = ("macos-x86_64", "macos-arm64")
-    assert set(binaries(Version.FMI3, *names)) == {
-        "x86_64-darwin/paper_system.dylib",
-        "aarch64-darwin/paper_system.dylib",
+    assert set(binaries(Version.FMI3, *names, model=PROFILE)) == {
+        "x86_64-darwin/paper_profile.dylib",
+        "aarch64-darwin/paper_profile.dylib",
     }
     found = binaries(Version.FMI2, *names)
     assert list(found) == ["darwin64/paper_system.dylib"]

@@ -136,7 +136,7 @@ class TestVelocities:
         st.floats(10.0, 1e6),
         st.sampled_from([0.001, 0.002, 0.004, 0.025]),
     )
-    @settings(max_examples=30, deadline=None)
+    @settings(max_examples=12, deadline=None)
     @pytest.mark.slow
     def test_nothing_adds_up(self, distance, duration, counts_per_si, period):
         """However coarse the counts, the axes are led to within what one count/s makes in a period."""

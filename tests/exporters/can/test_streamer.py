@@ -113,11 +113,11 @@ class TestWholeStream:
         assert "do not settle" in record.reason
 
     @pytest.mark.slow
-    def test_no_drift_in_an_hour(self):
-        hour = quintic((0.0, 1.0), duration=3600.0)
-        with Bench(profile=hour, sync_period=1.0, step=500 * MS) as bench:
+    def test_no_drift_in_twenty_minutes(self):
+        long = quintic((0.0, 1.0), duration=1200.0)
+        with Bench(profile=long, sync_period=1.0, step=500 * MS) as bench:
             record = bench.run()
-        assert record.sent == 3601
+        assert record.sent == 1201
         assert abs(record.lateness.drift) < 1e-12
         assert record.lateness.percentile(100) == 0.0
 
