@@ -27,7 +27,12 @@ if sys.platform != "win32":
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Give `-n auto` two processes more than processors, since many tests wait for other programs."""
+    """Give `-n auto` two processes more than processors, since many tests wait for other programs.
+
+    Those of a module stay together, as far as they can, so that its fixtures are made once.
+    """
+    if config.option.dist == "no":
+        config.option.dist = "worksteal"
     return (os.cpu_count() or 1) + 2
 
 
