@@ -26,3 +26,8 @@ def read_bounded(path: Path, most: int = MOST) -> bytes:
             if len(content) <= most:
                 return content
     raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MiB")
+
+
+def is_folder(error: OSError, path: Path) -> bool:
+    """Tell whether reading a path failed as it is a folder, which Windows calls a matter of permission."""
+    return isinstance(error, IsADirectoryError | PermissionError) and path.is_dir()

@@ -76,7 +76,7 @@ ARGUMENTS = {
     ),
     "missing file": (["bay.toml"], [r"Cannot read the spec bay\.toml: No such file or directory\."]),
     "name too long": ([300 * "x"], [r"Cannot read the spec x+: File name too long\."]),
-    "folder as spec": (["."], [r"Cannot read the spec \.: Is a directory\."]),
+    "folder as spec": (["."], [r"Cannot read the spec \.: Is a directory; name a file in it\."]),
     "both": (["spec.toml", "--preset", "paper"], [r"--preset: name either .*, not both\."]),
     "mistyped command": (["compar"], [r".* compar; did you mean 'compare'\?"]),
     "mistyped command with arguments": (
@@ -158,6 +158,11 @@ def test_misused_arguments(tmp_path, monkeypatch, words, message):
     assert outcome.code == outcome.document["error"]["exit_code"] == 2
     assert message in outcome.document["error"]["message"]
     assert "Traceback" not in outcome.err
+
+
+def test_a_block_that_is_not_there_is_said_before_what_else_is_missing():
+    outcome = run_here("planner", "play", "missing.st")
+    assert outcome.code == 2 and "'missing.st' does not exist" in outcome.errors[-1]
 
 
 @pytest.mark.slow

@@ -311,8 +311,10 @@ def test_a_setpoint_that_no_machine_can_follow_is_named(folder):
 
 
 def test_the_folder_itself_is_no_artefact(folder):
-    outcome = run_here("check", folder)
-    assert (outcome.code, outcome.errors) == (2, [f"Error: Cannot read {folder}: Is a directory."])
+    named = f"Is a directory; name a file in it, such as {folder / 'paper.csv'}."
+    for command in ("check", "report", "deploy --to opc.tcp://127.0.0.1:9", "stream --channel none"):
+        outcome = run_here(*command.split(), folder)
+        assert (outcome.code, outcome.errors) == (2, [f"Error: Cannot read {folder}: {named}"])
 
 
 @pytest.mark.slow
@@ -366,6 +368,7 @@ def test_a_variant_of_a_motion_with_hoist_is_judged_as_the_block_would_play_it(t
     [
         ("--scale crat=0.5", "no axis 'crat'; did you mean 'cart'"),
         ("--scale 1.5", "--scale cart=1.5: a playback block takes 0 to 1"),
+        ("--scale 0,5", "'0,5' is no number; write a decimal point: 0.5."),
         ("--offset cart=far", "'far' is no number"),
         ("--mirror 7", "no axis '7'"),
     ],

@@ -19,6 +19,7 @@ from gen_profile.charts.figure import LIMIT, Figure, Line, Panel
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.charts.picture import drawn as draw_side_by_side
 from gen_profile.charts.picture import save
+from gen_profile.charts.plotly_json import figure_json
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import number
@@ -92,6 +93,7 @@ from pathlib import Path
 from numpy import arange
 from gen_profile.charts.figure import Figure, Line, Panel
 from gen_profile.charts.picture import save
+from gen_profile.charts.plotly_json import figure_json
 line = Line(name="line", x=arange(2.0), y=arange(2.0))
 panel = Panel(title="panel", x_label="x", y_label="y", lines=[line])
 save([Figure(caption="caption", panels=[panel])], Path("picture.png"), "salt", "title")
@@ -246,6 +248,15 @@ def test_few_curves_are_drawn_each_in_a_colour_of_its_own_unless_all_are_asked_f
     assert {"nzv", "zvd"} | {advice.method for advice in plain.recommended.values()} <= set(few)
     assert len(few) == len(set(few.values())) <= 6
     assert set(curves(every=True)) == {row.method for row in plain.rows}
+
+
+def test_each_bar_has_a_colour_or_a_hatch_of_its_own_on_paper_and_on_pages(plain):
+    figure = comparison_figure(plain)
+    (bars,) = draw_side_by_side([figure], "title").axes[-1].containers
+    marker = figure_json(figure)["panels"][-1]["data"][0]["marker"]
+    looks = {(bar.get_facecolor(), bar.get_hatch()) for bar in bars}
+    pages = set(zip(marker["color"], marker["pattern"]["shape"], strict=True))
+    assert len(looks) == len(pages) == len(plain.rows) > len(set(marker["color"]))
 
 
 def test_numerical_error_is_no_figure_of_a_bar(plain):

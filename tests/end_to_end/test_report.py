@@ -284,7 +284,7 @@ def test_of_many_uncertain_parameters_those_that_matter_have_curves_and_the_wors
     assert 43 <= int(tried) <= 43 + 3 and "corners" in text  # and the worst that were found in between
     groups = 2 + (int(tried) > 43)
     assert content.count('<tr class="failed">') == 40 + 2 + groups  # and the limits of both loads
-    drawn = re.search(r"([0-9]+) machines that sway less after the move are not drawn", text)[1]
+    drawn = re.search(r"Machines that sway less after the move and are not drawn: ([0-9]+)\.", text)[1]
     assert int(drawn) == 1 + 2 + 2 * 5 - 8  # the other corners are tried without being followed
 
 

@@ -10,7 +10,7 @@ from command_line import run_here
 from headless import COLOURS
 from headless import browser as start
 
-from gen_profile.charts.figure import INK, Bars, Figure, Line, Map, Panel
+from gen_profile.charts.figure import INK, Bars, Figure, Line, Map, Panel, Style
 from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.page import render
 from gen_profile.spec.reading import preset_spec, presets
@@ -349,7 +349,7 @@ def section(text):
     grid = {"x": np.arange(3.0), "y": np.arange(3.0), "values": np.eye(3), "limit": 0.5, "frame": (1.0, 1.0)}
     coloured = Map(title=text, x_label=text, y_label=text, unit=text, **grid)
     rows = {"values": np.ones(2), "names": (text, f"{text} again"), "texts": (text, text), "limit": 1.0}
-    bars = Bars(title=text, x_label=text, colours=(INK, INK), **rows)
+    bars = Bars(title=text, x_label=text, styles=(Style(colour=INK),) * 2, **rows)
     blocks = [
         Terms(rows=[(text, text)]),
         Table(head=(text, text), rows=[TableRow(cells=(text, Share(0.5)), mark="own")], code=True),

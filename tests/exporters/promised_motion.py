@@ -110,10 +110,10 @@ def _motion(promise, state, pieces, step, target, speed, travel):
         for angle in ANGLES:
             above.append((slope * angle).real)
             most.append(promise.slopes * error / total - ((rest + state.slopes[mode]) * angle).real)
-        turned = [
+        projected = [
             (angle * row, angle * rest) for angle in ANGLES for row, rest in zip(rows, left, strict=True)
         ]
-        sways.append([(row.real, rest.real) for row, rest in turned])
+        sways.append([(row.real, rest.real) for row, rest in projected])
     fastest, greatest, jerk = promise.limits
     for rows, now, limits in (
         (accelerations, a + 0.0 * ends, (-greatest, greatest)),

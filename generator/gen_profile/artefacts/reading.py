@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path, PureWindowsPath
 
 from gen_profile.artefacts.manifest import FILENAME, PLANNER, Artefact, Manifest, parse_manifest, sha256
-from gen_profile.bounded_file import DOCUMENT, MOST, read_bounded
+from gen_profile.bounded_file import DOCUMENT, MOST, is_folder, read_bounded
 from gen_profile.errors import CheckFailed, GenProfileError, OutputError, SpecError
 
 
@@ -18,7 +18,17 @@ def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
     try:
         return read_bounded(path, most)
     except OSError as error:
-        raise OutputError(f"Cannot read {what}{path}: {error.strerror or error}.") from error
+        cure = _file_in(path) if is_folder(error, path) else "."
+        raise OutputError(f"Cannot read {what}{path}: {error.strerror or error}{cure}") from error
+
+
+def _file_in(folder: Path) -> str:
+    """End a sentence about a folder in a file's place with a file in it, of its manifest if there is one."""
+    try:
+        manifest = parse_manifest(read_artefact(folder / FILENAME, DOCUMENT), FILENAME)
+    except OutputError:
+        return "; name a file in it."
+    return f"; name a file in it, such as {folder / manifest.artefacts[0].path}."
 
 
 def read_motion(path: Path) -> bytes:

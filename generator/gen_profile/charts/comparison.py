@@ -37,7 +37,8 @@ def comparison_figure(comparison: Comparison, every: bool = False) -> Figure:
     styles = compared_styles(comparison, every)
     motions = {row.method: row.evaluation.motion for row in comparison.rows}
     caption = (
-        "Optimal motions solid, shapers dashed, extra-insensitive ones dotted; recommended ones thick. "
+        "Optimal motions solid, shapers dashed, extra-insensitive ones dotted, "
+        "bars hatched alike; recommended ones thick. "
         "Dashed in red: limits. Behind the spectrum: natural frequencies, with their ranges."
     )
     spectra = curves.spectrum_panel(comparison.spec, comparison.rows[0].evaluation, motions, styles)
@@ -122,7 +123,7 @@ def _residuals(comparison: Comparison, styles: Mapping[str, Style]) -> Bars:
         x_label="worst residual sway (mm)",
         values=worst,
         names=[row.method for row in comparison.rows],
-        colours=[styles[row.method].colour for row in comparison.rows],
+        styles=[styles[row.method] for row in comparison.rows],
         texts=[number(value) for value in worst.tolist()],
         limit=1e3 * list(comparison.spec.check.residual_sway.values())[-1],
     )

@@ -113,7 +113,7 @@ def sway_figure(
     times = np.linspace(0.0, evaluation.motion.duration + evaluation.watch, samples)
     responses = evaluation.swing.at(times)
     left_out = len(evaluation.machines) - len(shown)
-    more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""
+    more = f" Machines that sway less after the move and are not drawn: {left_out}." if left_out else ""
     wind = in_wind(spec, evaluation.machines)
     more += "" if wind is None else " Dotted lines: how far the wind holds the loads aside, on top of that."
     end, panels = float(times[-1]), []

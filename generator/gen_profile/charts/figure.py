@@ -119,7 +119,9 @@ class Bars:
     title, x_label : str
     values : (n,) array
         Not negative.
-    names, colours : sequence of str
+    names : sequence of str
+    styles : sequence of Style
+        Of which a bar has the colour, and the dash as a hatch.
     texts : sequence of str
         Beside the bars.
     limit : float
@@ -130,7 +132,7 @@ class Bars:
     x_label: str
     values: Array
     names: Sequence[str]
-    colours: Sequence[str]
+    styles: Sequence[Style]
     texts: Sequence[str]
     limit: float
     y_label: ClassVar[str] = "method"

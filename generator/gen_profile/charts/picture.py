@@ -16,6 +16,7 @@ from gen_profile.plugins import require_installed
 # suffix → metadata that keeps the clock out of the file
 METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 DASHES: dict[parts.Dash, str] = {"solid": "-", "dash": "--", "dot": ":", "points": "none"}
+HATCHES: dict[parts.Dash, str] = {"solid": "", "dash": "///", "dot": "..", "points": ""}
 WIDE, HIGH = (9.0, 7.5, 5.2, 3.9), (6.0, 3.8, 3.8, 3.4)  # inches of a panel, by columns from 1
 BESIDE = 5.5  # inches of a figure beside another one
 LETTERS = 13  # of a caption, in an inch
@@ -151,7 +152,12 @@ def _level(axis: Any, level: parts.Level) -> None:
 
 def _bars(axis: Any, panel: parts.Bars) -> None:
     """Draw bars, and their texts beside them; what the axis cannot hold has an arrow."""
-    axis.barh(list(panel.names), panel.values, color=list(panel.colours))
+    look = {
+        "color": [style.colour for style in panel.styles],
+        "edgecolor": parts.PAPER,
+        "hatch": [HATCHES[style.dash] for style in panel.styles],
+    }
+    axis.barh(list(panel.names), panel.values, **look, linewidth=0.0)
     for place, (value, text) in enumerate(zip(panel.values, panel.texts, strict=True)):
         arrow = "" if value <= panel.end else "▸ "
         axis.text(min(value, panel.end), place, f" {arrow}{text}", va="center", fontsize="small")

@@ -9,7 +9,7 @@ import numpy as np
 
 from gen_profile.charts.comparison import comparison_figure
 from gen_profile.charts.curves import motion_figure, profile_figure, select_machines, sway_figure
-from gen_profile.charts.figure import PALETTE, Bars, Figure
+from gen_profile.charts.figure import PLAIN, Bars, Figure
 from gen_profile.charts.identification import identification_figure
 from gen_profile.charts.machine import draw_machine
 from gen_profile.charts.picture import require_drawable, save
@@ -127,13 +127,13 @@ def _check_figure(check: Check) -> Figure:
         load, _ = check.worst_of([finding])
         shown[f"{finding.scenario.name}, {load}"] = finding, finding.residual[load]
     left_out = len(ranked) - len(shown)
-    more = f" {left_out} that sway less are not drawn." if left_out else ""
+    more = f" Not drawn, as they sway less: {left_out}." if left_out else ""
     bars = Bars(
         title="Residual sway",
         x_label="share of the allowed residual sway (%)",
         values=np.array([100.0 * check.fraction_after(finding) for finding, _ in shown.values()]),
         names=list(shown),
-        colours=[PALETTE[0]] * len(shown),
+        styles=[PLAIN] * len(shown),
         texts=[f"{number(1e3 * sway)} mm" for _, sway in shown.values()],
         limit=100.0,
     )

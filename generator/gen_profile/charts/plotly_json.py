@@ -12,6 +12,8 @@ from gen_profile.motion.profile import Array
 EVEN = 1e-12  # of the last time, by which even steps may differ
 DIGITS = 6  # of a curve's largest value: finer than any screen, and a third of the bytes
 SHADE = "rgba(120,130,140,0.16)"
+HATCHES: dict[parts.Dash, str] = {"solid": "", "dash": "/", "dot": ".", "points": ""}
+HATCHED = {"fillmode": "overlay", "size": 6, "solidity": 0.2}
 DASHED = {"color": parts.LIMIT, "dash": "dash", "width": 1.2}
 
 
@@ -56,7 +58,7 @@ def _bars(panel: parts.Bars) -> dict[str, Any]:
     shown = np.minimum(panel.values, panel.end)
     layout = _labels(panel.x_label, "")
     layout["xaxis"] |= {"range": [0, panel.end]}
-    layout["yaxis"] |= {"autorange": "reversed"}
+    layout["yaxis"] |= {"autorange": "reversed", "dtick": 1, "tickfont": {"size": 10}}  # all names
     layout["shapes"] = [_shape("line", (panel.limit, panel.limit), (0, 1), yref="paper", line=DASHED)]
     bars = {
         "type": "bar",
@@ -66,7 +68,10 @@ def _bars(panel: parts.Bars) -> dict[str, Any]:
         "text": [escape(text) for text in panel.texts],
         "textposition": "auto",
         "hoverinfo": "y+text",
-        "marker": {"color": list(panel.colours)},
+        "marker": {
+            "color": [style.colour for style in panel.styles],
+            "pattern": {"shape": [HATCHES[style.dash] for style in panel.styles], **HATCHED},
+        },
     }
     return {"data": [bars], "layout": {**layout, "hovermode": "closest"}}
 

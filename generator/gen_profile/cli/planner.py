@@ -107,7 +107,7 @@ def write(
 @planner.command(
     epilog="Example: gen-profile planner play deploy/bay-3.st --commands commands.csv --out setpoints.csv"
 )
-@click.argument("block", type=PathType())
+@click.argument("block", type=PathType(exists=True))
 @option(
     "--commands",
     "CSV with time_s, command, value (or value_AXIS) and live parameters; a row holds until the next.",

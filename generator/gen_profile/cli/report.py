@@ -138,9 +138,9 @@ def _is_artefact(path: Path) -> bool:
     from gen_profile.artefacts.reading import read_motion
     from gen_profile_exporters.registry import formats
 
-    if not path.is_file() or path.suffix.lower() == ".toml":
+    if path.suffix.lower() == ".toml" or not (path.is_file() or path.is_dir()):
         return False
-    read_motion(path)
+    read_motion(path)  # says of a folder which file is meant
     return any(path.name.endswith(known.suffix) for known in formats().values())
 
 

@@ -164,7 +164,7 @@ def read_table(path: Path) -> BlockTable:
     CheckFailed
         It is not the file that was exported, or one beside it not the one that was exported with it.
     """
-    container, content = find_container(container_of(path)), read_artefact(path)
+    content, container = read_artefact(path), find_container(container_of(path))
     kind: type[BlockTable] = PlannerTable if is_planner_block(path) else BlockTable
     if kind is PlannerTable:
         specs: tuple[Spec, ...] = (_exported_spec(path, content, planner=True),)

@@ -10,7 +10,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gen_profile.bounded_file import DOCUMENT, read_bounded
+from gen_profile.bounded_file import DOCUMENT, is_folder, read_bounded
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
@@ -123,6 +123,8 @@ def read_text(path: Path) -> str:
     except OSError as error:
         near = meant(path.name, [other.name for other in path.parent.glob("*.toml")])
         cure = f"; did you mean {listed(near)}?" if near and isinstance(error, FileNotFoundError) else "."
+        if is_folder(error, path):
+            cure = "; name a file in it."
         if str(path) in presets():
             cure = f"; a preset is called so: --preset {path}, or gp.preset_spec({str(path)!r})."
         raise OutputError(f"Cannot read the spec {path}: {error.strerror}{cure}") from error

@@ -22,7 +22,7 @@ from gen_profile.progress import Progress, no_progress, require_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec, spec_from_dict
 from gen_profile.spec.values import require_whole
-from gen_profile.suggestion import finite_number, suggestion
+from gen_profile.suggestion import finite_number, number_meant, suggestion
 from gen_profile.summary import Drawable
 from gen_profile.verification.cosimulation import cosimulate, sample_spacing
 from gen_profile.verification.judging import verdict
@@ -86,7 +86,7 @@ def _entry(option: str, text: str, axes: Sequence[str]) -> tuple[str, float]:
         raise SpecError(f"{option} {text}: say of which axis, as {axes[0]}={text} ({', '.join(axes)}).")
     value = finite_number(number)
     if math.isnan(value):
-        raise SpecError(f"{option} {text}: {number!r} is no number.")
+        raise SpecError(f"{option} {text}: {number!r} is no number{number_meant(number)}.")
     return _axis(option, name, axes) if equals else axes[0], value
 
 
