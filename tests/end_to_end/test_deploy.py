@@ -285,7 +285,7 @@ def test_what_is_not_as_it_should_be_is_told_in_a_sentence(changes, code, words,
 @pytest.mark.parametrize(
     ("file", "words"),
     [
-        ("paper.csv", "csv carries no playback block; the suffixes of those that do are"),
+        ("manifest.json", "the suffixes of those that do are"),
         ("absent.st", "absent.st"),
     ],
 )
