@@ -160,6 +160,14 @@ def test_misused_arguments(tmp_path, monkeypatch, words, message):
     assert "Traceback" not in outcome.err
 
 
+@pytest.mark.parametrize("words", [("report", "name.csv"), ("compare", "--plot", "name.png")])
+def test_a_path_that_no_system_takes_is_named(words):
+    *options, last = words
+    found = run_here(*options, last.replace("name", 300 * "n"))
+    assert found.code == 2
+    assert re.fullmatch(r"Error: Cannot use n+\.\w+: File name too long\.\n", found.err)
+
+
 def test_a_block_that_is_not_there_is_said_before_what_else_is_missing():
     outcome = run_here("planner", "play", "missing.st")
     assert outcome.code == 2 and "'missing.st' does not exist" in outcome.errors[-1]

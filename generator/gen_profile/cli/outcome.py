@@ -108,6 +108,8 @@ def print_error(error: Exception, as_json: bool) -> int:
             code, message = INTERRUPTED, "Standard input ended before an answer; give it by an option."
         case click.Abort():
             code, message = INTERRUPTED, "Interrupted."
+        case OSError(filename=str(path)):  # of a path that cannot even be looked at
+            code, message = OutputError.exit_code, f"Cannot use {path}: {error.strerror}."
         case _:
             code, message = 1, f"Internal error ({type(error).__name__}: {error}). Run again with --debug."
     if as_json:
