@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import os
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
+from selenium.webdriver.support.wait import WebDriverWait
 from system_parts import missing, program
 
 ARGUMENTS = (
@@ -66,12 +66,10 @@ class Browser:
         return self._driver.execute_async_script(script, *arguments)
 
     def wait(self, script: str, *arguments: object) -> None:
-        """Wait until a function's body gives something true, asking less and less often."""
-        until, pause = time.monotonic() + PATIENCE, 0.05
-        while not self.run(script, *arguments):
-            assert time.monotonic() < until, script
-            time.sleep(pause)
-            pause = min(1.2 * pause, 0.4)
+        """Wait until a function's body gives something true."""
+        WebDriverWait(self._driver, PATIENCE, poll_frequency=0.2).until(
+            lambda _: self.run(script, *arguments)
+        )
 
     def find(self, selector: str) -> WebElement:
         """Find the first element of a CSS selector."""

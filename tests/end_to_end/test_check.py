@@ -9,6 +9,7 @@ import pytest
 from command_line import run_here, run_process
 from fmu import absolute_angle_crane as oracle
 
+from gen_profile.artefacts.manifest import SEAL, seal_of
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.spec.reading import preset_spec
 
@@ -315,6 +316,14 @@ def test_the_folder_itself_is_no_artefact(folder):
     for command in ("check", "report", "deploy --to opc.tcp://127.0.0.1:9", "stream --channel none"):
         outcome = run_here(*command.split(), folder)
         assert (outcome.code, outcome.errors) == (2, [f"Error: Cannot read {folder}: {named}"])
+
+
+def test_a_folder_whose_manifest_lists_nothing_is_no_artefact_either(folder, tmp_path):
+    document = json.loads((folder / "manifest.json").read_text("utf-8")) | {"artefacts": []}
+    del document[SEAL]
+    (tmp_path / "manifest.json").write_text(json.dumps(document | {SEAL: seal_of(document)}), "utf-8")
+    outcome = run_here("check", tmp_path)
+    assert outcome.errors == [f"Error: Cannot read {tmp_path}: Is a directory; name a file in it."]
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ import pytest
 from command_line import run_here
 from distributed import LocalCluster
 from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, PAPER, swing
+from sweeps import LOOPBACK
 
 from gen_profile.charts.proof import history_figure
 from gen_profile.errors import SpecError
@@ -29,7 +30,6 @@ from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
 COUNT = 25  # histories, the fewest that have one of each group
 FEW = 8  # with corners, draws and a search
-LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 
 
 @pytest.fixture(scope="module")

@@ -27,8 +27,8 @@ SECTIONS = {  # elements and their attributes
     "VAR": ("localVars", {}),
     "VAR CONSTANT": ("localVars", {"constant": "true"}),
 }
-BESIDE = {"addData", "documentation"}  # CODESYS adds its own to what it exports
-DECLARING = {"name", "lower", "upper", "value"}  # attributes of what a group holds
+IGNORED = {"addData", "documentation"}  # elements; CODESYS adds its own to what it exports
+ATTRIBUTES = {"name", "lower", "upper", "value"}  # of what a group holds
 
 
 @attrs.frozen(kw_only=True)
@@ -171,7 +171,7 @@ def _uncommented(comment: str) -> str:
 def _source(element: etree._Element) -> BlockSource:
     """Read a function block back."""
     variables: list[BlockVariable] = []
-    for group in _declaring(child(element, "{*}interface")):
+    for group in _children(child(element, "{*}interface")):
         section = _section(group)
         variables += [_read_variable(section, item) for item in group.findall("{*}variable")]
     body = child(element, "{*}body/{*}ST/*")
@@ -183,8 +183,9 @@ def _source(element: etree._Element) -> BlockSource:
     )
 
 
-def _declaring(element: etree._Element) -> list[etree._Element]:
-    return [one for one in element.iterchildren("{*}*") if etree.QName(one).localname not in BESIDE]
+def _children(element: etree._Element) -> list[etree._Element]:
+    """Give all elements in one but those that mean nothing to a controller."""
+    return [one for one in element.iterchildren("{*}*") if etree.QName(one).localname not in IGNORED]
 
 
 def _section(group: etree._Element) -> str:
@@ -192,10 +193,10 @@ def _section(group: etree._Element) -> str:
     name = etree.QName(group).localname
     marks = {str(key): value for key, value in group.items() if value != "false"}
     section = next((key for key, kind in SECTIONS.items() if kind == (name, marks)), None)
-    inner = _declaring(group)
-    for item in inner:  # which grows
-        inner += _declaring(item)
-    others = [(item, key) for item in inner for key, _ in item.items() if key not in DECLARING]
+    inner = _children(group)
+    for item in inner:  # this grows, by all that is below
+        inner += _children(item)
+    others = [(item, key) for item in inner for key, _ in item.items() if key not in ATTRIBUTES]
     if section is None:
         others = [(group, " ".join((name, *marks)))]
     if others:

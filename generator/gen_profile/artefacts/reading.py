@@ -25,10 +25,10 @@ def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
 def _file_in(folder: Path) -> str:
     """End a sentence about a folder in a file's place with a file in it, of its manifest if there is one."""
     try:
-        manifest = parse_manifest(read_artefact(folder / FILENAME, DOCUMENT), FILENAME)
+        listed = parse_manifest(read_artefact(folder / FILENAME, DOCUMENT), FILENAME).artefacts
     except OutputError:
-        return "; name a file in it."
-    return f"; name a file in it, such as {folder / manifest.artefacts[0].path}."
+        listed = ()
+    return f"; name a file in it, such as {folder / listed[0].path}." if listed else "; name a file in it."
 
 
 def read_motion(path: Path) -> bytes:
