@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import resource_tracker
+from pathlib import Path
+from tempfile import gettempdir
 from typing import Any
 
 import dask
@@ -16,6 +18,7 @@ from tornado.ioloop import PeriodicCallback
 from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import SpecError
 from gen_profile.interrupts import interrupts_collected
+from gen_profile.private_folder import temporary_folder
 
 # else workers look at their own stack every 10 ms, and remember it for 1000 s: 80 MB; and all look at their
 # event loops every 20 ms, and at the whole computer twice a second
@@ -42,6 +45,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
         answer_time, silent = ANSWER_TIME, f"scheduler {scheduler}: no worker answers"
         if scheduler is None:
             answer_time, silent = START_TIME, f"workers: no process of this computer started in {START_TIME}"
+            stack.enter_context(_own_scratch_space())
             stack.enter_context(_script_hidden())
             with interrupts_collected():  # Dask cannot end processes that are about to start
                 cluster = stack.enter_context(_local_cluster(workers))
@@ -64,6 +68,17 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
     finally:
         with interrupts_collected():
             stack.close()
+
+
+@contextmanager
+def _own_scratch_space() -> Iterator[None]:
+    """Keep Dask out of the folder that all users share, where it writes through links and imports from."""
+    shared = Path(dask.config.get("temporary-directory", None) or gettempdir())
+    with (
+        temporary_folder(shared, "gen-profile-workers-") as own,
+        dask.config.set({"temporary-directory": str(own)}),
+    ):
+        yield
 
 
 @contextmanager

@@ -148,10 +148,13 @@ def fresh(files):
 
 @pytest.mark.slow
 def test_what_stands_is_watched(files, fresh, tmp_path):
-    old, log = files / "old" / "paper.st", tmp_path / "log.csv"
+    old, log, other = files / "old" / "paper.st", tmp_path / "log.csv", tmp_path / "other.csv"
+    other.write_text("mine", "utf-8")
+    log.symlink_to(other)  # as another user may have laid it in a folder that both write to
     where = ("--to", fresh, "--security", "none")
     done = run_here("deploy", old, *where, "--watch", "--for", "1", "--log", log, "--json")
     assert done.code == 0, done.err
+    assert other.read_text("utf-8") == "mine"
     document = done.document
     assert (document["action"], document["fault"], document["moving"]) == ("watched", None, 0)
     assert 1 < document["states"] <= document["cycles"] + 1

@@ -3,7 +3,9 @@
 import json
 import multiprocessing
 import os
+import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import attrs
@@ -47,6 +49,35 @@ def test_a_process_that_is_given_up_is_started_anew(monkeypatch):
         first = client.submit(os.getpid, pure=False).result()
         client.sync(client.cluster.workers[0].close)
         assert client.submit(os.getpid, pure=False).result() != first
+
+
+@pytest.mark.slow
+def test_links_that_another_user_laid_in_a_shared_folder_are_not_written_through(tmp_path, monkeypatch):
+    """Dask keeps its locks in a folder of one name for all users, truncates them, and imports from there."""
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine", "utf-8")
+    laid = tmp_path / "shared" / "dask-scratch-space"
+    laid.mkdir(parents=True)
+    for name in ("global.lock", "purge.lock"):
+        (laid / name).symlink_to(precious)
+    monkeypatch.setattr("tempfile.tempdir", str(laid.parent))
+    monkeypatch.setenv("TMPDIR", str(laid.parent))
+    with cluster.client_of(None, 1) as client:
+        paths = client.submit(lambda: [*sys.path, str(Path.cwd())]).result()
+        assert precious.read_text("utf-8") == "mine"
+        assert str(laid) not in {*paths, *sys.path}
+    assert list(laid.parent.iterdir()) == [laid] and len(list(laid.iterdir())) == 2
+
+
+def test_a_link_in_place_of_the_lock_is_not_written_through(tmp_path):
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine", "utf-8")
+    store = prepared(tmp_path / "out", "plant.L1=0.4:0.5:2")
+    store.folder.mkdir()
+    (store.folder / ".lock").symlink_to(precious)
+    with pytest.raises(OutputError, match="choose another one"), opened(store):
+        pass
+    assert precious.read_text("utf-8") == "mine"
 
 
 # Cases

@@ -2,12 +2,14 @@
 
 import asyncio
 import math
+import os
 import runpy
 import signal
 import subprocess
 import sys
 import time
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -158,3 +160,31 @@ def test_it_stops_where_nobody_changes_b_alive_and_at_a_second_signal_at_once(ho
 def test_a_wrong_word_is_refused(host, words):
     done = subprocess.run([host / "host_3", *words], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr.partition(":")[0]) == (2, "usage")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trap", ["open to all", "a second name", *["another user's"][: os.geteuid() == 0]])
+def test_shared_memory_that_another_user_may_write_is_not_taken(host, trap):
+    """Whoever writes it commands the axes."""
+    shared = Path("/dev/shm/host_3")
+    shared.touch(mode=0o600)
+    second = shared.with_name("host_3.second")
+    try:
+        if trap == "another user's":
+            os.chown(shared, 65534, 65534)
+        elif trap == "open to all":
+            shared.chmod(0o666)
+        else:
+            os.link(shared, second)
+        with running(host / "host_3") as process:
+            until(lambda: process.poll() is not None or shared.stat().st_size)
+            assert shared.stat().st_size == 0
+            assert "or others may write it: remove it, and start again" in process.stderr.read()
+        assert process.returncode == 1
+        if trap != "a second name":
+            script = runpy.run_path(str(host / "host 3_opcua.py"))
+            with pytest.raises(OSError, match="is another user's, or others may write it"):
+                script["Image"]()
+    finally:
+        for path in (shared, second):
+            path.unlink(missing_ok=True)

@@ -7,7 +7,8 @@
  *
  * It is called every $cycle s. Other programs reach it in shared memory, /dev/shm/$name, which is laid out as `struct
  * image` below: one writes the inputs, a fieldbus's takes the setpoints, and "${file}_opcua.py" serves both by OPC UA.
- * All that belongs to one cycle stands in one row.
+ * All that belongs to one cycle stands in one row. Only this user and his group may write it (UMask=0007 lets the
+ * group): a file of that name that is another user's is refused, and whoever opens it should do the same.
  *
  * Who commands must change bAlive, in any way, every SECONDS (1; 0 for never): while it does not, bStop is set. The
  * first signal sets bStop, too, and a second one bQuickStop; the program ends once the axis stands, and says how
@@ -25,6 +26,7 @@
 #include <stdlib.h>
 #include <sys/file.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -81,12 +83,30 @@ static void give_up(const char *what)
     exit(1);
 }
 
+/* Refuse a file that was there before: whoever may write it commands the axes. */
+static void require_own(int file)
+{
+    struct stat status;
+    if (fstat(file, &status)) {
+        give_up("/dev/shm/$name");
+    }
+    const mode_t foreign = S_IWOTH | (status.st_gid == getegid() ? 0 : S_IWGRP);
+    if (!S_ISREG(status.st_mode) || status.st_uid != geteuid() || status.st_nlink != 1 || status.st_mode & foreign) {
+        fputs("/dev/shm/$name is another user's, or others may write it: remove it, and start again.\n", stderr);
+        exit(1);
+    }
+}
+
 /* Share the image, and keep others that would drive the same axes out. */
 static struct image *shared_image(void)
 {
     const int file = shm_open("/$name", O_RDWR | O_CREAT, 0660);
-    if (file < 0 || flock(file, LOCK_EX | LOCK_NB)) {
-        give_up(file < 0 ? "/dev/shm/$name" : "$name runs already; end that first");
+    if (file < 0) {
+        give_up("/dev/shm/$name");
+    }
+    require_own(file);
+    if (flock(file, LOCK_EX | LOCK_NB)) {
+        give_up("$name runs already; end that first");
     }
     struct image *image = MAP_FAILED;
     if (ftruncate(file, sizeof *image) == 0) {

@@ -98,7 +98,8 @@ def _logged(table: BlockTable, path: Path) -> Iterator[Report]:
     own = ("promise", "command", "time_to_go_s") if planner else ("off_nominal", "place_cycles", "rate")
     began, last = datetime.now(UTC), -IDLE_PERIOD
     try:
-        with path.open("w", encoding="utf-8", newline="") as file:
+        path.unlink(missing_ok=True)  # it may lead to another file
+        with path.open("x", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(["time_s", "call", "phase", "error", *own, *columns, "event"])
 
