@@ -1,5 +1,9 @@
-# What CI runs, and what a change must pass.
-check: lint coverage
+# What a change must pass: quick tests, and slow ones whose rooms changed in five commits, or whose turn it is.
+check: lint
+    pytest -n auto --turn "${TURN:-$(git rev-list --count HEAD)}" --changed "$(git diff --name-only "${BASE:-HEAD~5}")"
+
+# All that there is, whatever turn it is.
+check-all: lint coverage oldest
 
 # Format, lint, types and import layers.
 [parallel]
@@ -29,6 +33,13 @@ layers:
 # The whole suite with branch coverage; pyproject.toml holds the least share.
 coverage:
     pytest -n auto --cov --cov-report=term
+
+# The quick tests with the oldest dependencies that pyproject.toml allows, parametrised ones in their first case, in
+# one process, which collects once.
+oldest:
+    uv venv --quiet --clear --python 3.11 build/oldest
+    uv pip install --quiet --python build/oldest --resolution lowest-direct -e '.[dev]'
+    build/oldest/bin/pytest -p no:xdist --assert=plain -m "not slow" --first-cases
 
 # Some tests: just test tests/generator -k shaper
 test *arguments:

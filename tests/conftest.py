@@ -4,14 +4,16 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is loaded: there is a process per processor
 
 import pytest
 from hypothesis import settings
+from turns import TURNS, reasons, turn_of
 
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
@@ -23,6 +25,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 if sys.platform != "win32":
     signal.signal(signal.SIGQUIT, signal.SIG_DFL)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup has it ignored
+
+
+TURN = pytest.StashKey[str]()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -42,6 +47,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="run each parametrised test once only, which does to try other versions of libraries",
     )
+    parser.addoption(
+        "--turn",
+        type=int,
+        help=f"run the slow tests whose rooms changed, and those whose turn it is (modulo {TURNS})",
+    )
+    parser.addoption(
+        "--changed", default="", metavar="PATHS", help="what changed, for --turn: a path each line"
+    )
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -49,9 +62,44 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: "recheck" not in item.path.parts)  # the longest first
     if config.getoption("--first-cases"):
         first = {item.nodeid.partition("[")[0]: item for item in reversed(items)}
-        kept = set(first.values())
-        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
-        items[:] = [item for item in items if item in kept]
+        keep(config, items, set(first.values()))
+    if config.getoption("--turn") is not None:
+        take_turns(config, items)
+
+
+def keep(config: pytest.Config, items: list[pytest.Item], kept: Set[pytest.Item]) -> None:
+    config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+    items[:] = [item for item in items if item in kept]
+
+
+def take_turns(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the slow tests whose turn it is not, and note how many for the last lines."""
+    turn, changed = config.getoption("--turn") % TURNS, set(config.getoption("--changed").split())
+    slow = {item: item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
+    why = {file: reasons(file, changed) for file in {*slow.values()}}
+    rooms = {item for item, file in slow.items() if why[file]}
+    due = {item for item, file in slow.items() if turn_of(file) == turn} - rooms
+    keep(config, items, {*items} - slow.keys() | rooms | due)
+    named = ", ".join(sorted({PurePosixPath(one).stem for one in set().union(*why.values())})) or "none"
+    left = len(slow) - len(rooms) - len(due)
+    config.stash[TURN] = (
+        f"Turn {turn + 1} of {TURNS}: of {len(slow)} slow tests {len(rooms)} of changed rooms ({named}), "
+        f"{len(due)} in turn; {left} were left for the next turns."
+    )
+    if hasattr(config, "workeroutput"):  # of a process of pytest-xdist
+        config.workeroutput["turn"] = config.stash[TURN]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Take over what a process noted, if it did not die."""
+    if told := getattr(node, "workeroutput", {}).get("turn"):
+        node.config.stash[TURN] = told
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    if told := config.stash.get(TURN, ""):
+        terminalreporter.write_line(told)
 
 
 def pytest_collection_finish() -> None:
