@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+CHAPTERS = ("presentation", "studies", "delivery", "assurance", "methods", "dynamics")
 SOURCES = {
     "gen_profile": "generator",
     "gen_profile_fmu": "fmu",
@@ -25,18 +26,32 @@ def layers() -> list[list[str]]:
     return [layer.replace(":", "|").replace(" ", "").split("|") for layer in names]
 
 
-def purpose(name: str) -> str:
-    """Read the first line of a package's or module's docstring."""
+def home(name: str) -> Path:
+    """Find the folder or the file of a package or module."""
     path = ROOT / SOURCES[name.partition(".")[0]] / name.replace(".", "/")
-    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return path if path.is_dir() else path.with_suffix(".py")
+
+
+def purpose(place: Path) -> str:
+    """Read the first line of a package's or module's docstring."""
+    file = place / "__init__.py" if place.is_dir() else place
     return (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").partition("\n")[0].rstrip(".")
 
 
+def packages(chapter: Path) -> list[Path]:
+    """List the packages of a chapter, none of a package that is no chapter."""
+    found = sorted(file.parent for file in chapter.glob("*/__init__.py"))
+    return found if chapter.name in CHAPTERS else []
+
+
 def table() -> str:
-    """Lay the layers out as a table, top to bottom."""
+    """Lay the layers out as a table, top to bottom, and below each chapter its packages."""
     lines = ["| layer | package | what |", "|---|---|---|"]
     for number, names in enumerate(layers(), 1):
-        lines += [f"| {number} | `{name.removeprefix('gen_profile.')}` | {purpose(name)} |" for name in names]
+        for name in names:
+            short = name.removeprefix("gen_profile.")
+            lines.append(f"| {number} | `{short}` | {purpose(home(name))} |")
+            lines += [f"| | `{short}.{one.name}` | {purpose(one)} |" for one in packages(home(name))]
     return "\n".join(lines)
 
 

@@ -111,7 +111,7 @@ def pytest_collection_finish() -> None:
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Halve the intervals of limited motions: what is refused, named and found to work is so on any mesh."""
-    set_up = "gen_profile.solvers.direct.set_up"
+    set_up = "gen_profile.methods.solvers.direct.set_up"
     monkeypatch.setattr(f"{set_up}.USUAL", import_module(set_up).DirectOptions(intervals=20))
 
 

@@ -16,8 +16,8 @@ from typing import Any
 import attrs
 from command_line import PROGRAM, run_here
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.reading import spec_from_dict
+from gen_profile.support.errors import SpecError
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_profile.artefacts.manifest import Manifest, artefact_of
-from gen_profile.deployment.mailbox import LinkLostError, Mailbox
-from gen_profile.deployment.simulated_block import SimulatedBlock
-from gen_profile.deployment.watching.watch import watch
-from gen_profile.designs.design import design
+from gen_profile.delivery.deployment.mailbox import LinkLostError, Mailbox
+from gen_profile.delivery.deployment.simulated_block import SimulatedBlock
+from gen_profile.delivery.deployment.watching.watch import watch
+from gen_profile.delivery.designs.design import design
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import block_files
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep.library import index_of
+from gen_profile.studies.sweep.library import index_of
+from gen_profile.support.artefacts.manifest import Manifest, artefact_of
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.playback.library import LibraryEntry, library_source

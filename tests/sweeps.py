@@ -9,9 +9,9 @@ from pathlib import Path
 
 from distributed import LocalCluster
 
-from gen_profile.sweep.archive import written_archive
-from gen_profile.sweep.case import CaseOutcome
-from gen_profile.sweep.store import grid_of
+from gen_profile.studies.sweep.archive import written_archive
+from gen_profile.studies.sweep.case import CaseOutcome
+from gen_profile.studies.sweep.store import grid_of
 
 LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 

@@ -18,7 +18,7 @@ FILES = [str(path.relative_to(ROOT)) for path in ROOT.glob("tests/**/test_*.py")
         ("tests/exporters/test_planner_far.py", "exporters/gen_profile_exporters/planner/a/b.st", "planner"),
         (
             "tests/generator/test_minimum_time.py",
-            "generator/gen_profile/solvers/minimum_time.py",
+            "generator/gen_profile/methods/solvers/minimum_time.py",
             "minimum_time",
         ),
         ("tests/fmu/test_cache.py", "fmu/gen_profile_fmu/building/plant_fmu.py", "fmu"),

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import attrs
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 
 SECTIONS = ("VAR_IN_OUT", "VAR_INPUT", "VAR_OUTPUT", "VAR", "VAR CONSTANT")
 VALUES_PER_LINE = 4  # of an array's initial values

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.setpoints import MAX_SAMPLES
 
 Row = tuple[int, list[str]]

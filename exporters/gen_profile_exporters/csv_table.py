@@ -26,9 +26,9 @@ from itertools import product
 
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
-from gen_profile.units import AXIS_UNITS, COUNTS, AxisScale
+from gen_profile.support.errors import ExportError
+from gen_profile.support.units import AXIS_UNITS, COUNTS, AxisScale
 from gen_profile_exporters import csv_dialects, setpoints
 from gen_profile_exporters.csv_dialects import DIALECTS, CsvDialect, Row
 from gen_profile_exporters.exporter import File, Target

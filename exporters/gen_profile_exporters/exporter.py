@@ -7,7 +7,7 @@ import attrs
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
-from gen_profile.units import AxisScale
+from gen_profile.support.units import AxisScale
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants
 

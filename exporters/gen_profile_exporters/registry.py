@@ -13,9 +13,9 @@ from importlib.metadata import entry_points
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
-from gen_profile.errors import ExportError, SpecError
-from gen_profile.plugins import load_plugin
-from gen_profile.suggestion import suggestion
+from gen_profile.support.errors import ExportError, SpecError
+from gen_profile.support.plugins import load_plugin
+from gen_profile.support.suggestion import suggestion
 
 if TYPE_CHECKING:
     from gen_profile_exporters import csv_table

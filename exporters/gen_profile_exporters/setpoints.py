@@ -9,10 +9,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile, columns_of, grid_length, sample
 from gen_profile.spec.values import Bounds, CycleTime
-from gen_profile.units import COUNTS, AxisScale
+from gen_profile.support.errors import ExportError
+from gen_profile.support.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import Target
 
 INT32: np.iinfo[Any] = np.iinfo(np.int32)

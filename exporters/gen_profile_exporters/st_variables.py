@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from lark import Token
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 
 NO_BLOCK = "The text is no function block that can be executed here"
 MOST_DINT = 2**31 - 1

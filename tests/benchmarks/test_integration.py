@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gen_profile as gp
-from gen_profile.evaluation.scenarios import scenarios
-from gen_profile.evaluation.simulation import PlantSimulation, equations_of, motion_of
-from gen_profile.problem.dynamics import parameter_rows
+from gen_profile.dynamics.evaluation.scenarios import scenarios
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation, equations_of, motion_of
+from gen_profile.dynamics.problem.dynamics import parameter_rows
 
 ROUNDS = 5
 

@@ -5,9 +5,9 @@ from time import perf_counter
 import numpy as np
 from fmpy import simulate_fmu
 
-from gen_profile.designs.design import design
+from gen_profile.assurance.verification.check import check_artefact
+from gen_profile.delivery.designs.design import design
 from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.check import check_artefact
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 from gen_profile_fmu.building.plant_fmu import plant_fmu

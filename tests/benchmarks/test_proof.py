@@ -4,10 +4,10 @@ from time import process_time
 
 import numpy as np
 
+from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.histories import Histories
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.planner.design import planner_block
-from gen_profile.proof.closed_loop import ClosedLoop
-from gen_profile.proof.histories import Histories
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 

@@ -13,13 +13,13 @@ from generator.crane_problems import crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost, direct_program
 from scipy.integrate import solve_bvp
 
+from gen_profile.dynamics.problem.pontryagin import optimality_system
+from gen_profile.dynamics.problem.problem import Problem
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.direct.set_up import DirectOptions
+from gen_profile.methods.solvers.indirect import solver as indirect
+from gen_profile.methods.solvers.indirect.boundary_value_problem import IndirectOptions, canonical_problem
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.pontryagin import optimality_system
-from gen_profile.problem.problem import Problem
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct.set_up import DirectOptions
-from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.indirect.boundary_value_problem import IndirectOptions, canonical_problem
 
 JERK_AT_START = 25.867416  # m/s³, β = 50
 REPEATS = 15

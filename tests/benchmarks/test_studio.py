@@ -7,10 +7,10 @@ import numpy as np
 from end_to_end.studios import studio
 from headless import browser
 
-from gen_profile.solvers.plan import draft
-from gen_profile.studio.orders import Question
-from gen_profile.studio.state import StudioState, preset_start
-from gen_profile.studio.views import picture
+from gen_profile.methods.solvers.plan import draft
+from gen_profile.presentation.studio.orders import Question
+from gen_profile.presentation.studio.state import StudioState, preset_start
+from gen_profile.presentation.studio.views import picture
 
 TURNS = 60
 REST = 0.5  # s between them, after which nothing of the last one is still at work

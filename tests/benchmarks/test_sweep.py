@@ -12,10 +12,10 @@ from pathlib import Path
 import psutil
 
 from gen_profile.spec.reading import preset_text
-from gen_profile.sweep.case import run_case
-from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.run import prepare, sweep
-from gen_profile.sweep.store import opened
+from gen_profile.studies.sweep.case import run_case
+from gen_profile.studies.sweep.grid import parse_grid
+from gen_profile.studies.sweep.run import prepare, sweep
+from gen_profile.studies.sweep.store import opened
 
 AXES = ("move.distance=0.1:0.3:20", "plant.L1=0.4:0.5:20")
 FORMATS = ("csv", "plc")

@@ -9,7 +9,7 @@ import pytest
 from command_line import run_here
 
 import gen_profile as gp
-from gen_profile.errors import CertificateError, OutputError, SpecError
+from gen_profile.support.errors import CertificateError, OutputError, SpecError
 
 PRESET, CYCLE, ON_THE_WAY = "single-pendulum-crane", "export.cycle_time=0.01", "limits.sway=0.25"
 BARE = ("--preset", PRESET, "--set", CYCLE)

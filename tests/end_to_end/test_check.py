@@ -9,9 +9,9 @@ import pytest
 from command_line import run_here, run_process
 from fmu import absolute_angle_crane as oracle
 
-from gen_profile.artefacts.manifest import SEAL, seal_of
-from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.dynamics.evaluation.scenarios import scenarios
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.artefacts.manifest import SEAL, seal_of
 
 CYCLE = 0.004
 

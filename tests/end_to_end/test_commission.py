@@ -8,9 +8,9 @@ import pytest
 from command_line import PROGRAM, run_here
 from end_to_end.simulated_controllers import free_port, serving
 
-from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
-from gen_profile.deployment.table import read_table
-from gen_profile.problem.linearization import linearize
+from gen_profile.delivery.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.spec.reading import preset_spec, read_spec
 
 ROPE, DAMPING = 6.05, 400.0

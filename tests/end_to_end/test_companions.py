@@ -7,17 +7,17 @@ import pytest
 from command_line import run_here
 from simulated_blocks import deliver_planner
 
-from gen_profile.certificate.from_file import certify_artefact
-from gen_profile.deployment.table import read_table
-from gen_profile.designs.design import design
-from gen_profile.errors import CheckFailed, ExportError
+from gen_profile.assurance.certificate.from_file import certify_artefact
+from gen_profile.assurance.proof.check import check_block, is_planner_block
+from gen_profile.assurance.verification.check import check_artefact
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.delivery.designs.design import design
+from gen_profile.delivery.streaming.stream import verified, verified_block
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import PROGRAMS, block_files
-from gen_profile.proof.check import check_block, is_planner_block
-from gen_profile.report.build import artefact_report
+from gen_profile.presentation.report.build import artefact_report
 from gen_profile.spec.reading import preset_spec
-from gen_profile.streaming.stream import verified, verified_block
-from gen_profile.verification.check import check_artefact
+from gen_profile.support.errors import CheckFailed, ExportError
 from gen_profile_exporters.registry import containers, formats
 
 SPEC = preset_spec("paper", ["export.cycle_time=0.01"])

@@ -7,12 +7,12 @@ import pytest
 from command_line import run_here
 
 from gen_profile.cli import words
-from gen_profile.comparison.candidates import candidates
-from gen_profile.comparison.compare import compare
-from gen_profile.problem.problem import problem_of
-from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.solvers.transient_sway import sways
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.shapers.impulses import SHAPERS
+from gen_profile.methods.solvers.transient_sway import sways
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.comparison.candidates import candidates
+from gen_profile.studies.comparison.compare import compare
 
 FEW = ("--set", "robustness={}")
 FIGURES = (

@@ -6,16 +6,16 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.comparison.candidates import candidates
-from gen_profile.comparison.compare import compare
-from gen_profile.errors import InfeasibleProblem
-from gen_profile.evaluation.motion_evaluation import evaluate
+from gen_profile.dynamics.evaluation.motion_evaluation import evaluate
+from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE, breaches
+from gen_profile.methods.shapers.base_moves import BASES
+from gen_profile.methods.shapers.impulses import SHAPERS
 from gen_profile.motion.actuator import lag_compensated
-from gen_profile.problem.limits import SWAY_TOLERANCE, breaches
-from gen_profile.shapers.base_moves import BASES
-from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.spec.model import CheckSpec, LimitsSpec, RobustnessSpec
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.comparison.candidates import candidates
+from gen_profile.studies.comparison.compare import compare
+from gen_profile.support.errors import InfeasibleProblem
 
 PAPER = preset_spec("paper")
 TIGHT = LimitsSpec(velocity=0.3, acceleration=0.5, jerk=8.0)
@@ -100,7 +100,7 @@ def test_the_spec_s_own_motion_is_designed_once(monkeypatch):
         calls.append(spec)
         raise InfeasibleProblem("limits.velocity: too little.")
 
-    monkeypatch.setattr("gen_profile.comparison.candidates.suggestions.solve", solve)
+    monkeypatch.setattr("gen_profile.studies.comparison.candidates.suggestions.solve", solve)
     loads = CheckSpec(residual_sway={"hook": 0.01, "payload": 0.003})
     found = compare(attrs.evolve(PAPER, robustness=RobustnessSpec(), check=loads))
     assert len(calls) == 1  # what is impossible for β = 0 is so for any β

@@ -18,14 +18,14 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from end_to_end.simulated_controllers import BARE, free_port, in_thread, serving
 
-from gen_profile.deployment.certificates import fingerprint, own_certificate
-from gen_profile.deployment.deploy import deploy
-from gen_profile.deployment.mailbox import Mailbox
-from gen_profile.deployment.opcua import OpcUaAccess, OpcUaLink
-from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
-from gen_profile.deployment.table import read_table
-from gen_profile.deployment.watching.judge import Judge
-from gen_profile.errors import DeploymentError, OutputError
+from gen_profile.delivery.deployment.certificates import fingerprint, own_certificate
+from gen_profile.delivery.deployment.deploy import deploy
+from gen_profile.delivery.deployment.mailbox import Mailbox
+from gen_profile.delivery.deployment.opcua import OpcUaAccess, OpcUaLink
+from gen_profile.delivery.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.delivery.deployment.watching.judge import Judge
+from gen_profile.support.errors import DeploymentError, OutputError
 
 FORMS = ("--export", "plc", "--export", "twincat")
 
@@ -112,7 +112,7 @@ def test_a_record_that_cannot_be_written_does_not_hide_what_was_done(files, acce
     def full(*_):
         raise OutputError("Cannot write: no space left.")
 
-    monkeypatch.setattr("gen_profile.deployment.record.deliver", full)
+    monkeypatch.setattr("gen_profile.delivery.deployment.record.deliver", full)
     done = run_here("deploy", files / "old" / "paper.st", *access)
     assert (done.code, done.errors[-2]) == (2, "Error: Cannot write: no space left.")
     assert done.errors[-1].startswith("Error: The controller uses ")
@@ -227,7 +227,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(
 
 @pytest.mark.slow
 def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch):
-    monkeypatch.setattr("gen_profile.deployment.opcua.STATE", "aNothing")
+    monkeypatch.setattr("gen_profile.delivery.deployment.opcua.STATE", "aNothing")
     where = ("--to", fresh, "--security", "none", "--watch")
     found = run_here("deploy", files / "old" / "paper.st", *where)
     assert found.code == 6 and "FB_paper shows no aNothing: let the server show it" in found.err
@@ -235,7 +235,7 @@ def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch
 
 @pytest.mark.slow
 def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, once_watched):
-    monkeypatch.setattr("gen_profile.deployment.watching.watch.LOST_FOR", 1.0)
+    monkeypatch.setattr("gen_profile.delivery.deployment.watching.watch.LOST_FOR", 1.0)
     ending = ExitStack()
     url = ending.enter_context(controller(files, secure=False))
     where = ("--to", url, "--security", "none")
@@ -348,7 +348,7 @@ def odd():
     ],
 )
 def test_odd_servers_are_told_apart(instance, words, files, odd, monkeypatch):
-    monkeypatch.setattr("gen_profile.deployment.mailbox.LOOKS", 2)
+    monkeypatch.setattr("gen_profile.delivery.deployment.mailbox.LOOKS", 2)
     where = ("--to", odd, "--security", "none", "--instance", instance)
     found = run_here("deploy", files / "old" / "paper.st", *where)
     assert found.code == 6 and re.search(words, found.err), found.err
@@ -356,7 +356,7 @@ def test_odd_servers_are_told_apart(instance, words, files, odd, monkeypatch):
 
 @pytest.mark.slow
 def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
-    monkeypatch.setattr("gen_profile.deployment.opcua.REPLY", "aNothing")
+    monkeypatch.setattr("gen_profile.delivery.deployment.opcua.REPLY", "aNothing")
     found = run_here("deploy", files / "old" / "paper.st", "--to", odd, "--security", "none")
     assert found.code == 6 and "shows no block with aRequest" in found.err
 
@@ -399,7 +399,8 @@ def test_expired_certificates_are_refused(files, plc, access, tmp_path, monkeypa
     assert own.code == 6 and "me.pem is good from" in own.err
     tomorrow = datetime.now(UTC) + timedelta(days=365 * 6)
     monkeypatch.setattr(
-        "gen_profile.deployment.certificates.datetime", type("Later", (), {"now": lambda _: tomorrow})
+        "gen_profile.delivery.deployment.certificates.datetime",
+        type("Later", (), {"now": lambda _: tomorrow}),
     )
     theirs = run_here("deploy", files / "old" / "paper.st", *access)
     assert theirs.code == 6 and f"The certificate of {plc} is good from" in theirs.err

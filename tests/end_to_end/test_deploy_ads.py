@@ -10,13 +10,13 @@ import pytest
 from command_line import run_here
 from end_to_end.simulated_controllers import BARE, free_port, serving
 
-from gen_profile.deployment.ads import AdsLink
-from gen_profile.deployment.ads_sim import SimulatedAdsController
-from gen_profile.deployment.block_state import MotionState, read_state
-from gen_profile.deployment.deploy import deploy, verify
-from gen_profile.deployment.mailbox import RIGHT, LinkLostError, Mailbox
-from gen_profile.deployment.table import BlockTable, read_table
-from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.delivery.deployment.ads import AdsLink
+from gen_profile.delivery.deployment.ads_sim import SimulatedAdsController
+from gen_profile.delivery.deployment.block_state import MotionState, read_state
+from gen_profile.delivery.deployment.deploy import deploy, verify
+from gen_profile.delivery.deployment.mailbox import RIGHT, LinkLostError, Mailbox
+from gen_profile.delivery.deployment.table import BlockTable, read_table
+from gen_profile.support.errors import CheckFailed, DeploymentError, ExportError
 
 FAULTS = 25
 

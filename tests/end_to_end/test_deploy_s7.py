@@ -10,13 +10,13 @@ from command_line import run_here
 from end_to_end.simulated_controllers import BARE, free_port, serving
 from snap7.error import S7ConnectionError, S7TimeoutError
 
-from gen_profile.deployment.block_state import MotionState, read_state
-from gen_profile.deployment.deploy import deploy, verify
-from gen_profile.deployment.mailbox import RIGHT, Mailbox
-from gen_profile.deployment.s7 import S7Link
-from gen_profile.deployment.s7_sim import SimulatedS7Controller
-from gen_profile.deployment.table import BlockTable, read_table
-from gen_profile.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.delivery.deployment.block_state import MotionState, read_state
+from gen_profile.delivery.deployment.deploy import deploy, verify
+from gen_profile.delivery.deployment.mailbox import RIGHT, Mailbox
+from gen_profile.delivery.deployment.s7 import S7Link
+from gen_profile.delivery.deployment.s7_sim import SimulatedS7Controller
+from gen_profile.delivery.deployment.table import BlockTable, read_table
+from gen_profile.support.errors import CheckFailed, DeploymentError, ExportError
 
 NUMBER, FAULTS = 7, 20
 

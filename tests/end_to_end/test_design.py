@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from command_line import run_here, run_process
 
-from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.spec.reading import spec_from_dict
+from gen_profile.support.artefacts.manifest import parse_manifest
 
 SUFFIXES = {"csv": ".csv", "plc": ".st", "can": ".log"}
 FIGURES = {

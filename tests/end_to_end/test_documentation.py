@@ -10,8 +10,8 @@ from command_line import STANDALONE, run_here
 from documentation import PAGES, ROOT, blocks, run
 from end_to_end.studios import studio
 
-from gen_profile.proof import prove
-from gen_profile.sweep import run as sweep
+from gen_profile.assurance.proof import prove
+from gen_profile.studies.sweep import run as sweep
 
 README = PAGES[0]
 

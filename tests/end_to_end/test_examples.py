@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gen_profile.sweep import run as sweep
+from gen_profile.studies.sweep import run as sweep
 
 pytestmark = pytest.mark.slow
 

@@ -190,7 +190,7 @@ def test_an_interruption_that_compiled_code_turns_into_its_own_error_is_one(tmp_
         except KeyboardInterrupt as stop:
             raise RuntimeError("of a library") from stop
 
-    monkeypatch.setattr("gen_profile.solvers.method_selection.attempt", solve)
+    monkeypatch.setattr("gen_profile.methods.solvers.method_selection.attempt", solve)
     outcome = run_here("--out", tmp_path / "deploy")
     assert (outcome.code, outcome.errors) == (130, ["Error: Interrupted."])
     assert tree(tmp_path) == {}

@@ -5,12 +5,12 @@ import re
 import pytest
 from command_line import run_here
 
-from gen_profile.artefacts.manifest import Artefact, Manifest, sha256
-from gen_profile.deployment.table import read_table
-from gen_profile.errors import OutputError
+from gen_profile.delivery.deployment.table import read_table
 from gen_profile.planner.design import planner_block
-from gen_profile.progress import no_progress
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.artefacts.manifest import Artefact, Manifest, sha256
+from gen_profile.support.errors import OutputError
+from gen_profile.support.progress import no_progress
 
 BAY = """
 name = "bay"

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from command_line import run_here
 
-from gen_profile.artefacts.manifest import FILENAME
-from gen_profile.bounded_file import read_bounded
-from gen_profile.errors import CosimulationError, SpecError
-from gen_profile.studio.state import opened_start
+from gen_profile.presentation.studio.state import opened_start
+from gen_profile.support.artefacts.manifest import FILENAME
+from gen_profile.support.bounded_file import read_bounded
+from gen_profile.support.errors import CosimulationError, SpecError
 from gen_profile_fmu.running.safe_archive import unpack
 
 HUGE = 100_000_000_000  # bytes, none of which the disk holds

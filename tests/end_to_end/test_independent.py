@@ -13,8 +13,8 @@ from command_line import run_here
 from fmu import absolute_angle_crane as oracle
 from scipy.integrate import solve_ivp
 
-from gen_profile.evaluation.scenarios import scenarios
-from gen_profile.solvers.plan import plan
+from gen_profile.dynamics.evaluation.scenarios import scenarios
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
 
 CASES = {

@@ -9,12 +9,12 @@ import pytest
 from command_line import run_here
 from sweeps import archived, scheduler
 
-from gen_profile.deployment.table import read_table as read_block_table
-from gen_profile.errors import CheckFailed, ExportError
+from gen_profile.delivery.deployment.table import read_table as read_block_table
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep import library as profile_library
-from gen_profile.sweep.store import grid_of
-from gen_profile.sweep.table import read_table
+from gen_profile.studies.sweep import library as profile_library
+from gen_profile.studies.sweep.store import grid_of
+from gen_profile.studies.sweep.table import read_table
+from gen_profile.support.errors import CheckFailed, ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.playback.library import read_library

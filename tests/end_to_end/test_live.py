@@ -21,8 +21,8 @@ from exporters.can.bench import HastyClock
 from headless import browser
 from rich.console import Console
 
-from gen_profile.streaming import live, live_page, live_terminal
-from gen_profile.streaming import stream as workflow
+from gen_profile.delivery.streaming import live, live_page, live_terminal
+from gen_profile.delivery.streaming import stream as workflow
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.streaming.record import Book, Phase
 

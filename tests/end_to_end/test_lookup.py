@@ -10,10 +10,10 @@ from command_line import run_here
 from pyarrow import parquet
 from sweeps import archived, scheduler
 
+from gen_profile.assurance.verification.check import check_artefact
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep.store import grid_of
-from gen_profile.sweep.table import read_table
-from gen_profile.verification.check import check_artefact
+from gen_profile.studies.sweep.store import grid_of
+from gen_profile.studies.sweep.table import read_table
 
 CYCLE = "export.cycle_time=0.01"
 AXES = ("--vary", "solver.method=auto,zv", "--vary", "move.distance=0.3,0.4", "--vary", "plant.L1=0.3,0.35")

@@ -9,12 +9,12 @@ from command_line import run_here
 from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
-from gen_profile.comparison.candidates import candidates
-from gen_profile.evaluation.residual_sway import observation_time
-from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.dynamics.evaluation.residual_sway import observation_time
+from gen_profile.dynamics.evaluation.scenarios import scenarios
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.metrics import greatest, peak
-from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec, presets
+from gen_profile.studies.comparison.candidates import candidates
 
 PRESETS = [name for name in presets() if not name.startswith("paper")]
 

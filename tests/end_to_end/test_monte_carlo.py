@@ -14,18 +14,18 @@ from command_line import run_here
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from gen_profile.evaluation.residual_sway import observation_time
-from gen_profile.evaluation.scenarios import further_scenarios, scenarios
-from gen_profile.evaluation.simulation import PlantSimulation
+from gen_profile.assurance.verification.check import _verdict, check_artefact
+from gen_profile.assurance.verification.monte_carlo import standstill
+from gen_profile.assurance.verification.setpoint_path import transmitted
+from gen_profile.assurance.verification.verdict import MOST_LISTED
+from gen_profile.dynamics.evaluation.residual_sway import observation_time
+from gen_profile.dynamics.evaluation.scenarios import further_scenarios, scenarios
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import SampledProfile, sample
-from gen_profile.progress import no_progress
-from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.check import _verdict, check_artefact
-from gen_profile.verification.monte_carlo import standstill
-from gen_profile.verification.setpoint_path import transmitted
-from gen_profile.verification.verdict import MOST_LISTED
+from gen_profile.support.progress import no_progress
 
 RANGES = "check.uncertain={L1=0.2, m2=0.15, L2=0.1}"
 DAMPING = "check.spans={c1=[0.0, 0.004], c2=[0.0, 0.002]}"

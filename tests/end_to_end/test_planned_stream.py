@@ -8,12 +8,12 @@ from command_line import run_here
 from exporters.can.bench import HastyClock
 from fmu.kinds import PLANNED, planner_text
 
-from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
 from gen_profile.cli import planner
+from gen_profile.delivery.streaming import stream as workflow
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import evolve_spec, preset_spec
-from gen_profile.streaming import stream as workflow
+from gen_profile.support.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
 
 KNOWING = "time_s,command,value,L1\n0,stop,,0.42\n0.1,velocity,0.3,\n2,stop,,\n"  # as --live-parameter does
 SCRIPT = ("--planner", "paper.st", "--commands", "commands.csv")

@@ -10,13 +10,13 @@ from command_line import run_here
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from gen_profile.errors import ExportError
+from gen_profile.assurance.verification.plausibility import implausibilities
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile, SampledProfile, sample
-from gen_profile.solvers.plan import plan
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.plausibility import implausibilities
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 

@@ -13,18 +13,18 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pictures import colours
 
 import gen_profile as gp
-from gen_profile.charts.comparison import comparison_figure
-from gen_profile.charts.curves import motion_figure, spectrum_figure
-from gen_profile.charts.figure import LIMIT, Figure, Line, Panel
-from gen_profile.charts.method_styles import method_styles
-from gen_profile.charts.picture import drawn as draw_side_by_side
-from gen_profile.charts.picture import save
-from gen_profile.charts.plotly_json import figure_json
-from gen_profile.comparison.compare import Comparison, compare
-from gen_profile.errors import OutputError
-from gen_profile.evaluation.phrases import number
-from gen_profile.shapers.impulses import SHAPERS
+from gen_profile.dynamics.evaluation.phrases import number
+from gen_profile.methods.shapers.impulses import SHAPERS
+from gen_profile.presentation.charts.comparison import comparison_figure
+from gen_profile.presentation.charts.curves import motion_figure, spectrum_figure
+from gen_profile.presentation.charts.figure import LIMIT, Figure, Line, Panel
+from gen_profile.presentation.charts.method_styles import method_styles
+from gen_profile.presentation.charts.picture import drawn as draw_side_by_side
+from gen_profile.presentation.charts.picture import save
+from gen_profile.presentation.charts.plotly_json import figure_json
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.comparison.compare import Comparison, compare
+from gen_profile.support.errors import OutputError
 
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
@@ -91,9 +91,9 @@ from matplotlib import pyplot
 pyplot.figure(7)
 from pathlib import Path
 from numpy import arange
-from gen_profile.charts.figure import Figure, Line, Panel
-from gen_profile.charts.picture import save
-from gen_profile.charts.plotly_json import figure_json
+from gen_profile.presentation.charts.figure import Figure, Line, Panel
+from gen_profile.presentation.charts.picture import save
+from gen_profile.presentation.charts.plotly_json import figure_json
 line = Line(name="line", x=arange(2.0), y=arange(2.0))
 panel = Panel(title="panel", x_label="x", y_label="y", lines=[line])
 save([Figure(caption="caption", panels=[panel])], Path("picture.png"), "salt", "title")

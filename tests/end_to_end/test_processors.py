@@ -5,12 +5,12 @@ import os
 import dask
 import pytest
 
-from gen_profile import cluster
-from gen_profile.artefacts.manifest import versions
+from gen_profile.assurance.verification import batch as many_machines
+from gen_profile.assurance.verification.batch import on_processors
 from gen_profile.plants.registry import find_plant
-from gen_profile.sweep.case import Recipe, run_case
-from gen_profile.verification import batch as many_machines
-from gen_profile.verification.batch import on_processors
+from gen_profile.studies.sweep.case import Recipe, run_case
+from gen_profile.support import cluster
+from gen_profile.support.artefacts.manifest import versions
 from gen_profile_fmu.running.many_runs import ManyRuns
 
 CRANE = find_plant("double-pendulum-crane")

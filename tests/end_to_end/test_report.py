@@ -12,15 +12,15 @@ import pytest
 import tomli_w
 from command_line import run_here, run_process
 
-from gen_profile.charts.comparison import comparison_figure
-from gen_profile.comparison.compare import compare
-from gen_profile.designs.design import design
-from gen_profile.errors import OutputError
-from gen_profile.report.content import Section
-from gen_profile.report.page import NEEDED, require_pages
-from gen_profile.report.print import printed
-from gen_profile.report.sections import sections
+from gen_profile.delivery.designs.design import design
+from gen_profile.presentation.charts.comparison import comparison_figure
+from gen_profile.presentation.report.content import Section
+from gen_profile.presentation.report.page import NEEDED, require_pages
+from gen_profile.presentation.report.print import printed
+from gen_profile.presentation.report.sections import sections
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.comparison.compare import compare
+from gen_profile.support.errors import OutputError
 
 QUICK = ("--set", "cost.sway_weight=0", "--no-compare")
 LIMITS = "{velocity=0.3, acceleration=0.8, travel=[-0.1, 0.5], sway=0.04}"
@@ -226,14 +226,14 @@ def test_a_report_is_printed_the_same_twice_and_says_what_else_it_shall(tmp_path
 
 
 def test_without_a_browser_the_sentence_tells_what_prints(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.report.print.shutil.which", lambda _: None)
+    monkeypatch.setattr("gen_profile.presentation.report.print.shutil.which", lambda _: None)
     outcome = run_here("report", "--out", tmp_path / "page.pdf")
     assert outcome.code == 2
     assert outcome.errors[-1].endswith("install one, or write a .html and print it from a browser.")
 
 
 def test_a_browser_that_prints_nothing_is_a_sentence(monkeypatch):
-    monkeypatch.setattr("gen_profile.report.print.BROWSERS", ("false",))
+    monkeypatch.setattr("gen_profile.presentation.report.print.BROWSERS", ("false",))
     with pytest.raises(OutputError, match=r"false printed nothing .*; write a .html"):
         printed(b"<p>")
 
@@ -337,7 +337,9 @@ def test_a_folder_is_no_file_to_write(tmp_path):
 
 @pytest.mark.parametrize("missing", NEEDED)
 def test_without_its_libraries_the_sentence_tells_what_to_install(monkeypatch, missing):
-    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda name: None if name == missing else name)
+    monkeypatch.setattr(
+        "gen_profile.support.plugins.find_spec", lambda name: None if name == missing else name
+    )
     with pytest.raises(OutputError, match=r"pip install 'gen-profile\[report\]'"):
         require_pages()
 

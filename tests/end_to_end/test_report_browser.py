@@ -10,9 +10,18 @@ from command_line import run_here
 from headless import COLOURS
 from headless import browser as start
 
-from gen_profile.charts.figure import INK, Bars, Figure, Line, Map, Panel, Style
-from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
-from gen_profile.report.page import render
+from gen_profile.presentation.charts.figure import INK, Bars, Figure, Line, Map, Panel, Style
+from gen_profile.presentation.report.content import (
+    Listing,
+    Page,
+    Section,
+    Share,
+    Table,
+    TableRow,
+    Terms,
+    Verdict,
+)
+from gen_profile.presentation.report.page import render
 from gen_profile.spec.reading import preset_spec, presets
 
 pytestmark = pytest.mark.slow

@@ -8,13 +8,13 @@ import pytest
 from command_line import run_here
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import OutputError
-from gen_profile.evaluation.motion_evaluation import evaluate
-from gen_profile.report.log import MeasuredLog, read_log
-from gen_profile.report.measured import compare_measured
-from gen_profile.report.measured_section import measured_verdict
-from gen_profile.solvers.plan import plan
+from gen_profile.dynamics.evaluation.motion_evaluation import evaluate
+from gen_profile.methods.solvers.plan import plan
+from gen_profile.presentation.report.log import MeasuredLog, read_log
+from gen_profile.presentation.report.measured import compare_measured
+from gen_profile.presentation.report.measured_section import measured_verdict
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import OutputError
 
 STEP = 0.01
 OFFSET, SENSOR = 1.234, 0.004  # s by which the log begins earlier; m by which a sensor's zero is off

@@ -8,14 +8,14 @@ import pytest
 from command_line import run_here
 from pictures import colours
 
-from gen_profile.charts.picture import drawn
-from gen_profile.charts.robustness import robustness_figure
-from gen_profile.comparison.robustness import Robustness, error_grid, robustness
-from gen_profile.errors import SpecError
-from gen_profile.evaluation.simulation import PlantSimulation
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation
+from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.motion.metrics import peak
-from gen_profile.solvers.shape import shaped_motion
+from gen_profile.presentation.charts.picture import drawn
+from gen_profile.presentation.charts.robustness import robustness_figure
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.comparison.robustness import Robustness, error_grid, robustness
+from gen_profile.support.errors import SpecError
 
 SPEC = preset_spec("paper")
 METHODS = ("--method", "zvd", "--method", "nzv")

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.errors import InfeasibleProblem
-from gen_profile.shapers.base_moves import BASES
-from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.solvers.plan import plan
-from gen_profile.solvers.shortest import timed
+from gen_profile.methods.shapers.base_moves import BASES
+from gen_profile.methods.shapers.impulses import SHAPERS
+from gen_profile.methods.solvers.plan import plan
+from gen_profile.methods.solvers.shortest import timed
 from gen_profile.spec.model import SolverSpec
 from gen_profile.spec.reading import preset_spec
 from gen_profile.spec.values import ShaperName
+from gen_profile.support.errors import InfeasibleProblem
 
 SIX_SECONDS = ("--set", "move.duration=6.0")  # longer than any delay
 LOOSE = ("--set", "check.residual_sway=0.1")  # what matters is that the sway found is the shaper's own

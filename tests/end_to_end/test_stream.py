@@ -18,9 +18,9 @@ import pytest
 from command_line import PROGRAM, run_here, run_process
 from exporters.can.bench import MS, FakeClock, HastyClock, RigidLoad
 
-from gen_profile.artefacts import writing as delivery
-from gen_profile.artefacts.manifest import parse_manifest
-from gen_profile.streaming import stream as workflow
+from gen_profile.delivery.streaming import stream as workflow
+from gen_profile.support.artefacts import writing as delivery
+from gen_profile.support.artefacts.manifest import parse_manifest
 from gen_profile_exporters.can.simulation.drive_bank import FAREWELL, DriveBank
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive

@@ -8,7 +8,7 @@ from selenium.webdriver.common.keys import Keys
 
 pytestmark = pytest.mark.slow
 
-ASSETS = files("gen_profile.studio") / "assets"
+ASSETS = files("gen_profile.presentation.studio") / "assets"
 SCRIPTS = "uPlot/uPlot.iife.min.js", "numbers.js", "curves.js"
 
 

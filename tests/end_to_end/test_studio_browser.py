@@ -18,10 +18,10 @@ from headless import browser as start
 from selenium.webdriver.common.keys import Keys
 from simulated_blocks import exported, poked
 
-from gen_profile.deployment.s7_sim import SimulatedS7Controller
-from gen_profile.deployment.table import read_table
-from gen_profile.evaluation.simulation import free_swing
-from gen_profile.problem.dynamics import parameter_rows
+from gen_profile.delivery.deployment.s7_sim import SimulatedS7Controller
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.dynamics.evaluation.simulation import free_swing
+from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.spec.reading import preset_spec, preset_text
 
 pytestmark = pytest.mark.slow

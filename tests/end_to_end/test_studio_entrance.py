@@ -14,8 +14,8 @@ from end_to_end.studios import closed, conversation, status, studio
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
 
-from gen_profile.studio.entrance import GO_ON
-from gen_profile.studio.state import StudioState
+from gen_profile.presentation.studio.entrance import GO_ON
+from gen_profile.presentation.studio.state import StudioState
 
 BROWSER = """#!/bin/sh
 tr '\\0' '\\n' < /proc/$$/cmdline > {seen}.part
@@ -68,7 +68,7 @@ def opened_file(seen):
 
 
 def test_no_page_lets_a_browser_ask_for_an_icon():
-    assets = resources.files("gen_profile.studio") / "assets"
+    assets = resources.files("gen_profile.presentation.studio") / "assets"
     for page in (GO_ON, *((assets / name).read_text("utf-8") for name in ("code.html", "studio.html"))):
         assert '<link rel="icon" href="data:,">' in page
 

@@ -16,13 +16,13 @@ from command_line import PROGRAM, run_here, run_process
 from distributed import Client
 from sweeps import archived, scheduler
 
-from gen_profile.designs.design import design
+from gen_profile.assurance.verification.check import check_artefact
+from gen_profile.delivery.designs.design import design
 from gen_profile.spec.reading import preset_spec, preset_text
-from gen_profile.sweep import run as workflow
-from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.run import prepare
-from gen_profile.sweep.store import grid_of, swept_table, take_out
-from gen_profile.verification.check import check_artefact
+from gen_profile.studies.sweep import run as workflow
+from gen_profile.studies.sweep.grid import parse_grid
+from gen_profile.studies.sweep.run import prepare
+from gen_profile.studies.sweep.store import grid_of, swept_table, take_out
 
 pytestmark = pytest.mark.slow
 
@@ -223,7 +223,7 @@ def test_a_signal_ends_it_quietly(tmp_path, number):
 STARTED = """
 import signal
 from multiprocessing import resource_tracker
-from gen_profile import cluster
+from gen_profile.support import cluster
 
 def start(**_):
     resource_tracker.ensure_running()  # as the first process of any cluster does

@@ -10,14 +10,14 @@ import pytest
 from command_line import run_here
 from system_parts import program
 
-from gen_profile.artefacts.manifest import Manifest, sha256
-from gen_profile.errors import OutputError
 from gen_profile.spec.reading import preset_text
-from gen_profile.sweep.archive import read_archive
-from gen_profile.sweep.case import CaseOutcome, failed
-from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.run import prepare
-from gen_profile.sweep.store import grid_of, opened, swept_table, take_out
+from gen_profile.studies.sweep.archive import read_archive
+from gen_profile.studies.sweep.case import CaseOutcome, failed
+from gen_profile.studies.sweep.grid import parse_grid
+from gen_profile.studies.sweep.run import prepare
+from gen_profile.studies.sweep.store import grid_of, opened, swept_table, take_out
+from gen_profile.support.artefacts.manifest import Manifest, sha256
+from gen_profile.support.errors import OutputError
 
 TABLE = b"1;2\r\n\xb5"
 ARTEFACT = {"format": "csv", "path": "paper.csv", "sha256": sha256(TABLE), "bytes": 0, "payload_sha256": "p"}

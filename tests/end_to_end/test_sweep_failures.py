@@ -16,16 +16,16 @@ from command_line import run_here
 from distributed import KilledWorker, LocalCluster
 from sweeps import LOOPBACK, scheduler
 
-from gen_profile import cluster
-from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import preset_text
-from gen_profile.sweep import case as sweep_case
-from gen_profile.sweep import run as workflow
-from gen_profile.sweep.case import failed, run_case
-from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.run import prepare
-from gen_profile.sweep.store import opened
-from gen_profile.sweep.table import read_table, write_table
+from gen_profile.studies.sweep import case as sweep_case
+from gen_profile.studies.sweep import run as workflow
+from gen_profile.studies.sweep.case import failed, run_case
+from gen_profile.studies.sweep.grid import parse_grid
+from gen_profile.studies.sweep.run import prepare
+from gen_profile.studies.sweep.store import opened
+from gen_profile.studies.sweep.table import read_table, write_table
+from gen_profile.support import cluster
+from gen_profile.support.errors import OutputError, SpecError
 
 QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
 
@@ -201,7 +201,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
 
 
 def test_a_scheduler_that_nobody_runs_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.cluster.ANSWER_TIME", "200ms")
+    monkeypatch.setattr("gen_profile.support.cluster.ANSWER_TIME", "200ms")
     with pytest.raises(SpecError, match=r"scheduler tcp://127.0.0.1:9: no worker answers"):
         workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler="tcp://127.0.0.1:9")
 
@@ -215,7 +215,7 @@ def test_processes_of_this_computer_that_do_not_start_are_a_sentence(tmp_path, m
 
 
 def test_a_scheduler_without_workers_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.cluster.ANSWER_TIME", "1s")
+    monkeypatch.setattr("gen_profile.support.cluster.ANSWER_TIME", "1s")
     with (
         LocalCluster(n_workers=0, **LOOPBACK) as cluster,
         pytest.raises(SpecError, match="no worker"),
@@ -314,7 +314,7 @@ def test_batches_of_rows_make_one_table(tmp_path, monkeypatch):
     records[3]["figures"] = {"duration_s": 3.0}
     write_table(tmp_path, grid, records)
     whole = read_table(tmp_path, grid).to_pylist()
-    monkeypatch.setattr("gen_profile.sweep.table.BATCH", 1)
+    monkeypatch.setattr("gen_profile.studies.sweep.table.BATCH", 1)
     write_table(tmp_path, grid, records)
     assert read_table(tmp_path, grid).to_pylist() == whole
 

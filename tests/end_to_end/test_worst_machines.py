@@ -12,15 +12,15 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 import gen_profile as gp
-from gen_profile.errors import SpecError
-from gen_profile.evaluation.residual_sway import observation_time
-from gen_profile.evaluation.scenarios import further_scenarios, scenarios
+from gen_profile.assurance.verification.check import check_artefact
+from gen_profile.assurance.verification.monte_carlo import with_further
+from gen_profile.assurance.verification.verdict import Check
+from gen_profile.assurance.verification.worst_machines import worst_machines
+from gen_profile.dynamics.evaluation.residual_sway import observation_time
+from gen_profile.dynamics.evaluation.scenarios import further_scenarios, scenarios
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.check import check_artefact
-from gen_profile.verification.monte_carlo import with_further
-from gen_profile.verification.verdict import Check
-from gen_profile.verification.worst_machines import worst_machines
+from gen_profile.support.errors import SpecError
 
 
 def pendulum(p, state, push):

@@ -17,7 +17,7 @@ from exporters.st_interpreter import FunctionBlock, StError
 from exporters.st_programs import FAULT, INPUTS, SHOWN, block, draw
 from lark.exceptions import LarkError
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.st_to_c import translate
 
 BATCH = 500  # programs in a C file

@@ -5,7 +5,7 @@ import numpy as np
 from gen_profile.motion.profile import Profile
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec
-from gen_profile.units import AxisScale, axis_factor
+from gen_profile.support.units import AxisScale, axis_factor
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.machine_variants import AxisVariants
 

@@ -8,7 +8,7 @@ from playing import IDLE, start
 from st_interpreter import FunctionBlock, StError
 from test_profile_library import started, together
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback import structured_text
 from gen_profile_exporters.playback.library import read_library

@@ -8,8 +8,8 @@ from motions import bang_bang, quintic, target
 from playing import IDLE, checked, column, play
 from st_interpreter import FunctionBlock
 
-from gen_profile.errors import ExportError
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback import buffers, structured_text
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from motions import quintic, target
 
-from gen_profile.errors import ExportError, SpecError
 from gen_profile.motion.profile import sample
 from gen_profile.spec.reading import parse_spec
+from gen_profile.support.errors import ExportError, SpecError
 from gen_profile_exporters import csv_table
 from gen_profile_exporters.csv_dialects import DIALECTS
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from motions import quintic, target
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters import csv_table
 
 MOVE = quintic((0.1, 0.4))

@@ -10,8 +10,8 @@ from exporters.interpreters import BATCH, CYCLES, bits, compiled, differences, i
 from exporters.st_programs import DECLARATIONS, FAULT, INPUTS, SHOWN, draw
 from st_interpreter import FunctionBlock, StError
 
-from gen_profile.errors import ExportError
 from gen_profile.planner import execution
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.st_to_c import translate
 
 COUNT = int(os.environ.get("PROGRAMS", "200"))

@@ -6,7 +6,7 @@ import pytest
 from motions import quintic, target
 from playing import checked, start
 
-from gen_profile.evaluation.simulation import PlantSimulation
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants

@@ -23,11 +23,11 @@ from driven_block import (
 from farthest_motion import farthest
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import live_modes
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.errors import ExportError, SpecError
 
 pytestmark = pytest.mark.slow
 

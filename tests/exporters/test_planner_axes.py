@@ -10,11 +10,11 @@ from generator.planned_machines import GANTRY
 from scipy.integrate import solve_ivp
 
 import gen_profile as gp
-from gen_profile.errors import SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis, block_axes
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.errors import SpecError
 from gen_profile_exporters.planner.c_source import c_files
 
 pytestmark = pytest.mark.slow

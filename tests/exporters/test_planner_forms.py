@@ -15,7 +15,6 @@ from lxml import etree
 from system_parts import program as program_of
 
 import gen_profile as gp
-from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play, read_commands
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.events import read_events
@@ -23,6 +22,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.errors import ExportError, SpecError
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.planner.axis_wrapper import LIBRARIES
 from gen_profile_exporters.planner.openplc import openplc_files

@@ -8,11 +8,11 @@ from driven_block import CYCLE, Driver, require_limits
 from generator.planned_machines import swing
 
 import gen_profile as gp
-from gen_profile.errors import SpecError
 from gen_profile.planner import commands
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import SpecError
 
 pytestmark = pytest.mark.slow
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from test_planner_sensor import MEASURED
 
-from gen_profile.errors import ExportError
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.parameters import buffered_planner, constant_planner
 from gen_profile_exporters.playback.buffers import FIRST, LENGTH, WINDOW, buffer_texts

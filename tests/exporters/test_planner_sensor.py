@@ -5,10 +5,10 @@ import pytest
 from exporters.counted_block import CountedBlock, compile_counting
 from exporters.measured_machines import MeasuredCrane, MeasuredGantry, MeasuredJoint, MeasuredTank
 
-from gen_profile.errors import SpecError
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.sensor import damping_kernel, damping_room
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import SpecError
 
 pytestmark = pytest.mark.slow
 

@@ -12,9 +12,9 @@ from exporters.planner_benches import ON, START, UNITS, Converter, PlannerBench
 from exporters.st_interpreter import FunctionBlock
 from exporters.vendor_axes import VENDORS
 
-from gen_profile.errors import ExportError
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters import motion_libraries
 from gen_profile_exporters.block_source import BlockVariable, parse_function_block
 from gen_profile_exporters.planner.axis_wrapper import planner_wrapper

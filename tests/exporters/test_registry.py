@@ -5,7 +5,7 @@ from pathlib import PurePosixPath
 
 import pytest
 
-from gen_profile.errors import SpecError
+from gen_profile.support.errors import SpecError
 from gen_profile_exporters import registry
 from gen_profile_exporters.registry import (
     BUILT_IN,

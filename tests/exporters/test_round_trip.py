@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import quintic, target
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile, sample
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.registry import BUILT_IN, find_exporter
 
 AXES = {1: ("cart",), 2: ("bridge", "trolley")}

@@ -5,7 +5,7 @@ import pytest
 from motions import bang_bang, quintic, target
 from st_interpreter import FunctionBlock
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.playback import structured_text
 
 MOVE = quintic((0.1, 0.4))

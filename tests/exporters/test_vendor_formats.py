@@ -11,8 +11,8 @@ from lxml import etree
 from motions import bang_bang, quintic, target
 from playing import checked, column, play, start
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.motion_libraries import CODESYS, SIEMENS, TWINCAT
 from gen_profile_exporters.playback import structured_text

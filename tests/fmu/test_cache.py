@@ -9,7 +9,7 @@ import attrs
 import pytest
 from fmu.caches import share_zig
 
-from gen_profile.errors import CosimulationError
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building import build
 from gen_profile_fmu.building.cache import cache_folders, cached, is_intact, write_entry
 from gen_profile_fmu.building.plant_fmu import plant_fmu

@@ -10,7 +10,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from gen_profile.cli import fmu as command
-from gen_profile.designs.fmu import KINDS
+from gen_profile.delivery.designs.fmu import KINDS
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.model.plant_variables import InputKind
 

@@ -13,9 +13,9 @@ import pytest
 from fmu.kinds import KINDS, model_of
 from system_parts import program
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import sample
 from gen_profile.plants.registry import find_plant
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building import platforms
 from gen_profile_fmu.building.compiler import PACKED, Compiler, compile_library, find_compiler
 from gen_profile_fmu.building.plant_fmu import plant_fmu

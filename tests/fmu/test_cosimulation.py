@@ -10,8 +10,8 @@ from fmpy.fmi2 import FMU2Slave
 from fmu.caches import share_zig
 from fmu.hoisting_pendulum import PLANT as WINCH
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import SampledProfile, sample
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.running import instances
 from gen_profile_fmu.running.cosimulation import PlantCosimulation

@@ -14,16 +14,16 @@ from fmu.kinds import machine_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_profile.artefacts.manifest import FILENAME
-from gen_profile.designs.design import design
-from gen_profile.errors import CosimulationError, SpecError
+from gen_profile.assurance.verification import external_fmu as foreign_check
+from gen_profile.assurance.verification.batch import Feed
+from gen_profile.assurance.verification.check import check_artefact
+from gen_profile.assurance.verification.external_fmu import _axis_inputs
+from gen_profile.delivery.designs.design import design
+from gen_profile.delivery.streaming.stream import verified
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.reading import preset_spec, spec_from_dict
-from gen_profile.streaming.stream import verified
-from gen_profile.verification import external_fmu as foreign_check
-from gen_profile.verification.batch import Feed
-from gen_profile.verification.check import check_artefact
-from gen_profile.verification.external_fmu import _axis_inputs
+from gen_profile.support.artefacts.manifest import FILENAME
+from gen_profile.support.errors import CosimulationError, SpecError
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import host_platform
 from gen_profile_fmu.description.fmu_files import Version, sources
@@ -458,7 +458,7 @@ def test_any_scenario_can_be_replayed_on_a_foreign_fmu(own, tmp_path, group):
 
 def test_scenarios_that_share_setpoints_share_a_process(tmp_path, monkeypatch):
     write_fmu(tmp_path / "customer.fmu")
-    monkeypatch.setattr("gen_profile.evaluation.scenarios.FEWEST_TIMINGS", 1)
+    monkeypatch.setattr("gen_profile.dynamics.evaluation.scenarios.FEWEST_TIMINGS", 1)
     started = []
     run = foreign_check.run_foreign
     monkeypatch.setattr(

@@ -18,10 +18,10 @@ from fmu.kinds import INPUTS, PAIRS, model_of, motion
 from numpy.polynomial import Polynomial
 from system_parts import program
 
+from gen_profile.dynamics.problem import symbolic as sym
+from gen_profile.dynamics.problem.dynamics import dynamics
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import dynamics
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources

@@ -9,7 +9,7 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 from fmu.kinds import model_of, motion
 from generator.lagrangian_machines import MACHINES, Lagrange
 
-from gen_profile.evaluation.simulation import PlantSimulation
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version

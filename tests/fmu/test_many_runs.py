@@ -7,8 +7,8 @@ import pytest
 from fmu.drivers import Instance, cosimulate
 from fmu.kinds import model_of
 
-from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.running.many_runs import ManyRuns

@@ -22,9 +22,9 @@ from fmpy.validation import validate_fmu
 from fmu.hoisting_pendulum import PLANT as WINCH
 from fmu.kinds import ALL_KINDS, INPUTS, KINDS, PAIRS, model_of
 
-from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Coordinate, Parameter
 from gen_profile.plants.registry import BUILT_IN, find_plant
+from gen_profile.support.errors import CosimulationError
 from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.building.plant_fmu import cached_fmu, plant_fmu
 from gen_profile_fmu.description.base_units import BASE_UNITS

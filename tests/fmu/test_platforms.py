@@ -17,8 +17,8 @@ from fmu.kinds import model_of
 from fmu.test_fmi2_calls import functions_of_the_standard
 from system_parts import program
 
-from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building import platforms
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.compiler import compile_library, find_compiler

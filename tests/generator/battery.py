@@ -18,9 +18,9 @@ import attrs
 sys.path.insert(0, str(Path(__file__).parent))
 from random_specs import random_spec
 
-from gen_profile.errors import GenProfileError, NoMotion, SpecError
-from gen_profile.solvers.plan import plan
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.spec.reading import overridden, spec_from_dict
+from gen_profile.support.errors import GenProfileError, NoMotion, SpecError
 
 KILLED_AFTER = 60  # s of processor
 

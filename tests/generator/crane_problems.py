@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.problem import Problem
 
 CRANE = find_plant("double-pendulum-crane")
 EFFORTS = [("jerk", None), ("snap", None), ("reference", 0.1)]

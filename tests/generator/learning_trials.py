@@ -10,10 +10,10 @@ import sys
 import numpy as np
 
 import gen_profile as gp
-from gen_profile.evaluation.scenarios import Scenario
-from gen_profile.identification.learning import learn
-from gen_profile.identification.measurements import SwingLog
-from gen_profile.verification.cosimulation import cosimulate
+from gen_profile.assurance.verification.cosimulation import cosimulate
+from gen_profile.dynamics.evaluation.scenarios import Scenario
+from gen_profile.studies.identification.learning import learn
+from gen_profile.studies.identification.measurements import SwingLog
 
 CRANE = gp.preset_spec(
     "bay-crane",

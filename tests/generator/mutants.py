@@ -36,15 +36,15 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from planned_machines import GANTRY, HOIST, histories_apart, numbering
 
-from gen_profile.errors import GenProfileError
+from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.histories import Histories, History
+from gen_profile.assurance.proof.judging import judge_run
+from gen_profile.assurance.proof.numbering import DRAWS, RHYTHMS, SEARCH
+from gen_profile.assurance.proof.verdict import JudgedHistory, kind_of, late_on_average, lateness
 from gen_profile.planner import design, execution
-from gen_profile.proof.closed_loop import ClosedLoop
-from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.judging import judge_run
-from gen_profile.proof.numbering import DRAWS, RHYTHMS, SEARCH
-from gen_profile.proof.verdict import JudgedHistory, kind_of, late_on_average, lateness
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.errors import GenProfileError
 from gen_profile_exporters.planner import block
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_fmu.building import compiler

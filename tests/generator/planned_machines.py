@@ -5,11 +5,11 @@ from math import inf, sin
 import attrs
 import numpy as np
 
+from gen_profile.assurance.proof.habits import Change
+from gen_profile.assurance.proof.histories import Histories, History
+from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import STEADY
-from gen_profile.proof.habits import Change
-from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.numbering import Numbering
 
 G = 9.81
 CYCLE = 0.004

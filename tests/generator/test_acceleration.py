@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gen_profile.solvers.direct.acceleration import accelerate
+from gen_profile.methods.solvers.direct.acceleration import accelerate
 
 
 @pytest.mark.parametrize("eigenvalues", [(-1.3, 0.2), (0.95, -2.0, 0.4)])

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from generator.random_specs import random_spec
 
-from gen_profile.errors import InfeasibleProblem
-from gen_profile.evaluation.motion_evaluation import keeps_residual_sway
-from gen_profile.problem.problem import problem_of
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct.relaxation import Relaxation
-from gen_profile.solvers.direct.set_up import DirectOptions
-from gen_profile.solvers.plan import plan
+from gen_profile.dynamics.evaluation.motion_evaluation import keeps_residual_sway
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.direct.relaxation import Relaxation
+from gen_profile.methods.solvers.direct.set_up import DirectOptions
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.spec.reading import overridden, spec_from_dict
+from gen_profile.support.errors import InfeasibleProblem
 
 SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum, tower, chain, tank, gantry
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}

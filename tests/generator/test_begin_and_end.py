@@ -7,11 +7,11 @@ from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 from scipy.interpolate import PPoly
 
-from gen_profile.problem.problem import WorstCase, problem_of
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.motion import optimal_profile
+from gen_profile.dynamics.problem.problem import WorstCase, problem_of
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.indirect import solver as indirect
+from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
 

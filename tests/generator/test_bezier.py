@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from gen_profile.solvers.direct.bezier import Piece, bernstein, elevation, gram, halving, power_basis
+from gen_profile.methods.solvers.direct.bezier import Piece, bernstein, elevation, gram, halving, power_basis
 
 numbers = st.floats(-10.0, 10.0)
 TIMES = np.linspace(0.0, 1.0, 41)

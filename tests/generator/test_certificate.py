@@ -12,11 +12,11 @@ from numpy.polynomial import chebyshev as series
 from scipy import signal
 
 import gen_profile as gp
-from gen_profile.certificate import certify, theorem
-from gen_profile.certificate.boxes import covers
-from gen_profile.certificate.certify import _tails, attempt
+from gen_profile.assurance.certificate import certify, theorem
+from gen_profile.assurance.certificate.boxes import covers
+from gen_profile.assurance.certificate.certify import _tails, attempt
+from gen_profile.assurance.verification.batch import on_processors
 from gen_profile.motion.profile import SampledProfile
-from gen_profile.verification.batch import on_processors
 
 CLOSE = 1.05  # how far a bound may be above the truth
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev as series
 
-from gen_profile.certificate.arithmetic import balls, chebyshev
-from gen_profile.certificate.arithmetic.affine import Affine, constant
-from gen_profile.certificate.arithmetic.balls import Ball, ball, matmul, shared
-from gen_profile.certificate.boxes import Ranges, covers, halves
-from gen_profile.certificate.equations import OPERATIONS, Enclosed, over_sinh
-from gen_profile.problem import symbolic as sym
-from gen_profile.problem.symbolic import Function
+from gen_profile.assurance.certificate.arithmetic import balls, chebyshev
+from gen_profile.assurance.certificate.arithmetic.affine import Affine, constant
+from gen_profile.assurance.certificate.arithmetic.balls import Ball, ball, matmul, shared
+from gen_profile.assurance.certificate.boxes import Ranges, covers, halves
+from gen_profile.assurance.certificate.equations import OPERATIONS, Enclosed, over_sinh
+from gen_profile.dynamics.problem import symbolic as sym
+from gen_profile.dynamics.problem.symbolic import Function
 
 POINTS = 200
 

@@ -3,8 +3,8 @@
 import attrs
 import pytest
 
-from gen_profile.evaluation.scenarios import Scenario
-from gen_profile.verification.verdict import Check, Finding
+from gen_profile.assurance.verification.verdict import Check, Finding
+from gen_profile.dynamics.evaluation.scenarios import Scenario
 
 LIMIT = {"hook": 0.004, "payload": 0.002}
 

@@ -114,7 +114,7 @@ def test_a_bug_is_told_without_a_traceback(monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr("gen_profile.designs.design.plan", broken)
+    monkeypatch.setattr("gen_profile.delivery.designs.design.plan", broken)
     outcome = run_here("--json")
     assert outcome.code == 1
     assert outcome.errors == ["Error: Internal error (ZeroDivisionError: broken). Run again with --debug."]
@@ -128,7 +128,7 @@ def test_an_interrupt_is_no_bug(monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gen_profile.designs.design.plan", interrupted)
+    monkeypatch.setattr("gen_profile.delivery.designs.design.plan", interrupted)
     outcome = run_here("--json")
     assert outcome.code == outcome.document["error"]["exit_code"] == 130
     assert outcome.errors[-1] == "Error: Interrupted."

@@ -8,7 +8,7 @@ from command_line import COMMANDS
 from json_page import PAGE, documented, require_documented
 
 from gen_profile.cli import outcome
-from gen_profile.errors import GenProfileError
+from gen_profile.support.errors import GenProfileError
 
 TEXT = PAGE.read_text("utf-8")
 SHARED = {"spec_path", "preset", "overrides", "as_json", "debug"}  # told once, at the page's top

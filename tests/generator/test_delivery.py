@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from gen_profile.artefacts.writing import deliver, staged
-from gen_profile.errors import OutputError
+from gen_profile.support.artefacts.writing import deliver, staged
+from gen_profile.support.errors import OutputError
 
 
 def tree(folder):
@@ -132,7 +132,7 @@ def test_a_file_that_cannot_be_replaced_is_a_sentence(tmp_path):
 KILLED = """
 import sys
 from pathlib import Path
-from gen_profile.artefacts.writing import staged
+from gen_profile.support.artefacts.writing import staged
 with staged(Path(sys.argv[1])) as staging:
     staging.write("one.txt", b"half")
     print(flush=True)

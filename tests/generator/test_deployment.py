@@ -16,12 +16,12 @@ from simulated_blocks import (
     poked,
 )
 
-from gen_profile.deployment.deploy import deploy, require_fit, verify
-from gen_profile.deployment.mailbox import IN_USE, RIGHT, LinkLostError
-from gen_profile.deployment.simulated_block import SimulatedBlock
-from gen_profile.deployment.table import BlockTable, PlannerTable, read_table
-from gen_profile.errors import CheckFailed, DeploymentError, ExportError, OutputError
+from gen_profile.delivery.deployment.deploy import deploy, require_fit, verify
+from gen_profile.delivery.deployment.mailbox import IN_USE, RIGHT, LinkLostError
+from gen_profile.delivery.deployment.simulated_block import SimulatedBlock
+from gen_profile.delivery.deployment.table import BlockTable, PlannerTable, read_table
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import CheckFailed, DeploymentError, ExportError, OutputError
 
 FAULTS = 40
 

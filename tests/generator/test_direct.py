@@ -6,22 +6,22 @@ import pytest
 from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
+from gen_profile.dynamics.problem.cost import SwayCost
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers import suggestions
+from gen_profile.methods.solvers.direct import set_up
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.direct.refinement import bisected, switching
+from gen_profile.methods.solvers.indirect import solver as indirect
+from gen_profile.methods.solvers.indirect.extremal import METHOD as INDIRECT
+from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.solution import Status
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
-from gen_profile.problem.cost import SwayCost
-from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers import suggestions
-from gen_profile.solvers.direct import set_up
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct.refinement import bisected, switching
-from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.indirect.extremal import METHOD as INDIRECT
-from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
-from gen_profile.work import OutOfWork, budget
+from gen_profile.support.work import OutOfWork, budget
 
 LIMITS = {"velocity": 0.15, "acceleration": 0.4, "jerk": 6.0}
 

@@ -8,12 +8,12 @@ import pytest
 from generator.mutants import judged, kinds_of
 from generator.planned_machines import BAY
 
+from gen_profile.assurance.proof.habits import Change
+from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.obedience import WORDS
+from gen_profile.assurance.proof.orders import POSITION
+from gen_profile.assurance.proof.verdict import kind_of
 from gen_profile.planner.design import planner_block
-from gen_profile.proof.habits import Change
-from gen_profile.proof.histories import Histories
-from gen_profile.proof.obedience import WORDS
-from gen_profile.proof.orders import POSITION
-from gen_profile.proof.verdict import kind_of
 from gen_profile.spec.reading import parse_spec
 
 pytestmark = pytest.mark.slow

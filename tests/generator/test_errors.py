@@ -5,9 +5,9 @@ import pickle
 
 import pytest
 
-from gen_profile import errors
-from gen_profile.errors import Code, GenProfileError, InfeasibleProblem, Reason, SpecError, Suggestion
-from gen_profile.phrase import plain
+from gen_profile.support import errors
+from gen_profile.support.errors import Code, GenProfileError, InfeasibleProblem, Reason, SpecError, Suggestion
+from gen_profile.support.phrase import plain
 
 EXIT_CODES = {
     "GenProfileError": 1,

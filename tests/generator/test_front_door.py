@@ -10,8 +10,8 @@ import pytest
 from scipy.interpolate import BPoly, CubicSpline, PPoly, make_interp_spline
 
 import gen_profile as gp
-from gen_profile.charts.method_styles import method_styles
 from gen_profile.motion.profile import Profile
+from gen_profile.presentation.charts.method_styles import method_styles
 from gen_profile.spec.reading import preset_text
 
 

@@ -11,18 +11,18 @@ from generator.free_swings import periods, swing
 from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import CosimulationError, OutputError, SpecError
-from gen_profile.evaluation.simulation import free_swing
-from gen_profile.identification.identify import identify, write_spec
-from gen_profile.identification.measurements import (
+from gen_profile.dynamics.evaluation.simulation import free_swing
+from gen_profile.plants.registry import find_plant
+from gen_profile.spec.reading import preset_spec, read_spec
+from gen_profile.studies.identification.identify import identify, write_spec
+from gen_profile.studies.identification.measurements import (
     DirectReading,
     Period,
     parse_period,
     parse_reading,
     parse_swing,
 )
-from gen_profile.plants.registry import find_plant
-from gen_profile.spec.reading import preset_spec, read_spec
+from gen_profile.support.errors import CosimulationError, OutputError, SpecError
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
 

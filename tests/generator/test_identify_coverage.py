@@ -7,12 +7,12 @@ import pytest
 from generator.free_swings import inside, periods, states, swing
 from generator.lagrangian_machines import MACHINES
 
-from gen_profile.errors import InfeasibleProblem
-from gen_profile.identification.estimation import estimate
-from gen_profile.identification.measurements import DirectReading, Period, SwingLog
-from gen_profile.identification.swing_model import SwingingMachine
+from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.linearization import linearize
+from gen_profile.studies.identification.estimation import estimate
+from gen_profile.studies.identification.measurements import DirectReading, Period, SwingLog
+from gen_profile.studies.identification.swing_model import SwingingMachine
+from gen_profile.support.errors import InfeasibleProblem
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from command_line import PROGRAM
 
-from gen_profile.identification.identify import identify
-from gen_profile.identification.measurements import SwingLog
-from gen_profile.identification.swing_model import MOST_SAMPLES, SwingingMachine, shortened
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.identification.identify import identify
+from gen_profile.studies.identification.measurements import SwingLog
+from gen_profile.studies.identification.swing_model import MOST_SAMPLES, SwingingMachine, shortened
 
 LENGTH, DAMPING = 3.4, 0.004  # m, of the rope; 1/s
 PRESET, HOISTED = "single-pendulum-crane", 1.0  # m, of rope that the hoist adds at the move's target

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from generator.free_swings import inside, swing
 
-from gen_profile.charts.identification import identification_figure
-from gen_profile.errors import InfeasibleProblem
-from gen_profile.identification import misfit
-from gen_profile.identification.estimation import estimate
-from gen_profile.identification.fit import fit_of
-from gen_profile.identification.identify import identify
-from gen_profile.identification.measurements import Period, SwingLog, parse_reading
-from gen_profile.identification.misfit import Explanation, elsewhere, likeliest, spectrum
-from gen_profile.identification.swing_model import SwingingMachine, SwingModel, swing_model
-from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.plants.registry import find_plant
+from gen_profile.presentation.charts.identification import identification_figure
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.identification import misfit
+from gen_profile.studies.identification.estimation import estimate
+from gen_profile.studies.identification.fit import fit_of
+from gen_profile.studies.identification.identify import identify
+from gen_profile.studies.identification.measurements import Period, SwingLog, parse_reading
+from gen_profile.studies.identification.misfit import Explanation, elsewhere, likeliest, spectrum
+from gen_profile.studies.identification.swing_model import SwingingMachine, SwingModel, swing_model
+from gen_profile.studies.identification.uncertainty import uncertainty
+from gen_profile.support.errors import InfeasibleProblem
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
 TIMES = np.arange(0.0, 15.0, 0.1)

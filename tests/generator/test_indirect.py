@@ -10,14 +10,14 @@ import pytest
 from generator.crane_problems import crane_problem
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import InfeasibleProblem, SolverDiverged
+from gen_profile.dynamics.problem.problem import Problem
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.plan import plan
+from gen_profile.methods.solvers.solution import Status
 from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant
-from gen_profile.problem.problem import Problem
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.plan import plan
-from gen_profile.solvers.solution import Status
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import InfeasibleProblem, SolverDiverged
 
 
 @pytest.mark.slow
@@ -116,8 +116,8 @@ SCRIPT = """
 import sys
 sys.path.insert(0, {tests!r})
 from generator.crane_problems import crane_problem
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
 print(optimal_profile(solve(crane_problem(desensitized=("L1", "L2")))).payload_hash())
 """
 

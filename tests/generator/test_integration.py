@@ -5,11 +5,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from gen_profile.errors import CosimulationError
-from gen_profile.evaluation import simulation
-from gen_profile.evaluation.integration import MOST, NODES, integrate
-from gen_profile.solvers.shape import shaped_motion
+from gen_profile.dynamics.evaluation import simulation
+from gen_profile.dynamics.evaluation.integration import MOST, NODES, integrate
+from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import CosimulationError
 
 TIGHT = {"accuracy": 1e-10, "least": 1e-13, "what": "test"}
 

@@ -83,12 +83,12 @@ def test_reading_a_spec_or_an_artefact_loads_nothing_heavy(heavy):
 
 @pytest.mark.parametrize("heavy", ["casadi", "scipy"])
 def test_shapers_need_numpy_only(heavy):
-    assert heavy not in loaded_by("gen_profile.shapers.shaped_move")
+    assert heavy not in loaded_by("gen_profile.methods.shapers.shaped_move")
 
 
 @pytest.mark.parametrize("slow", ["scipy.stats", "scipy.special", "matplotlib", "plotly", "distributed"])
 def test_the_main_job_does_not_wait_for_what_it_seldom_needs(slow):
-    assert slow not in loaded_by("gen_profile.designs.design")
+    assert slow not in loaded_by("gen_profile.delivery.designs.design")
 
 
 FAULTY = """
@@ -118,7 +118,7 @@ def test_a_fault_of_a_spec_waits_for_nothing_heavy(arguments):
 
 
 def test_that_test_would_see_casadi():
-    assert "casadi" in loaded_by("gen_profile.problem.linearization")
+    assert "casadi" in loaded_by("gen_profile.dynamics.problem.linearization")
 
 
 @pytest.mark.slow

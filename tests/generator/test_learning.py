@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from gen_profile.errors import InfeasibleProblem, SpecError
-from gen_profile.identification import learning
-from gen_profile.identification.learning import LEAST, Machines, learn
-from gen_profile.identification.measurements import DirectReading, SwingLog, parse_reading
+from gen_profile.assurance.verification.from_python import cosimulate
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile, SampledProfile, sample
-from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import HERE, parse_spec, preset_spec, preset_text, read_spec
 from gen_profile.spec.text import changed_text
-from gen_profile.verification.from_python import cosimulate
+from gen_profile.studies.identification import learning
+from gen_profile.studies.identification.learning import LEAST, Machines, learn
+from gen_profile.studies.identification.measurements import DirectReading, SwingLog, parse_reading
+from gen_profile.support.errors import InfeasibleProblem, SpecError
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 

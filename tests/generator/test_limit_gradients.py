@@ -9,13 +9,13 @@ from generator.lagrangian_machines import Lagrange
 from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
 
+from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.problem import Problem
+from gen_profile.methods.solvers.collocation import GAUSS
+from gen_profile.methods.solvers.direct.bezier import bernstein
+from gen_profile.methods.solvers.direct.set_up import set_up
+from gen_profile.methods.solvers.direct.transcription import Iterate
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.linearization import linearize
-from gen_profile.problem.problem import Problem
-from gen_profile.solvers.collocation import GAUSS
-from gen_profile.solvers.direct.bezier import bernstein
-from gen_profile.solvers.direct.set_up import set_up
-from gen_profile.solvers.direct.transcription import Iterate
 
 STEP = 1e-2
 STENCIL = {-2: 1.0 / 12.0, -1: -2.0 / 3.0, 1: 2.0 / 3.0, 2: -1.0 / 12.0}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gen_profile.solvers.collocation import GAUSS, LONG_GAUSS
-from gen_profile.solvers.indirect.linear_response import linear_response
+from gen_profile.methods.solvers.collocation import GAUSS, LONG_GAUSS
+from gen_profile.methods.solvers.indirect.linear_response import linear_response
 
 N = 5
 MESH = np.array([0.0, 0.2, 0.35, 0.6, 0.8, 1.0])

@@ -8,9 +8,9 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.dynamics.problem.linearization import linearize, resting_place
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.linearization import linearize, resting_place
+from gen_profile.support.errors import InfeasibleProblem
 
 CRANE = find_plant("double-pendulum-crane")
 OTHER = {"m1": 350.0, "m2": 12000.0, "L1": 20.0, "L2": 2.0, "g": 9.81, "c1": 900.0, "c2": 50.0}

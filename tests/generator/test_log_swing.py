@@ -17,8 +17,8 @@ from asyncua import Server, ua
 from command_line import PROGRAM, run_here
 from end_to_end.simulated_controllers import free_port, in_thread
 
-from gen_profile.identification.identify import read_swing
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.identification.identify import read_swing
 
 AXIS = np.array([0.36, -0.48, 0.8])  # about which the phone swings, of its own
 FREQUENCY = 1.9
@@ -278,7 +278,7 @@ def test_an_encoder_on_a_can_bus_is_logged(tmp_path, size, more):
     ],
 )
 def test_an_encoder_that_is_not_there(tmp_path, monkeypatch, source, more, code, sentence):
-    monkeypatch.setattr("gen_profile.identification.encoder.SILENT", 0.5)
+    monkeypatch.setattr("gen_profile.studies.identification.encoder.SILENT", 0.5)
     outcome = run_here("log-swing", source, *more, "--out", tmp_path / "swing.csv")
     assert outcome.code == code and sentence in outcome.err, outcome.err
     assert not list(tmp_path.iterdir())

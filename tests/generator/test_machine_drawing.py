@@ -7,8 +7,8 @@ import pytest
 from command_line import run_here
 
 import gen_profile as gp
-from gen_profile.charts.machine import views
 from gen_profile.plants.registry import find_plant, plant_types
+from gen_profile.presentation.charts.machine import views
 
 LENGTHS = {
     "double-pendulum-crane": {"L1", "L2"},

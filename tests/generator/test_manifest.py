@@ -6,8 +6,8 @@ import json
 import attrs
 import pytest
 
-from gen_profile.artefacts.manifest import PLANNER, Artefact, Manifest, parse_manifest, sha256
-from gen_profile.errors import OutputError
+from gen_profile.support.artefacts.manifest import PLANNER, Artefact, Manifest, parse_manifest, sha256
+from gen_profile.support.errors import OutputError
 
 ARTEFACT = Artefact(format="csv", path="brücke.csv", sha256="00", bytes=3, payload_sha256="11")
 MANIFEST = Manifest(

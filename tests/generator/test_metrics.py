@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from generator.crane_problems import crane_problem
 
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.motion.metrics import extremes, greatest, overshoot
 from gen_profile.motion.profile import Profile
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
 
 
 @pytest.fixture(scope="module")

@@ -9,16 +9,16 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
-from gen_profile.errors import Code, CosimulationError, InfeasibleProblem
-from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers import shortest as searching
-from gen_profile.solvers.direct import relaxation
-from gen_profile.solvers.plan import draft
-from gen_profile.solvers.search import least
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers import shortest as searching
+from gen_profile.methods.solvers.direct import relaxation
+from gen_profile.methods.solvers.plan import draft
+from gen_profile.methods.solvers.search import least
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
-from gen_profile.work import OutOfWork, budget, spend
+from gen_profile.support.errors import Code, CosimulationError, InfeasibleProblem
+from gen_profile.support.work import OutOfWork, budget, spend
 
 
 def shortest(frequencies, distances, guess, desensitized, **limits):
@@ -212,7 +212,7 @@ def test_a_motion_that_no_machine_can_follow_is_passed_over(monkeypatch):
     def flung(*_):
         raise CosimulationError("The motion cannot be integrated beyond 2.565 s.")
 
-    monkeypatch.setattr("gen_profile.solvers.draft.evaluate", flung)
+    monkeypatch.setattr("gen_profile.methods.solvers.draft.evaluate", flung)
     assert drafted.excess_sway == math.inf
 
 

@@ -6,9 +6,9 @@ from generator.crane_problems import EFFORTS, crane_problem
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PPoly
 
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.motion.actuator import lag_compensated
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
 
 START, TARGET = 0.137, 0.437
 

@@ -7,7 +7,7 @@ import sys
 
 PROGRAM = """
 import json
-from gen_profile.one_thread import one_thread
+from gen_profile.support.one_thread import one_thread
 import scipy.linalg
 from threadpoolctl import threadpool_info
 def threads():

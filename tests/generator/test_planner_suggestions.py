@@ -6,10 +6,10 @@ import pytest
 from command_line import run_here
 from generator.planned_machines import BAY, HOIST
 
-from gen_profile.designs import planner_suggestions as suggestions
-from gen_profile.designs.planner_suggestions import planner_suggestions
-from gen_profile.errors import SpecError
+from gen_profile.delivery.designs import planner_suggestions as suggestions
+from gen_profile.delivery.designs.planner_suggestions import planner_suggestions
 from gen_profile.spec.reading import parse_spec
+from gen_profile.support.errors import SpecError
 
 
 def proof(fraction, faults=(), broken=()):

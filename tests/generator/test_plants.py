@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import SpecError
+from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.plants import registry
 from gen_profile.plants.registry import find_plant, plant_types
-from gen_profile.problem.linearization import linearize
+from gen_profile.support.errors import SpecError
 
 CRANE = find_plant("double-pendulum-crane")
 ANGLES, RATES = st.floats(-1.5, 1.5), st.floats(-5.0, 5.0)

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from gen_profile.errors import SpecError
+from gen_profile.dynamics.problem.cost import axis_reach, effort_weights
+from gen_profile.dynamics.problem.limits import breaches
+from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.indirect import solver as indirect
+from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.motion.metrics import greatest, length
-from gen_profile.problem.cost import axis_reach, effort_weights
-from gen_profile.problem.limits import breaches
-from gen_profile.problem.linearization import linearize
-from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec.reading import parse_spec, preset_spec, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 
 def fault_of(preset, *overrides):

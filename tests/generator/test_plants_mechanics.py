@@ -7,11 +7,11 @@ import pytest
 from generator.lagrangian_machines import MACHINES, Lagrange
 from scipy.integrate import quad, simpson, solve_ivp
 
+from gen_profile.dynamics.problem import symbolic as sym
+from gen_profile.dynamics.problem.dynamics import dynamics
+from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.symbolic import Function
 from gen_profile.plants.registry import BUILT_IN, FAMILIES, find_plant
-from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import dynamics
-from gen_profile.problem.linearization import linearize
-from gen_profile.problem.symbolic import Function
 
 
 def own_accelerations(plant, q, dq, ddq_a, parameters):

@@ -12,13 +12,13 @@ import pytest
 from command_line import run_here
 from fmu.hoisting_pendulum import PLANT as WINCH
 
-from gen_profile.errors import SpecError
+from gen_profile.dynamics.problem.dynamics import dynamics
 from gen_profile.plants.machine_file import plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile.plants.soundness import faults_of
-from gen_profile.problem.dynamics import dynamics
 from gen_profile.spec.reading import parse_spec, read_spec, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 PENDULUM = '''"""A load on a rope, and nothing else."""
 

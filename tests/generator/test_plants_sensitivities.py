@@ -7,11 +7,11 @@ import pytest
 from generator.lagrangian_machines import MACHINES
 from scipy.integrate import solve_ivp
 
+from gen_profile.dynamics.problem import symbolic as sym
+from gen_profile.dynamics.problem.dynamics import dynamics
+from gen_profile.dynamics.problem.motion_equations import motion_equations
+from gen_profile.dynamics.problem.sensitivities import sensitivities
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import dynamics
-from gen_profile.problem.motion_equations import motion_equations
-from gen_profile.problem.sensitivities import sensitivities
 
 STEP = 4e-3  # of the logarithm of a parameter
 STENCIL = np.exp(STEP * np.arange(-2, 3))

@@ -6,10 +6,10 @@ from generator.crane_problems import EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 from scipy.integrate import solve_ivp
 
+from gen_profile.dynamics.problem.pontryagin import SNAP_TIME
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.motion.metrics import greatest, root_mean_square
-from gen_profile.problem.pontryagin import SNAP_TIME
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
 
 CASES = [(beta, *effort) for beta in (0.0, 20.0, 50.0) for effort in EFFORTS]
 

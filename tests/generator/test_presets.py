@@ -7,7 +7,7 @@ import attrs
 import pytest
 from command_line import run_here
 
-from gen_profile.solvers.plan import plan
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, read_spec
 
 

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from gen_profile.errors import GenProfileError
 from gen_profile.motion.profile import Profile, SampledProfile, grid_length, grid_times, sample
+from gen_profile.support.errors import GenProfileError
 
 NUMBERS = st.floats(-10.0, 10.0, allow_subnormal=False)
 EXACT_DECIMALS = st.integers(1, 10**6).map(lambda n: n / 10**6)

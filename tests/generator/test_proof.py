@@ -14,18 +14,18 @@ from distributed import LocalCluster
 from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, PAPER, swing
 from sweeps import LOOPBACK
 
-from gen_profile.charts.proof import history_figure
-from gen_profile.errors import SpecError
+from gen_profile.assurance.proof.closed_loop import ClosedLoop, trace
+from gen_profile.assurance.proof.histories import Histories, History
+from gen_profile.assurance.proof.judging import WatchedRun, judge_run
+from gen_profile.assurance.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH, Numbering
+from gen_profile.assurance.proof.on_cluster import ProofRecipe, judge_part
+from gen_profile.assurance.proof.prove import prove, replay
 from gen_profile.planner.commands import Command, play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.proof.closed_loop import ClosedLoop, trace
-from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.judging import WatchedRun, judge_run
-from gen_profile.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH, Numbering
-from gen_profile.proof.on_cluster import ProofRecipe, judge_part
-from gen_profile.proof.prove import prove, replay
+from gen_profile.presentation.charts.proof import history_figure
 from gen_profile.spec.reading import parse_spec
+from gen_profile.support.errors import SpecError
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
 COUNT = 25  # histories, the fewest that have one of each group
@@ -51,7 +51,7 @@ def text(block):
 def designed(block):
     """Spare the command line the design of the block, which depends on neither errors nor limits of sway."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("gen_profile.designs.planner.planner_block", lambda _: block)
+        patched.setattr("gen_profile.delivery.designs.planner.planner_block", lambda _: block)
         yield
 
 
@@ -193,7 +193,7 @@ def test_a_worker_with_other_libraries_judges_nothing(spec):
 
 
 def test_a_scheduler_that_nobody_runs_is_named(spec, text, monkeypatch):
-    monkeypatch.setattr("gen_profile.cluster.ANSWER_TIME", "200ms")
+    monkeypatch.setattr("gen_profile.support.cluster.ANSWER_TIME", "200ms")
     with pytest.raises(SpecError, match=r"scheduler tcp://127\.0\.0\.1:9: no worker answers"):
         prove(spec, text, histories=1, scheduler="tcp://127.0.0.1:9")
 
@@ -202,7 +202,7 @@ def test_a_worker_that_fails_is_told(spec, text, monkeypatch):
     def unable(*_):
         raise ModuleNotFoundError("No module 'x'")
 
-    monkeypatch.setattr("gen_profile.proof.on_cluster.judge_part", unable)
+    monkeypatch.setattr("gen_profile.assurance.proof.on_cluster.judge_part", unable)
     with (
         LocalCluster(n_workers=1, processes=False, **LOOPBACK) as cluster,
         pytest.raises(SpecError, match=r"the workers cannot go on .*No module 'x'"),
@@ -464,7 +464,7 @@ def test_what_only_a_design_has_is_refused_in_a_report(deployed):
 @pytest.mark.slow
 @pytest.mark.usefixtures("designed")
 def test_a_block_that_sways_too_much_is_not_written(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.designs.planner.planner_suggestions", lambda *_: ())
+    monkeypatch.setattr("gen_profile.delivery.designs.planner.planner_suggestions", lambda *_: ())
     (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.00001"))
     options = ("--out", tmp_path / "out", "--histories", 4, "--json")
     failed = run_here("planner", "write", tmp_path / "bay.toml", *options)

@@ -8,11 +8,11 @@ import pytest
 from generator.mutants import MACHINES, judged, kinds_of
 from generator.planned_machines import FORMER, SELDOM, histories_apart
 
+from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.habits import Change
+from gen_profile.assurance.proof.histories import Histories, History
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
-from gen_profile.proof.closed_loop import ClosedLoop
-from gen_profile.proof.habits import Change
-from gen_profile.proof.histories import Histories, History
 
 pytestmark = pytest.mark.slow
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, swing
 
-from gen_profile.charts.proof import history_figure
-from gen_profile.errors import SpecError
+from gen_profile.assurance.proof.closed_loop import ClosedLoop, trace
+from gen_profile.assurance.proof.histories import Histories, History
+from gen_profile.assurance.proof.numbering import Numbering
+from gen_profile.assurance.proof.prove import prove
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.planner import Planner
-from gen_profile.proof.closed_loop import ClosedLoop, trace
-from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.numbering import Numbering
-from gen_profile.proof.prove import prove
+from gen_profile.presentation.charts.proof import history_figure
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.errors import SpecError
 
 HOISTED = ((0.0, 6.0), (2.0, 6.0), (27.0, 8.5), (32.0, 8.0))  # s and m: at 0.1 m/s
 

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from generator.planned_machines import BAY
 
-from gen_profile.planner.interface import BlockAxis
-from gen_profile.planner.left_swinging import GivenModes
-from gen_profile.proof.followed import Followed, Zone
-from gen_profile.proof.habits import GENTLE, ROUGH
-from gen_profile.proof.histories import Histories
-from gen_profile.proof.obedience import WORDS, faults, measured
-from gen_profile.proof.orders import (
+from gen_profile.assurance.proof.followed import Followed, Zone
+from gen_profile.assurance.proof.habits import GENTLE, ROUGH
+from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.obedience import WORDS, faults, measured
+from gen_profile.assurance.proof.orders import (
     BLOCKED,
     DISABLED,
     POSITION,
@@ -28,8 +26,10 @@ from gen_profile.proof.orders import (
     TimedOrder,
     read_orders,
 )
-from gen_profile.proof.verdict import kind_of
-from gen_profile.proof.watching import BlockWatch
+from gen_profile.assurance.proof.verdict import kind_of
+from gen_profile.assurance.proof.watching import BlockWatch
+from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, CYCLES = 0.01, 6000

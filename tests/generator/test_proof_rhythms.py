@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from generator.planned_machines import BAY
 
+from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.habits import Change
+from gen_profile.assurance.proof.histories import SHIFT, Histories
+from gen_profile.assurance.proof.numbering import DRAWS, LONG, RHYTHMS, SEARCH, Numbering
 from gen_profile.planner.design import planner_block
-from gen_profile.proof.closed_loop import ClosedLoop
-from gen_profile.proof.habits import Change
-from gen_profile.proof.histories import SHIFT, Histories
-from gen_profile.proof.numbering import DRAWS, LONG, RHYTHMS, SEARCH, Numbering
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 COARSE = ["export.cycle_time=0.02"]

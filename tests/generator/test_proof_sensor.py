@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 from generator.test_proof_obedience import CYCLES, MOVE, REST, STICKS, STOPS, kinds, with_orders
 
-from gen_profile.charts.proof import damping_figures, worst_damped
-from gen_profile.errors import SpecError
+from gen_profile.assurance.proof.closed_loop import ClosedLoop, trace
+from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.numbering import Numbering
+from gen_profile.assurance.proof.obedience import WORDS
+from gen_profile.assurance.proof.orders import POSITION
+from gen_profile.assurance.proof.prove import prove
+from gen_profile.assurance.proof.sensing import FAULTS, JUMP, Gust, sensor_faults
+from gen_profile.assurance.proof.verdict import kind_of
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.planner import Planner
 from gen_profile.planner.sensor import FADES, estimation_error
 from gen_profile.planner.sensor_log import read_sensor_log
-from gen_profile.proof.closed_loop import ClosedLoop, trace
-from gen_profile.proof.histories import Histories
-from gen_profile.proof.numbering import Numbering
-from gen_profile.proof.obedience import WORDS
-from gen_profile.proof.orders import POSITION
-from gen_profile.proof.prove import prove
-from gen_profile.proof.sensing import FAULTS, JUMP, Gust, sensor_faults
-from gen_profile.proof.verdict import kind_of
+from gen_profile.presentation.charts.proof import damping_figures, worst_damped
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import SpecError
 from gen_profile_fmu.running.block_run import BlockRun
 
 MEASURED = [

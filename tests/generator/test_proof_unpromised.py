@@ -3,12 +3,12 @@
 import attrs
 import pytest
 
+from gen_profile.assurance.proof.check import BlockJudgement
+from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.numbering import CORNERS, Numbering
+from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
 from gen_profile.cli.words import block_judgement
-from gen_profile.proof.check import BlockJudgement
-from gen_profile.proof.histories import Histories
-from gen_profile.proof.numbering import CORNERS, Numbering
-from gen_profile.proof.verdict import JudgedHistory, Proof
-from gen_profile.report.planner import _facts, _limits, _ranking, _verdict
+from gen_profile.presentation.report.planner import _facts, _limits, _ranking, _verdict
 from gen_profile.spec.reading import preset_spec
 
 SPEC = preset_spec("bay-crane")

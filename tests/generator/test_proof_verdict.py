@@ -19,11 +19,11 @@ from generator.test_proof_obedience import (
     with_orders,
 )
 
-from gen_profile.proof.followed import WAY
-from gen_profile.proof.numbering import DRAWS, SEARCH
-from gen_profile.proof.obedience import LATER, WORDS, measured
-from gen_profile.proof.orders import POSITION, STOP, VELOCITY
-from gen_profile.proof.verdict import Proof, kind_of, late_on_average
+from gen_profile.assurance.proof.followed import WAY
+from gen_profile.assurance.proof.numbering import DRAWS, SEARCH
+from gen_profile.assurance.proof.obedience import LATER, WORDS, measured
+from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
+from gen_profile.assurance.proof.verdict import Proof, kind_of, late_on_average
 
 ONE_LOAD = {"payload": 0.05}
 

@@ -6,10 +6,10 @@ from fmu import absolute_angle_crane as oracle
 from generator.crane_problems import crane_problem
 from scipy.interpolate import PPoly
 
-from gen_profile.problem.reachability import independent_states
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Status
+from gen_profile.dynamics.problem.reachability import independent_states
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.solution import Status
 
 ALL = ("L1", "L2", "m1", "m2")
 

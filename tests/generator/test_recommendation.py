@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gen_profile.comparison.compare import OBJECTIVES, efficient, recommend
+from gen_profile.studies.comparison.compare import OBJECTIVES, efficient, recommend
 
 
 def row(duration, acceleration, sway, worst):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.errors import OutputError, SpecError
-from gen_profile.identification.log_table import read_table
-from gen_profile.report.log import parse_log, read_log
+from gen_profile.presentation.report.log import parse_log, read_log
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.identification.log_table import read_table
+from gen_profile.support.errors import OutputError, SpecError
 
 TIMES = [0.02 * k for k in range(20)]
 MILLIMETRES = ("axis.unit=mm", "axis.sign=-1")
@@ -135,7 +135,7 @@ def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path):
 
 
 def test_a_huge_file_is_refused_unread(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.identification.log_table.MOST_BYTES", 10)
+    monkeypatch.setattr("gen_profile.studies.identification.log_table.MOST_BYTES", 10)
     (tmp_path / "log.csv").write_text("time_s,sway\n0,0\n", "utf-8")
     with pytest.raises(OutputError, match="cut the move out of it"):
         read_log(tmp_path / "log.csv", paper())

@@ -12,8 +12,8 @@ from gen_profile.plants.looks import body_size, drawings, pose_of
 from gen_profile.plants.machine_file import plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate
 from gen_profile.plants.registry import find_plant, plant_types
-from gen_profile.report.animation import Actor, Animation
-from gen_profile.report.page import ASSETS
+from gen_profile.presentation.report.animation import Actor, Animation
+from gen_profile.presentation.report.page import ASSETS
 
 FRAMES = 50
 LINES = {"rail", "rope", "spring", "plumb", "frame", "liquid"}

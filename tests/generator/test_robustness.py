@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Status
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.solution import Status
 
 FIFTY_DEGREES = np.radians(50.0)  # beyond, Newton may fail although a motion exists
 LARGE = np.radians(25.0)  # beyond, moves that are barely possible may be refused, with a cure that works

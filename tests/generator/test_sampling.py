@@ -5,7 +5,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from gen_profile.problem.sampling import halton, latin_hypercube
+from gen_profile.dynamics.problem.sampling import halton, latin_hypercube
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from itertools import product
 
 import pytest
 
-from gen_profile.evaluation.scenarios import named, scenarios
+from gen_profile.dynamics.evaluation.scenarios import named, scenarios
 from gen_profile.spec.reading import preset_spec
 
 

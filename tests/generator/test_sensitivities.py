@@ -7,9 +7,9 @@ from fmu import absolute_angle_crane as oracle
 from generator.crane_problems import EFFORTS, crane_problem
 from scipy.interpolate import PPoly
 
-from gen_profile.problem.pontryagin import optimality_system
-from gen_profile.solvers.indirect.solver import solve
-from gen_profile.solvers.motion import optimal_profile
+from gen_profile.dynamics.problem.pontryagin import optimality_system
+from gen_profile.methods.solvers.indirect.solver import solve
+from gen_profile.methods.solvers.motion import optimal_profile
 
 STEP = 1e-4
 

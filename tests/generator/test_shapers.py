@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp, trapezoid
 
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.methods.shapers.base_moves import QUINTIC, SEPTIC
+from gen_profile.methods.shapers.impulses import SHAPERS, convolve
+from gen_profile.methods.shapers.shaped_move import shaped_move
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.linearization import linearize
-from gen_profile.shapers.base_moves import QUINTIC, SEPTIC
-from gen_profile.shapers.impulses import SHAPERS, convolve
-from gen_profile.shapers.shaped_move import shaped_move
+from gen_profile.support.errors import InfeasibleProblem
 
 CRANE = find_plant("double-pendulum-crane")
 FREQUENCIES = linearize(CRANE, CRANE.nominal()).frequencies

@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import polynomial
 
-from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
+from gen_profile.methods.shapers.base_moves import BASES, QUINTIC, SEPTIC, jerk_limited
+from gen_profile.methods.shapers.impulses import SHAPERS
+from gen_profile.methods.shapers.shaped_move import shaped_move
+from gen_profile.methods.solvers.shape import shaped_motion, shortest_duration
 from gen_profile.motion.metrics import greatest
-from gen_profile.shapers.base_moves import BASES, QUINTIC, SEPTIC, jerk_limited
-from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.shapers.shaped_move import shaped_move
-from gen_profile.solvers.shape import shaped_motion, shortest_duration
 from gen_profile.spec.model import AxisLimitsSpec, LimitsSpec
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import InfeasibleProblem, OutputError, SpecError
 
 FREQUENCIES = (3.64, 9.017)
 LIMITS = (0.3, 1.0, 4.0)
@@ -80,7 +80,7 @@ def test_a_jerk_limited_move_needs_a_limit():
 
 
 def test_without_ruckig_the_sentence_tells_what_to_install(monkeypatch):
-    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda _: None)
+    monkeypatch.setattr("gen_profile.support.plugins.find_spec", lambda _: None)
     with pytest.raises(OutputError, match=r"pip install 'gen-profile\[ruckig\]'"):
         jerk_limited(LimitsSpec(jerk=1.0), [1.0])
 
@@ -107,7 +107,7 @@ def test_the_shortest_move_keeps_all_limits_and_a_shorter_one_does_not(name, bas
 
 
 def test_limits_that_no_duration_keeps(monkeypatch):
-    monkeypatch.setattr("gen_profile.solvers.shape._breaches", lambda *_: ("whatever",))
+    monkeypatch.setattr("gen_profile.methods.solvers.shape._breaches", lambda *_: ("whatever",))
     spec = preset_spec("paper", ["move.duration=minimum", "limits.velocity=0.3"])
     with pytest.raises(InfeasibleProblem, match=r"^move\.duration: no duration keeps the limits"):
         shaped_motion(spec, "zvd")

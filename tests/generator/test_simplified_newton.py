@@ -5,15 +5,19 @@ import numpy as np
 import pytest
 from generator.crane_problems import EFFORTS, crane_problem
 
+from gen_profile.dynamics.problem.pontryagin import optimality_system
+from gen_profile.dynamics.problem.problem import Problem
+from gen_profile.methods.solvers.collocation import LONG_GAUSS
+from gen_profile.methods.solvers.indirect import simplified_newton
+from gen_profile.methods.solvers.indirect import solver as indirect
+from gen_profile.methods.solvers.indirect.boundary_value_problem import (
+    canonical_problem,
+    independence,
+    quintic,
+)
+from gen_profile.methods.solvers.indirect.simplified_newton import solve_simplified
+from gen_profile.methods.solvers.indirect.solver import solve_fully
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.pontryagin import optimality_system
-from gen_profile.problem.problem import Problem
-from gen_profile.solvers.collocation import LONG_GAUSS
-from gen_profile.solvers.indirect import simplified_newton
-from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem, independence, quintic
-from gen_profile.solvers.indirect.simplified_newton import solve_simplified
-from gen_profile.solvers.indirect.solver import solve_fully
 
 
 def posed(problem):

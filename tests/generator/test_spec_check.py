@@ -2,10 +2,10 @@
 
 import pytest
 
-from gen_profile.errors import SpecError
-from gen_profile.evaluation.scenarios import further_scenarios, scenarios
+from gen_profile.dynamics.evaluation.scenarios import further_scenarios, scenarios
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.reading import preset_spec, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 
 def test_the_check_tries_the_ranges_of_the_design_unless_it_has_its_own():

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.reading import preset_spec, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 PAPER = preset_spec("paper").to_dict()
 MISSING = object()

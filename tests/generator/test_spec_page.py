@@ -8,9 +8,9 @@ from typing import get_type_hints
 import attrs
 import pytest
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 PAGE = Path(__file__).parents[2] / "docs" / "spec.md"
 (BLOCK,) = re.findall(r"^```toml\n(.*?)^```$", PAGE.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)

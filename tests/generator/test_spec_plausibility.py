@@ -3,9 +3,9 @@
 import pytest
 from command_line import run_here
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.spec.reading import preset_spec, presets
+from gen_profile.support.errors import SpecError
 
 CRANE = "double-pendulum-crane"
 QUAY = ("plant.L1=50", "plant.m1=9000", "plant.m2=40000")

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import parse_spec, preset_spec, presets, read_spec, spec_from_dict
+from gen_profile.support.errors import OutputError, SpecError
 
 LEAST = """
 [plant]

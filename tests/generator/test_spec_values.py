@@ -4,9 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.model import CheckSpec
 from gen_profile.spec.reading import evolve_spec, make_spec, preset_spec
+from gen_profile.support.errors import SpecError
 
 PAPER = preset_spec("paper")
 

@@ -9,13 +9,11 @@ import zlib
 import numpy as np
 import pytest
 
-from gen_profile.errors import SpecError
-from gen_profile.solvers.plan import plan
-from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, spec_from_dict
-from gen_profile.studio.depth import depth
-from gen_profile.studio.knobs import knobs
-from gen_profile.studio.orders import Question
-from gen_profile.studio.state import (
+from gen_profile.methods.solvers.plan import plan
+from gen_profile.presentation.studio.depth import depth
+from gen_profile.presentation.studio.knobs import knobs
+from gen_profile.presentation.studio.orders import Question
+from gen_profile.presentation.studio.state import (
     MOST_ADDRESS,
     MOST_STATE,
     StudioState,
@@ -25,7 +23,9 @@ from gen_profile.studio.state import (
     preset_start,
     text_of,
 )
-from gen_profile.studio.views import picture
+from gen_profile.presentation.studio.views import picture
+from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 PAPER = preset_start("paper")
 LIMITED = {"limits.velocity": 0.3, "limits.acceleration": 0.8, "limits.jerk": 40.0}

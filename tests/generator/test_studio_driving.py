@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from generator.free_swings import states
 
-from gen_profile.studio.driving import MOMENT, Drive, drive
-from gen_profile.studio.orders import DriveQuestion, Question
-from gen_profile.studio.state import StudioState, preset_start
+from gen_profile.presentation.studio.driving import MOMENT, Drive, drive
+from gen_profile.presentation.studio.orders import DriveQuestion, Question
+from gen_profile.presentation.studio.state import StudioState, preset_start
 
 pytestmark = pytest.mark.slow  # blocks are compiled
 

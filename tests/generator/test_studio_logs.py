@@ -8,14 +8,14 @@ import pytest
 from command_line import run_here
 from generator.free_swings import states
 
-from gen_profile.charts.figure import Figure, Line, Panel
-from gen_profile.report.log import parse_log
-from gen_profile.solvers.plan import draft
+from gen_profile.methods.solvers.plan import draft
+from gen_profile.presentation.charts.figure import Figure, Line, Panel
+from gen_profile.presentation.report.log import parse_log
+from gen_profile.presentation.studio.curves_json import MOST, curves_json
+from gen_profile.presentation.studio.logs import log
+from gen_profile.presentation.studio.orders import LogQuestion, Question
+from gen_profile.presentation.studio.state import StudioState, document_of, preset_start
 from gen_profile.spec.reading import preset_spec, spec_from_dict
-from gen_profile.studio.curves_json import MOST, curves_json
-from gen_profile.studio.logs import log
-from gen_profile.studio.orders import LogQuestion, Question
-from gen_profile.studio.state import StudioState, document_of, preset_start
 
 PAPER = Question(start=preset_start("paper"), state=StudioState(preset="paper"))
 TRUE = 0.52  # m, L1 of the crane that was logged

@@ -3,8 +3,8 @@
 import asyncio
 import json
 
-from gen_profile.studio.session import IDLE_TIME, PATIENCE, Session
-from gen_profile.studio.workers import BEGUN, ENDED, LOST, Message
+from gen_profile.presentation.studio.session import IDLE_TIME, PATIENCE, Session
+from gen_profile.presentation.studio.workers import BEGUN, ENDED, LOST, Message
 
 
 class Clock:

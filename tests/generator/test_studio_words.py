@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from gen_profile.errors import NoMotion, SpecError, Suggestion
-from gen_profile.phrase import Phrase
-from gen_profile.solvers.solution import LATER, LONGER, WIDER, Status
-from gen_profile.solvers.suggestions import IN_VAIN
+from gen_profile.methods.solvers.solution import LATER, LONGER, WIDER, Status
+from gen_profile.methods.solvers.suggestions import IN_VAIN
+from gen_profile.presentation.studio.knobs import knobs
+from gen_profile.presentation.studio.state import document_of, preset_start
+from gen_profile.presentation.studio.views import SEARCHING, fault
 from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.spec.reading import preset_spec, presets, spec_from_dict
-from gen_profile.studio.knobs import knobs
-from gen_profile.studio.state import document_of, preset_start
-from gen_profile.studio.views import SEARCHING, fault
+from gen_profile.support.errors import NoMotion, SpecError, Suggestion
+from gen_profile.support.phrase import Phrase
 
-WORDS = json.loads((files("gen_profile.studio") / "assets" / "words.json").read_text("utf-8"))
+WORDS = json.loads((files("gen_profile.presentation.studio") / "assets" / "words.json").read_text("utf-8"))
 ENGLISH = re.compile(
     r"\b(the|of|than|and|or|must|be|found|at|is|are|which|only|with|from|to|by|did|state|no|it|that)\b"
 )
@@ -137,6 +137,6 @@ def test_every_word_is_there_in_both_languages():
             shown |= {knob.words, f"group.{knob.group}"} - {"plant", "robustness.uncertain"}
     assert shown - set(WORDS["texts"]) == set()
     assert all(len(texts) == 2 and all(texts) for texts in WORDS["texts"].values())
-    page = (files("gen_profile.studio") / "assets" / "studio.html").read_text("utf-8")
+    page = (files("gen_profile.presentation.studio") / "assets" / "studio.html").read_text("utf-8")
     used = {text.split('"')[0] for key in ('data-text="', 'data-words="') for text in page.split(key)[1:]}
     assert used - set(WORDS["texts"]) == set()

@@ -9,7 +9,7 @@ from time import sleep
 
 import pytest
 
-from gen_profile.studio.workers import BEGUN, ENDED, Job, Workers
+from gen_profile.presentation.studio.workers import BEGUN, ENDED, Job, Workers
 
 HANG = 300.0  # s without any answer
 

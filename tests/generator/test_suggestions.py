@@ -8,18 +8,18 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.errors import InfeasibleProblem, LimitViolation, NoMotion
-from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers import suggestions, transient_sway
-from gen_profile.solvers.direct import relaxation
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.draft import lasting
-from gen_profile.solvers.plan import plan
-from gen_profile.solvers.shortest import timed
-from gen_profile.solvers.solution import Status
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers import suggestions, transient_sway
+from gen_profile.methods.solvers.direct import relaxation
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.draft import lasting
+from gen_profile.methods.solvers.plan import plan
+from gen_profile.methods.solvers.shortest import timed
+from gen_profile.methods.solvers.solution import Status
 from gen_profile.spec.reading import preset_spec
-from gen_profile.work import OutOfWork, budget, spend
+from gen_profile.support.errors import InfeasibleProblem, LimitViolation, NoMotion
+from gen_profile.support.work import OutOfWork, budget, spend
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse")]
 
@@ -373,7 +373,7 @@ def test_redundant_sensitivities_are_left_out_here_too():
 
 def test_a_motion_whose_loads_cannot_be_followed_is_none(monkeypatch):
     monkeypatch.setattr(
-        "gen_profile.solvers.direct.transient_sway.greatest_sway", lambda *_: np.array([np.inf])
+        "gen_profile.methods.solvers.direct.transient_sway.greatest_sway", lambda *_: np.array([np.inf])
     )
     solution = direct.solve(problem_of(preset_spec("paper", ["limits.sway=0.02"])))
     assert solution.optimum is None

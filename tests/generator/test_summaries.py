@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import gen_profile as gp
-from gen_profile.certificate.document import Certificate
-from gen_profile.comparison.robustness import Robustness
-from gen_profile.designs.planner import Deployment
-from gen_profile.identification.identify import Identification
-from gen_profile.identification.measurements import SwingLog
-from gen_profile.proof.verdict import Proof
-from gen_profile.summary import Drawable, Summarised
-from gen_profile.sweep.run import Sweep
+from gen_profile.assurance.certificate.document import Certificate
+from gen_profile.assurance.proof.verdict import Proof
+from gen_profile.delivery.designs.planner import Deployment
+from gen_profile.studies.comparison.robustness import Robustness
+from gen_profile.studies.identification.identify import Identification
+from gen_profile.studies.identification.measurements import SwingLog
+from gen_profile.studies.sweep.run import Sweep
+from gen_profile.support.summary import Drawable, Summarised
 
 PICTURED = {"Spec", "Design", "Plan", "Profile", "Judgement", "Check", "Robustness"}
 LONGEST = 400  # characters, of a line that is still read
@@ -57,7 +57,7 @@ def test_a_picture_is_an_image_of_its_own(results):
 
 
 def test_where_matplotlib_is_missing_the_table_remains(results, monkeypatch):
-    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda _: None)
+    monkeypatch.setattr("gen_profile.support.plugins.find_spec", lambda _: None)
     assert results["Check"]._repr_html_().endswith("</table>")
     with pytest.raises(gp.OutputError, match=r"gen-profile\[data\]"):
         results["Check"].to_pandas()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gen_profile.problem.cost import SwayCost
+from gen_profile.dynamics.problem.cost import SwayCost
 
 COST = SwayCost(beta=3.0, gamma=20.0)
 SWAY = np.array([[0.01, -0.03], [0.0, 0.0], [0.05, 0.02]])

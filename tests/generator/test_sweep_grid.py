@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep.grid import GridAxis, grid_of_values, overrides, parse_grid
+from gen_profile.studies.sweep.grid import GridAxis, grid_of_values, overrides, parse_grid
+from gen_profile.support.errors import SpecError
 
 
 def test_the_last_axis_changes_fastest():

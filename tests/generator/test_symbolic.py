@@ -6,9 +6,9 @@ import casadi
 import numpy as np
 import pytest
 
-from gen_profile.evaluation.simulation import equations_of
+from gen_profile.dynamics.evaluation.simulation import equations_of
+from gen_profile.dynamics.problem.symbolic import Function
 from gen_profile.plants.registry import find_plant, plant_types
-from gen_profile.problem.symbolic import Function
 
 MANY = 500
 x, y = casadi.SX.sym("x", 2), casadi.SX.sym("y", 3)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gen_profile.errors import Code
+from gen_profile.support.errors import Code
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.reading import preset_spec
-from gen_profile.units import AXIS_UNITS, COUNTS, UNITS, axis_factor
+from gen_profile.support.errors import SpecError
+from gen_profile.support.units import AXIS_UNITS, COUNTS, UNITS, axis_factor
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from gen_profile.evaluation.scenarios import scenarios
-from gen_profile.evaluation.simulation import Response
+from gen_profile.assurance.verification.cosimulation import beyond_equations, judge
+from gen_profile.dynamics.evaluation.scenarios import scenarios
+from gen_profile.dynamics.evaluation.simulation import Response
+from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import sample
-from gen_profile.solvers.plan import plan
 from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.cosimulation import beyond_equations, judge
 
 SPEC = preset_spec("paper", ["robustness={}", "cost.sway_weight=0"])
 

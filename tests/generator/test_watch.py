@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from simulated_blocks import DirectLink, Machine, box_of, exported, poked, seen, setting
 
-from gen_profile.deployment.block_state import MOVING, MotionState, read_state
-from gen_profile.deployment.deploy import deploy
-from gen_profile.deployment.simulated_block import SimulatedBlock
-from gen_profile.deployment.table import read_table
-from gen_profile.deployment.watching import watch as watching
-from gen_profile.deployment.watching.motion import MotionJudge
-from gen_profile.errors import CheckFailed, DeploymentError
+from gen_profile.delivery.deployment.block_state import MOVING, MotionState, read_state
+from gen_profile.delivery.deployment.deploy import deploy
+from gen_profile.delivery.deployment.simulated_block import SimulatedBlock
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.delivery.deployment.watching import watch as watching
+from gen_profile.delivery.deployment.watching.motion import MotionJudge
+from gen_profile.support.errors import CheckFailed, DeploymentError
 
 GANTRY = ("export.cycle_time=0.02", "move.duration=8.0")
 

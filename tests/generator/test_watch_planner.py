@@ -8,11 +8,11 @@ from rich.console import Console
 from simulated_blocks import Machine, exported_planner, seen, setting
 
 from gen_profile.cli.deployment.watching import picture, reporting, words
-from gen_profile.deployment.block_state import PlannerState, read_state
-from gen_profile.deployment.simulated_block import SimulatedBlock
-from gen_profile.deployment.table import read_table
-from gen_profile.deployment.watching.watch import watch
-from gen_profile.errors import CheckFailed, DeploymentError
+from gen_profile.delivery.deployment.block_state import PlannerState, read_state
+from gen_profile.delivery.deployment.simulated_block import SimulatedBlock
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.delivery.deployment.watching.watch import watch
+from gen_profile.support.errors import CheckFailed, DeploymentError
 
 pytestmark = pytest.mark.slow
 

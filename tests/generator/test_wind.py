@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.charts.curves import WINDY, wind_lines
-from gen_profile.errors import SpecError
-from gen_profile.evaluation.scenarios import scenarios
-from gen_profile.evaluation.static_deflection import in_wind, static_deflection
+from gen_profile.dynamics.evaluation.scenarios import scenarios
+from gen_profile.dynamics.evaluation.static_deflection import in_wind, static_deflection
+from gen_profile.presentation.charts.curves import WINDY, wind_lines
 from gen_profile.spec.reading import preset_spec, read_spec
+from gen_profile.support.errors import SpecError
 
 FORCE = 300.0
 
@@ -115,6 +115,6 @@ def test_plots_draw_it_on_both_sides():
 def test_where_no_place_is_found_or_a_value_is_not_meant_it_is_refused(monkeypatch):
     with pytest.raises(SpecError, match=r"check\.wind\.force"):
         preset_spec("paper", ["check.wind.force=-1"])
-    monkeypatch.setattr("gen_profile.evaluation.static_deflection.ITERATIONS", 1)
+    monkeypatch.setattr("gen_profile.dynamics.evaluation.static_deflection.ITERATIONS", 1)
     with pytest.raises(SpecError, match=r"check\.wind\.force: 300 N hold the payload nowhere"):
         deflected("double-pendulum-crane")

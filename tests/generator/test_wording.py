@@ -2,7 +2,7 @@
 
 import pytest
 
-from gen_profile.evaluation.phrases import bound, machine, mm, number
+from gen_profile.dynamics.evaluation.phrases import bound, machine, mm, number
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,14 @@ import pytest
 from generator.crane_problems import crane_problem
 from scipy import sparse
 
-from gen_profile.interrupts import interrupts_collected
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct.conic import ConicProgram
-from gen_profile.solvers.direct.set_up import DirectOptions
-from gen_profile.solvers.solution import Status
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.direct.conic import ConicProgram
+from gen_profile.methods.solvers.direct.set_up import DirectOptions
+from gen_profile.methods.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
-from gen_profile.work import OutOfWork, budget, left, spend
+from gen_profile.support.interrupts import interrupts_collected
+from gen_profile.support.work import OutOfWork, budget, left, spend
 
 
 def test_a_budget_within_another_takes_from_both():
@@ -31,7 +31,7 @@ def test_work_without_a_budget_is_free():
 
 def test_the_clock_of_all_threads_ends_what_takes_longer_than_an_answer_may(monkeypatch):
     now = 0.0
-    monkeypatch.setattr("gen_profile.work.time.process_time", lambda: now)
+    monkeypatch.setattr("gen_profile.support.work.time.process_time", lambda: now)
     with budget(2.0, clock=3.0), budget(1.5):
         now = 2.9  # a processor that is slower than usual
         spend(1.0)
@@ -92,7 +92,7 @@ def test_a_program_ends_at_once_when_interrupted(monkeypatch):
             assert self.ended(None)
             return Stopped()
 
-    monkeypatch.setattr("gen_profile.solvers.direct.conic.clarabel.DefaultSolver", Solver)
+    monkeypatch.setattr("gen_profile.methods.solvers.direct.conic.clarabel.DefaultSolver", Solver)
     program = ConicProgram(np.ones(1))
     program.equal(sparse.csc_matrix([[1.0]]), np.ones(1))
     with pytest.raises(KeyboardInterrupt):

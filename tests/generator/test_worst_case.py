@@ -9,14 +9,14 @@ from fmu import absolute_angle_crane as oracle
 from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import least_worst_sway
 
+from gen_profile.dynamics.problem.parameter_box import Start, start, worst_places
+from gen_profile.dynamics.problem.problem import WorstCase, problem_of
+from gen_profile.methods.solvers import method_selection as choice
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.direct import worst_case
+from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.solution import Status
 from gen_profile.motion.metrics import greatest
-from gen_profile.problem.parameter_box import Start, start, worst_places
-from gen_profile.problem.problem import WorstCase, problem_of
-from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct import worst_case
-from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
 

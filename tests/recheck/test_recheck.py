@@ -14,10 +14,10 @@ from certificates import certified, contents
 from flint import arb, arb_poly
 
 import gen_profile as gp
-from gen_profile.certificate.arithmetic.balls import ball
-from gen_profile.certificate.equations import enclosed_equations
-from gen_profile.errors import CertificateError
+from gen_profile.assurance.certificate.arithmetic.balls import ball
+from gen_profile.assurance.certificate.equations import enclosed_equations
 from gen_profile.plants.registry import find_plant
+from gen_profile.support.errors import CertificateError
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 from gen_profile_recheck.__main__ import main

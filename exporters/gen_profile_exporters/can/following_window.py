@@ -5,7 +5,7 @@ count one cycle late, and an answer may come one cycle late. So an axis that is 
 ``v (τ + 2 T)``, and one that runs away or is blocked is further off soon.
 """
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.scaling import Demand, magnitude_counts
 from gen_profile_exporters.exporter import Target
 

@@ -15,8 +15,8 @@ import numpy as np
 from can import Message
 from numpy.typing import NDArray
 
-from gen_profile.errors import ExportError
 from gen_profile.spec.can import CanSpec, CobIdsSpec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.pdos import (
     CONTROLWORD,
     Field,

@@ -22,8 +22,8 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 
-from gen_profile.errors import ExportError
 from gen_profile.spec.can import CanSpec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.cia402 import IP_ENABLE, MODES, Controlword
 
 RPDO1, RPDO2, RPDO3, RPDO4 = RPDOS = (0x200, 0x300, 0x400, 0x500)  # by the COB-ID of node 0

@@ -10,10 +10,10 @@ from fractions import Fraction
 import attrs
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.can import CanSpec
-from gen_profile.units import AxisScale
+from gen_profile.support.errors import ExportError
+from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import pdos
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.pdos import Field

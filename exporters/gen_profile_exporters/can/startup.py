@@ -15,8 +15,8 @@ from math import ceil
 
 import attrs
 
-from gen_profile.errors import ExportError
 from gen_profile.spec.can import CanSpec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MODES
 from gen_profile_exporters.can.following_window import windows

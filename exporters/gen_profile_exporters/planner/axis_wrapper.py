@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import attrs
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import (
     CODESYS,

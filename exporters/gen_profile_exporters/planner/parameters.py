@@ -17,7 +17,7 @@ from math import ceil
 
 import attrs
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import COMMENT, TOKEN, bare
 from gen_profile_exporters.playback.layouts import LAYOUTS
 

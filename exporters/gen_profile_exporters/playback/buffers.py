@@ -26,7 +26,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser, parse_function_block
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.block import fill, layout_of

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback import buffers

@@ -20,9 +20,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
-from gen_profile.units import AxisScale
+from gen_profile.support.errors import ExportError
+from gen_profile.support.units import AxisScale
 from gen_profile_exporters.block_source import BlockSource, initialiser, is_planner, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.machine_variants import AxisVariants

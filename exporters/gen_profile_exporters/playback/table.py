@@ -13,9 +13,9 @@ from math import ceil
 import attrs
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
-from gen_profile.units import COUNTS, AxisScale
+from gen_profile.support.errors import ExportError
+from gen_profile.support.units import COUNTS, AxisScale
 from gen_profile_exporters import setpoints
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.machine_variants import AxisVariants

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_exporters.playback.table import tabulate

@@ -10,8 +10,8 @@ from typing import Any
 import attrs
 from lxml import etree
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_text, replays

@@ -11,9 +11,9 @@ import re
 import numpy as np
 from lxml import etree
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
-from gen_profile.units import COUNTS, AxisScale
+from gen_profile.support.errors import ExportError
+from gen_profile.support.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_name
 from gen_profile_exporters.setpoints import MAX_SAMPLES, axis_table, in_si, sampled

@@ -12,8 +12,8 @@ import re
 import attrs
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, sample
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import (
     BlockSource,
     BlockVariable,

@@ -9,8 +9,8 @@ from uuid import NAMESPACE_URL, uuid5
 
 from lxml import etree
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import TWINCAT

@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 
 
 def parse_xml(content: bytes) -> etree._Element:

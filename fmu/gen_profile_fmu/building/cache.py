@@ -17,10 +17,10 @@ from pathlib import Path
 
 import platformdirs
 
-from gen_profile.artefacts.manifest import sha256
-from gen_profile.errors import CosimulationError
-from gen_profile.private_folder import is_private, make_private, others_may_write, temporary_folder
-from gen_profile.strict_json import parse_json
+from gen_profile.support.artefacts.manifest import sha256
+from gen_profile.support.errors import CosimulationError
+from gen_profile.support.private_folder import is_private, make_private, others_may_write, temporary_folder
+from gen_profile.support.strict_json import parse_json
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"

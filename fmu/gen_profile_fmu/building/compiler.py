@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 
 import attrs
 
-from gen_profile.errors import CosimulationError
-from gen_profile.private_folder import temporary_folder
+from gen_profile.support.errors import CosimulationError
+from gen_profile.support.private_folder import temporary_folder
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CC"

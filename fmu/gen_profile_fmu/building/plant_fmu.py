@@ -7,7 +7,7 @@ import attrs
 import fmpy
 
 from gen_profile.plants.plant import Plant
-from gen_profile.progress import Progress, no_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.building.build import compile_texts, sources_key
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import Compiler, find_compiler

@@ -5,7 +5,7 @@ from platform import machine
 
 import attrs
 
-from gen_profile.errors import CosimulationError
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.description.fmu_files import Version
 
 _PROCESSORS = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "arm64", "aarch64": "arm64"}

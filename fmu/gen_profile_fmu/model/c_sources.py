@@ -7,10 +7,10 @@ from string import Template
 
 import numpy as np
 
+from gen_profile.dynamics.problem import symbolic as sym
+from gen_profile.dynamics.problem.dynamics import Dynamics
+from gen_profile.dynamics.problem.symbolic import Function
 from gen_profile.motion.profile import Profile
-from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import Dynamics
-from gen_profile.problem.symbolic import Function
 from gen_profile_fmu.model.variables import DERIVATIVES, STATES, FmuVariable, Kind, Type, VariableTable
 
 _FOLDER = Path(__file__).parents[1] / "c"

@@ -5,9 +5,9 @@ from functools import partial
 
 import attrs
 
+from gen_profile.dynamics.problem.dynamics import Dynamics, dynamics
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate
-from gen_profile.problem.dynamics import Dynamics, dynamics
 from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.model.c_sources import equations_source, model_sources, motion_table, variables_header
 from gen_profile_fmu.model.dependencies import Structure, plant_structure, profile_structure

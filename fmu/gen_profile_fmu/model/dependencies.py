@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 
 import attrs
 
-from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import Dynamics
+from gen_profile.dynamics.problem import symbolic as sym
+from gen_profile.dynamics.problem.dynamics import Dynamics
 from gen_profile_fmu.model.variables import OBSERVED, Kind, VariableTable
 
 Dependencies = dict[int, list[int]]

@@ -9,7 +9,7 @@ from string import Template
 
 import numpy as np
 
-from gen_profile.evaluation.simulation import PlantSimulation
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile_exporters.text_parts import text_parts

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_profile.evaluation.simulation import AT_REST, PlantSimulation
+from gen_profile.dynamics.evaluation.simulation import AT_REST, PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Plant
 from gen_profile_fmu.model.variables import variable_name

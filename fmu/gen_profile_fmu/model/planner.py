@@ -6,7 +6,7 @@ from functools import cached_property, partial
 
 import attrs
 
-from gen_profile.problem.dynamics import dynamics
+from gen_profile.dynamics.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.planner.axis_declarations import GIVEN, PLACE, TAKEN
 from gen_profile_exporters.planner.sensor_constants import INPUTS, OUTPUTS

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import attrs
 
-from gen_profile.errors import CosimulationError
+from gen_profile.support.errors import CosimulationError
 
 DERIVATIVES = "DERIVATIVES"
 # blocks of the continuous states, in the order of their derivatives

@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.running.instances import compiled_loops, doubles, instance, unsigned
 

@@ -9,11 +9,11 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2True
 
-from gen_profile.errors import CosimulationError
-from gen_profile.evaluation.simulation import AT_REST, Response
+from gen_profile.dynamics.evaluation.simulation import AT_REST, Response
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.plants.plant import Plant
-from gen_profile.progress import Progress, no_progress
+from gen_profile.support.errors import CosimulationError
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.instances import Instance, compiled_loops, doubles, instance, unsigned

@@ -15,8 +15,8 @@ from fmpy import instantiate_fmu, platform, platform_tuple, read_model_descripti
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2OK
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.running.safe_archive import unpack
 
 LONGEST_MESSAGE = 300  # characters, of what an external FMU says

@@ -11,8 +11,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import CosimulationError
 
 
 @attrs.frozen(kw_only=True, eq=False)

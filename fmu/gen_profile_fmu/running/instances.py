@@ -21,8 +21,8 @@ from fmpy.fmi2 import (
     fmi2OK,
 )
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import ENVIRONMENT_VARIABLE, cached
 from gen_profile_fmu.building.compiler import find_compiler

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.running.instances import CalledFmu, Instance, compiled_loops, doubles, instance, unsigned
 

@@ -6,7 +6,7 @@ import zipfile
 import zlib
 from pathlib import Path, PurePosixPath
 
-from gen_profile.errors import CosimulationError
+from gen_profile.support.errors import CosimulationError
 
 LARGEST = 1 << 30  # bytes, of all files unpacked
 MOST_FILES = 10_000

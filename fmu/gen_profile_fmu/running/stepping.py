@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_profile.evaluation.simulation import Response
+from gen_profile.dynamics.evaluation.simulation import Response
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.plants.plant import Plant
-from gen_profile.progress import Progress, no_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.cosimulation import PlantCosimulation, Steps
 

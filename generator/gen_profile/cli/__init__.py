@@ -2,7 +2,7 @@
 
 import sys
 
-from gen_profile.interrupts import interrupts_collected
+from gen_profile.support.interrupts import interrupts_collected
 
 __all__ = ["main"]
 

@@ -11,7 +11,7 @@ from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import option
 from gen_profile.cli.outcome import print_outcome
-from gen_profile.errors import SpecError
+from gen_profile.support.errors import SpecError
 
 if TYPE_CHECKING:
     from gen_profile_exporters.can.host.detection import Channel
@@ -59,7 +59,7 @@ def list_(interface: str | None, channel: str | None, bitrate: int) -> None:
 
 
 def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:
-    from gen_profile.plugins import require_installed
+    from gen_profile.support.plugins import require_installed
 
     require_installed("Streaming needs canopen", "can", "canopen")
     from gen_profile_exporters.can.host.clock import SystemClock

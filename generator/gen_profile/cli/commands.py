@@ -15,16 +15,16 @@ from gen_profile.cli.options import Count, InputFile, Number, OutputFile, PathTy
 from gen_profile.cli.outcome import fail, leave_unproved, not_written, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.cli.signing import require_signature, sign, signed_by_option, signing_key, signing_option
-from gen_profile.errors import CertificateError, OutputError, SpecError
-from gen_profile.suggestion import suggestion
+from gen_profile.support.errors import CertificateError, OutputError, SpecError
+from gen_profile.support.suggestion import suggestion
 
 if TYPE_CHECKING:
-    from gen_profile.certificate.document import Certificate
-    from gen_profile.designs.design import Design
+    from gen_profile.assurance.certificate.document import Certificate
+    from gen_profile.assurance.proof.check import BlockJudgement
+    from gen_profile.assurance.verification.check import Judgement
+    from gen_profile.delivery.designs.design import Design
     from gen_profile.plants.plant import Plant
-    from gen_profile.proof.check import BlockJudgement
     from gen_profile.spec.model import Spec
-    from gen_profile.verification.check import Judgement
 
 
 @click.group(cls=DefaultGroup, epilog="Example: gen-profile crane.toml --export plc --out deploy")
@@ -73,7 +73,7 @@ def design(
     options.require_formats(formats)
     key = signing_key(key_path)
     from gen_profile.cli import words
-    from gen_profile.designs.design import design as run
+    from gen_profile.delivery.designs.design import design as run
 
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
@@ -120,7 +120,7 @@ def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | N
     """Compare optimal profiles with shapers."""
     spec = chosen.changed({"solver.base": base}).spec()
     from gen_profile.cli import words
-    from gen_profile.comparison.compare import compare as run
+    from gen_profile.studies.comparison.compare import compare as run
 
     with progress() as tell:
         comparison = run(spec, tell)
@@ -155,9 +155,9 @@ def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | N
 def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, **given: Any) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     spec = chosen.spec()
-    from gen_profile.artefacts.writing import deliver
     from gen_profile.cli import words
-    from gen_profile.comparison.robustness import robustness as run
+    from gen_profile.studies.comparison.robustness import robustness as run
+    from gen_profile.support.artefacts.writing import deliver
 
     with progress() as tell:
         curves = run(spec, **given, progress=tell)
@@ -196,8 +196,8 @@ def check(artefact: Path, chosen: SpecChoice, *, public_path: Path | None, **giv
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
     require_signature(artefact, public_path)
     spec = chosen.spec() if chosen.stated else None
+    from gen_profile.assurance.proof.check import is_planner_block
     from gen_profile.cli import words
-    from gen_profile.proof.check import is_planner_block
 
     judgement: Judgement | BlockJudgement
     unproved: Sequence[str] = ()
@@ -244,8 +244,8 @@ def _require_only(given: Mapping[str, Any], known: Sequence[str], other: str) ->
 def _check_motion(
     artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **given: Any
 ) -> Judgement:
-    from gen_profile.artefacts.writing import deliver
-    from gen_profile.verification.check import check_artefact, scenario_table
+    from gen_profile.assurance.verification.check import check_artefact, scenario_table
+    from gen_profile.support.artefacts.writing import deliver
 
     with progress() as tell:
         tell("checking by co-simulation")
@@ -256,14 +256,14 @@ def _check_motion(
 
 
 def _certified(path: Path, spec: Spec | None) -> Certificate:
-    from gen_profile.certificate.from_file import certify_artefact
+    from gen_profile.assurance.certificate.from_file import certify_artefact
 
     with progress() as tell:
         return certify_artefact(path, spec, progress=partial(tell, "proving it for boxes of machines"))
 
 
 def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path) -> None:
-    from gen_profile.certificate.from_file import check_certificate
+    from gen_profile.assurance.certificate.from_file import check_certificate
     from gen_profile.cli import words
 
     with progress() as tell:
@@ -273,12 +273,12 @@ def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path) -> None:
 
 
 def _check_block(artefact: Path, spec: Spec | None, *, picture: Path | None, **given: Any) -> BlockJudgement:
-    from gen_profile.proof.check import check_block
+    from gen_profile.assurance.proof.check import check_block
 
     with progress() as tell:
         judgement = check_block(artefact, spec, **given, progress=tell)
         if picture is not None:
-            from gen_profile.charts.proof import draw
+            from gen_profile.presentation.charts.proof import draw
 
             draw(judgement.spec, judgement.text, judgement.check, picture, tell)
     return judgement
@@ -311,7 +311,7 @@ def plants(name: str | None, picture: Path | None) -> None:
         hint = suggestion(str(name), plant_types())
         raise SpecError(f"plants {str(name)[:60]}: unknown machine{hint}") from error
     if picture is not None:
-        from gen_profile.charts.machine import draw_machine
+        from gen_profile.presentation.charts.machine import draw_machine
 
         (plant,) = known
         draw_machine(plant, plant.nominal(), picture, f"{plant.type}: {plant.summary}")
@@ -364,7 +364,7 @@ def presets(name: str | None, path: Path | None) -> None:
     if path is not None:
         from shlex import quote
 
-        from gen_profile.artefacts.writing import deliver
+        from gen_profile.support.artefacts.writing import deliver
 
         if path.exists():
             raise OutputError(f"Cannot write {path}: it exists already; choose another name.")

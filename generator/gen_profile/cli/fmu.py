@@ -9,7 +9,7 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import OutputFile, SpecChoice, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
-from gen_profile.errors import SpecError
+from gen_profile.support.errors import SpecError
 
 # spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
 KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
@@ -50,7 +50,7 @@ def fmu(
     if source_only and platform is not None:
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
     spec = chosen.spec()
-    from gen_profile.designs.fmu import export_fmu, platform_names
+    from gen_profile.delivery.designs.fmu import export_fmu, platform_names
     from gen_profile_fmu.model.contents import AUTHOR
 
     platforms = () if source_only else platform_names(platform or "host")

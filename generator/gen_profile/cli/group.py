@@ -6,8 +6,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from gen_profile.errors import SpecError
-from gen_profile.suggestion import suggestion
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import suggestion
 
 
 class DefaultGroup(click.Group):

@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from gen_profile.cli.outcome import print_warnings
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.support.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
     from gen_profile.spec.model import Spec
@@ -36,7 +36,7 @@ class Number(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Take the number."""
-        from gen_profile.suggestion import number_meant
+        from gen_profile.support.suggestion import number_meant
 
         try:
             float(value)
@@ -84,7 +84,7 @@ class OutputFile(InputFile):
         OutputError
             Its folder is not there, or it cannot be written.
         """
-        from gen_profile.artefacts.writing import require_place
+        from gen_profile.support.artefacts.writing import require_place
 
         path = cast("Path", super().convert(value, param, ctx))
         if ctx is not None and ctx.resilient_parsing:  # of a line that is still being typed
@@ -107,7 +107,7 @@ class PictureFile(OutputFile):
         OutputError
             As of `OutputFile`; or Matplotlib is not installed, or the suffix is none of a picture.
         """
-        from gen_profile.charts.picture import require_drawable
+        from gen_profile.presentation.charts.picture import require_drawable
 
         path = super().convert(value, param, ctx)
         if ctx is None or not ctx.resilient_parsing:

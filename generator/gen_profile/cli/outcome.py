@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from gen_profile.errors import CertificateError, CheckFailed, GenProfileError, NoMotion, OutputError
+from gen_profile.support.errors import CertificateError, CheckFailed, GenProfileError, NoMotion, OutputError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gen_profile.proof.verdict import Proof
-    from gen_profile.verification.verdict import Check
+    from gen_profile.assurance.proof.verdict import Proof
+    from gen_profile.assurance.verification.verdict import Check
 
 INTERRUPTED = 128 + signal.SIGINT  # as shells count it
 
@@ -74,7 +74,7 @@ def print_warnings(sentences: Iterable[str]) -> None:
 
 def not_written(folder: Path) -> str:
     """Say that nothing was delivered to a folder now."""
-    from gen_profile.artefacts.manifest import FILENAME
+    from gen_profile.support.artefacts.manifest import FILENAME
 
     before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
     return f"Nothing was written{before}."

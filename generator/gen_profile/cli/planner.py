@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from gen_profile.bounded_file import DOCUMENT
 from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
@@ -19,11 +18,12 @@ from gen_profile.cli.options import InputFile, OutputFile, PathType, SpecChoice,
 from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, signing_key, signing_option
-from gen_profile.errors import SpecError, StreamAborted
-from gen_profile.progress import Progress
+from gen_profile.support.bounded_file import DOCUMENT
+from gen_profile.support.errors import SpecError, StreamAborted
+from gen_profile.support.progress import Progress
 
 if TYPE_CHECKING:
-    from gen_profile.streaming.outcome import Source
+    from gen_profile.delivery.streaming.outcome import Source
 
 CLEARED = "\r\x1b[K"  # the line, of a terminal
 
@@ -70,10 +70,10 @@ def write(
     spec = chosen.spec()
     if picture is not None and no_check:
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
+    from gen_profile.assurance.proof.prove import HISTORIES
     from gen_profile.cli import words
-    from gen_profile.designs.planner import deploy_planner
+    from gen_profile.delivery.designs.planner import deploy_planner
     from gen_profile.planner.forms import require_forms
-    from gen_profile.proof.prove import HISTORIES
 
     require_forms(formats)
     key = signing_key(key_path)
@@ -88,7 +88,7 @@ def write(
             **given,
         )
         if picture is not None and outcome.proof is not None:
-            from gen_profile.charts.proof import draw
+            from gen_profile.presentation.charts.proof import draw
 
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
     if outcome.proof is None or outcome.proof.passed:
@@ -135,11 +135,11 @@ def play(
     block: Path, commands_path: Path, path: Path, events_path: Path | None, sensor_path: Path | None
 ) -> None:
     """Execute a written planner block under a table of commands."""
-    from gen_profile.artefacts.writing import deliver
     from gen_profile.planner.commands import play as run
     from gen_profile.planner.events import error_words
     from gen_profile.planner.forms import read_block
     from gen_profile.planner.interface import LOST
+    from gen_profile.support.artefacts.writing import deliver
 
     content, commands = read_block(block), _read(commands_path)
     with progress() as tell:
@@ -182,7 +182,7 @@ def explain(events: Path) -> None:
 
 
 def _read(path: Path, what: str = "commands") -> str:
-    from gen_profile.artefacts.reading import decoded, read_artefact
+    from gen_profile.support.artefacts.reading import decoded, read_artefact
 
     return decoded(read_artefact(path, DOCUMENT, f"the {what} "), path, f"the {what} ")
 
@@ -211,16 +211,16 @@ def planned(
     Raises
     ------
     GenProfileError
-        As `gen_profile.streaming.stream.verified_block` and
-        `gen_profile.streaming.planned_motion.PlannedMotion`; or there is no terminal.
+        As `gen_profile.delivery.streaming.stream.verified_block` and
+        `gen_profile.delivery.streaming.planned_motion.PlannedMotion`; or there is no terminal.
     """
+    from gen_profile.delivery.streaming.keyboard import Keyboard
+    from gen_profile.delivery.streaming.outcome import Source
+    from gen_profile.delivery.streaming.planned_motion import CommandList, Operator, PlannedMotion
+    from gen_profile.delivery.streaming.stream import verified_block
     from gen_profile.planner.commands import read_commands
     from gen_profile.planner.interface import live_inputs
     from gen_profile.planner.machine import planned_axes
-    from gen_profile.streaming.keyboard import Keyboard
-    from gen_profile.streaming.outcome import Source
-    from gen_profile.streaming.planned_motion import CommandList, Operator, PlannedMotion
-    from gen_profile.streaming.stream import verified_block
 
     operator: Operator
     if commands_path is None and not sys.stderr.isatty():
@@ -255,7 +255,7 @@ def status_line() -> Iterator[Progress]:
 
 
 def _numbers(live_parameters: tuple[str, ...]) -> dict[str, float]:
-    from gen_profile.suggestion import number_meant
+    from gen_profile.support.suggestion import number_meant
 
     numbers = {}
     for text in live_parameters:

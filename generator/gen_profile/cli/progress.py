@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_profile.progress import Progress
+from gen_profile.support.progress import Progress
 
 if TYPE_CHECKING:
-    from gen_profile.charts.plot import Drawn
+    from gen_profile.presentation.charts.plot import Drawn
 
 FIRST_LINE, LONGEST_PAUSE = 2.0, 30.0  # s after which a log hears of work again, and at the longest
 REFRESH = 4.0  # times a second, on a terminal
@@ -55,7 +55,7 @@ class _Step:
 def draw(result: Drawn, picture: Path | None, tell: Progress, **options: bool) -> None:
     """Draw a result in a file, where one is named; options are those of `plot`."""
     if picture is not None:
-        from gen_profile.charts.plot import plot
+        from gen_profile.presentation.charts.plot import plot
 
         tell("drawing")
         plot(result, picture, **options)

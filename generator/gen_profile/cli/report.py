@@ -14,7 +14,7 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import Number, OutputFile, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, print_outcome
 from gen_profile.cli.progress import progress
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.support.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
     from gen_profile.spec.model import Spec
@@ -62,8 +62,8 @@ def report(
     **log: Any,
 ) -> None:
     """Write everything about a design, or about a planner block and its proof, into one HTML file."""
-    from gen_profile.artefacts.writing import deliver, require_place
-    from gen_profile.report.print import printed, require_browser
+    from gen_profile.presentation.report.print import printed, require_browser
+    from gen_profile.support.artefacts.writing import deliver, require_place
 
     given = {**log, "compared": not no_compare}
     if chosen.path is not None and _holds_block(chosen.path):
@@ -100,7 +100,7 @@ _Subject = tuple[str, Callable[..., Any], Callable[[Any, Path], str]]
 
 def _of_design(spec: Spec, formats: tuple[str, ...], **given: Any) -> _Subject:
     from gen_profile.cli import words
-    from gen_profile.report.build import report as run
+    from gen_profile.presentation.report.build import report as run
 
     return spec.name, partial(run, spec, formats, **given), words.report
 
@@ -108,7 +108,7 @@ def _of_design(spec: Spec, formats: tuple[str, ...], **given: Any) -> _Subject:
 def _of_block(path: Path) -> _Subject:
     """Refuse what only a design has, and make a report of a planner block."""
     from gen_profile.cli import words
-    from gen_profile.report.planner import planner_report
+    from gen_profile.presentation.report.planner import planner_report
 
     taken = {"spec_path", "path", "fields", "as_json", "debug"}
     for parameter in click.get_current_context().command.params:
@@ -120,7 +120,7 @@ def _of_block(path: Path) -> _Subject:
 def _of_artefact(path: Path, **given: Any) -> _Subject:
     """Make a report of the design that a file comes from."""
     from gen_profile.cli import words
-    from gen_profile.report.build import artefact_report
+    from gen_profile.presentation.report.build import artefact_report
 
     for name, flag in {"preset": "--preset", "overrides": "--set", "formats": "--export"}.items():
         if _given(name):
@@ -135,7 +135,7 @@ def _given(name: str | None) -> bool:
 
 def _is_artefact(path: Path) -> bool:
     """Tell specs from exported files by their suffix; refuse those that only go with one."""
-    from gen_profile.artefacts.reading import read_motion
+    from gen_profile.support.artefacts.reading import read_motion
     from gen_profile_exporters.registry import formats
 
     if path.suffix.lower() == ".toml" or not (path.is_file() or path.is_dir()):
@@ -146,6 +146,6 @@ def _is_artefact(path: Path) -> bool:
 
 def _holds_block(path: Path) -> bool:
     """Tell specs from planner blocks; what cannot be read is taken for a spec, whose reader says so."""
-    from gen_profile.proof.check import is_planner_block
+    from gen_profile.assurance.proof.check import is_planner_block
 
     return path.suffix.lower() != ".toml" and path.is_file() and is_planner_block(path)

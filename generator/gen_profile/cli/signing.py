@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.options import InputFile, option
-from gen_profile.plugins import require_installed
+from gen_profile.support.plugins import require_installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gen_profile.artefacts.signature import Key
+    from gen_profile.support.artefacts.signature import Key
 
 signed_by_option = option(
     "--signed-by", "Refuse what this public key has not signed.", InputFile(), into="public_path"
@@ -34,7 +34,7 @@ def signing_key(path: Path | None) -> Key | None:
     if path is None:
         return None
     require_installed("Signatures need the package cryptography", "sign", "cryptography")
-    from gen_profile.artefacts.signature import secret_key
+    from gen_profile.support.artefacts.signature import secret_key
 
     return secret_key(path)
 
@@ -42,7 +42,7 @@ def signing_key(path: Path | None) -> Key | None:
 def sign(folder: Path, key: Key | None) -> None:
     """Sign what was delivered, and say so."""
     if key is not None:
-        from gen_profile.artefacts.signature import sign_manifest
+        from gen_profile.support.artefacts.signature import sign_manifest
 
         click.echo(f"Signed by {key.identity}: {sign_manifest(folder, key)}", err=True)
 
@@ -51,7 +51,7 @@ def require_signature(artefact: Path, public_path: Path | None) -> None:
     """Refuse an artefact that no manifest vouches for which the key has signed."""
     if public_path is not None:
         require_installed("Signatures need the package cryptography", "sign", "cryptography")
-        from gen_profile.artefacts.signature import public_key, require_signed
+        from gen_profile.support.artefacts.signature import public_key, require_signed
 
         key = public_key(public_path)
         require_signed(artefact, key)

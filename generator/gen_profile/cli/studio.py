@@ -14,12 +14,12 @@ from gen_profile.cli.deployment.access import controller_options
 from gen_profile.cli.options import Count, PathType, option
 from gen_profile.cli.outcome import as_json
 from gen_profile.cli.progress import progress
-from gen_profile.errors import SpecError
-from gen_profile.plugins import require_installed
+from gen_profile.support.errors import SpecError
+from gen_profile.support.plugins import require_installed
 
 if TYPE_CHECKING:
     from gen_profile.cli.options import SpecChoice
-    from gen_profile.studio.watching import Watching
+    from gen_profile.presentation.studio.watching import Watching
 
 
 @cli.command(epilog="Example: gen-profile studio bay-3.toml")
@@ -39,7 +39,7 @@ def studio(
 ) -> None:
     """Turn every knob of a spec in the browser, and see the swing at once."""
     require_installed("gen-profile studio needs Tornado", "studio", "tornado")
-    from gen_profile.studio.state import changed_start
+    from gen_profile.presentation.studio.state import changed_start
 
     if (artefact is None) != (controller["url"] is None):
         raise SpecError("--watch, --to: go together: name the file, and the controller that uses its table.")
@@ -50,7 +50,7 @@ def studio(
         chosen.spec()
     import asyncio
 
-    from gen_profile.studio.server import serve
+    from gen_profile.presentation.studio.server import serve
 
     def ready(address: str, code: str) -> None:
         if as_json():
@@ -76,7 +76,7 @@ def studio(
 def _watching(artefact: Path, controller: dict[str, Any], stack: ExitStack) -> Watching:
     """Watch a controller until the context ends."""
     from gen_profile.cli.deployment.commands import verified
-    from gen_profile.studio.watching import Watching
+    from gen_profile.presentation.studio.watching import Watching
 
     with progress() as tell:
         table, link = verified(artefact, controller, stack, tell)

@@ -50,9 +50,9 @@ def sweep(
     Cases that fail are rows of the table with their reason; the exit code is 0 once all are done.
     """
     from gen_profile.cli import words
-    from gen_profile.sweep.grid import parse_grid
-    from gen_profile.sweep.run import prepare
-    from gen_profile.sweep.run import sweep as run
+    from gen_profile.studies.sweep.grid import parse_grid
+    from gen_profile.studies.sweep.run import prepare
+    from gen_profile.studies.sweep.run import sweep as run
 
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers is for processes of this computer; a scheduler has its own.")
@@ -82,7 +82,7 @@ def lookup(words: tuple[str, ...], out: Path | None) -> None:
     away is no answer. Safe is what, played on the machine asked for, keeps the limits of the check.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.sweep.lookup import lookup as run
+    from gen_profile.studies.sweep.lookup import lookup as run
 
     folder, asked = _folder_and_values(words)
     with progress() as tell:
@@ -106,7 +106,7 @@ def library(folder: Path, path: Path) -> None:
     An input of the block selects the profile.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.sweep.library import write_library
+    from gen_profile.studies.sweep.library import write_library
 
     with progress() as tell:
         written = write_library(folder, path, tell)

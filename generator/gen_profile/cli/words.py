@@ -13,28 +13,28 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from gen_profile.certificate.document import certificate_path
-from gen_profile.evaluation.phrases import MANIFEST_WORDS, UNPROMISED, companions, mm, named, number
-from gen_profile.units import RATES
+from gen_profile.assurance.certificate.document import certificate_path
+from gen_profile.dynamics.evaluation.phrases import MANIFEST_WORDS, UNPROMISED, companions, mm, named, number
+from gen_profile.support.units import RATES
 
 if TYPE_CHECKING:
-    from gen_profile.certificate.document import Certificate
-    from gen_profile.comparison.compare import Comparison
-    from gen_profile.comparison.robustness import Robustness
-    from gen_profile.designs.design import Design
-    from gen_profile.designs.planner import Deployment
-    from gen_profile.identification.identify import Identification
-    from gen_profile.identification.learning import Learning
-    from gen_profile.proof.check import BlockJudgement
-    from gen_profile.proof.verdict import JudgedHistory, Proof
-    from gen_profile.report.build import Report
-    from gen_profile.report.planner import PlannerReport
+    from gen_profile.assurance.certificate.document import Certificate
+    from gen_profile.assurance.proof.check import BlockJudgement
+    from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
+    from gen_profile.assurance.verification.check import JudgedFile, Judgement
+    from gen_profile.assurance.verification.verdict import Check
+    from gen_profile.delivery.designs.design import Design
+    from gen_profile.delivery.designs.planner import Deployment
+    from gen_profile.presentation.report.build import Report
+    from gen_profile.presentation.report.planner import PlannerReport
     from gen_profile.spec.model import Spec
-    from gen_profile.sweep.library import Library
-    from gen_profile.sweep.lookup import LookupResult
-    from gen_profile.sweep.run import Sweep
-    from gen_profile.verification.check import JudgedFile, Judgement
-    from gen_profile.verification.verdict import Check
+    from gen_profile.studies.comparison.compare import Comparison
+    from gen_profile.studies.comparison.robustness import Robustness
+    from gen_profile.studies.identification.identify import Identification
+    from gen_profile.studies.identification.learning import Learning
+    from gen_profile.studies.sweep.library import Library
+    from gen_profile.studies.sweep.lookup import LookupResult
+    from gen_profile.studies.sweep.run import Sweep
 
 
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
@@ -393,7 +393,7 @@ def _move(spec: Spec) -> str:
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:
-    from gen_profile.evaluation.demands import demands
+    from gen_profile.dynamics.evaluation.demands import demands
 
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
     peaks: dict[str, list[str]] = {}

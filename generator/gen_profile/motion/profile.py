@@ -15,9 +15,9 @@ from attrs.converters import optional
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
-from gen_profile.errors import GenProfileError, SpecError
-from gen_profile.suggestion import found
-from gen_profile.summary import Drawable, Sampled, Summarised, Tabled
+from gen_profile.support.errors import GenProfileError, SpecError
+from gen_profile.support.suggestion import found
+from gen_profile.support.summary import Drawable, Sampled, Summarised, Tabled
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from itertools import chain
 import attrs
 import numpy as np
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.events import COLUMNS, events_of, require_events
 from gen_profile.planner.execution import BlockInstance, block_inputs
 from gen_profile.planner.interface import SENSED, BlockAxis, block_axes, live_inputs, sensed_axes
 from gen_profile.planner.sensor_log import SensorLog, read_rows, read_sensor_log
-from gen_profile.suggestion import number_meant
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import number_meant
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")
 FIRST = ("time_s", "command")

@@ -7,10 +7,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
-from gen_profile.one_thread import one_thread
-from gen_profile.phrase import Phrase, placed
 from gen_profile.planner.chebyshev import same_terms
 from gen_profile.planner.machine import (
     LiveModes,
@@ -25,7 +22,10 @@ from gen_profile.planner.machine import (
 )
 from gen_profile.planner.sensor import between, damping_room, sensor_constants
 from gen_profile.spec.model import Spec
-from gen_profile.units import RATES
+from gen_profile.support.errors import SpecError
+from gen_profile.support.one_thread import one_thread
+from gen_profile.support.phrase import Phrase, placed
+from gen_profile.support.units import RATES
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, block_text
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.sensor_log import read_rows
-from gen_profile.suggestion import number_meant
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import number_meant
 
 KEPT = 16
 MOST = 1e9  # s, and of a code: no block's counts so far

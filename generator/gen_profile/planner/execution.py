@@ -13,10 +13,10 @@ import attrs
 import fmpy
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import ISSUED, STATES, BlockAxis, block_axes
-from gen_profile.strict_json import parse_json
+from gen_profile.support.errors import ExportError
+from gen_profile.support.strict_json import parse_json
 from gen_profile_exporters import st_to_c, st_variables, text_parts
 from gen_profile_exporters.st_to_c import FAULTS, Translation, translate
 from gen_profile_exporters.st_variables import StVariable

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import attrs
 
-from gen_profile.artefacts.reading import decoded, read_artefact, refusal
-from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
-from gen_profile.suggestion import suggestion
+from gen_profile.support.artefacts.reading import decoded, read_artefact, refusal
+from gen_profile.support.errors import ExportError, SpecError
+from gen_profile.support.suggestion import suggestion
 from gen_profile_exporters.block_source import is_planner, parse_function_block
 from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.planner.axis_wrapper import planner_wrappers

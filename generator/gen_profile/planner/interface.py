@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import attrs
 
-from gen_profile.errors import ExportError, SpecError
+from gen_profile.support.errors import ExportError, SpecError
 
 COMMON = ("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "rOverride", "fCycleTime")
 OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of each axis

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import attrs
 import numpy as np
 
-from gen_profile.errors import SpecError
+from gen_profile.dynamics.problem.linearization import Linearization, linearize
 from gen_profile.motion.profile import Array
 from gen_profile.planner.chebyshev import Interpolant, bend, interpolate
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.problem.linearization import Linearization, linearize
 from gen_profile.spec.model import Spec
+from gen_profile.support.errors import SpecError
 
 MOST_MODES = 3
 SYMMETRIC = 2  # modes whose frequencies come from sum and product of their squares

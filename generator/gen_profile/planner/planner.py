@@ -9,7 +9,6 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
@@ -17,8 +16,9 @@ from gen_profile.planner.forms import read_block
 from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs, sensed_axes
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_numbers, as_spec, as_values
-from gen_profile.suggestion import found, suggestion
-from gen_profile.summary import Sampled, Summarised
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import found, suggestion
+from gen_profile.support.summary import Sampled, Summarised
 
 PLACE = "fActPosition"
 OWN = {  # of each axis

@@ -12,7 +12,6 @@ import attrs
 import numpy as np
 from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.chebyshev import Interpolant, interpolate
 from gen_profile.planner.machine import (
@@ -28,6 +27,7 @@ from gen_profile.planner.machine import (
 )
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
+from gen_profile.support.errors import SpecError
 from gen_profile_exporters.planner.block import KERNEL_SLOTS, SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.sensor_constants import (
     MEMORY,

@@ -9,9 +9,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import SENSOR, BlockAxis
+from gen_profile.support.errors import SpecError
 
 TIME, VALUE = "time_s", "value"
 Row = Mapping[str, Any]

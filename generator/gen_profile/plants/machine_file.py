@@ -11,11 +11,11 @@ from types import ModuleType
 
 import attrs
 
-from gen_profile.bounded_file import DOCUMENT, read_bounded
-from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.soundness import faults_of
-from gen_profile.suggestion import found
+from gen_profile.support.bounded_file import DOCUMENT, read_bounded
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import found
 
 
 @attrs.frozen(kw_only=True)

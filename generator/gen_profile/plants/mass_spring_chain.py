@@ -15,7 +15,6 @@ from functools import cache
 from itertools import pairwise
 from types import SimpleNamespace
 
-from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import (
     Coordinate,
     Equations,
@@ -26,6 +25,7 @@ from gen_profile.plants.plant import (
     Scalar,
     Vector,
 )
+from gen_profile.support.phrase import Phrase
 
 LARGEST = 24
 

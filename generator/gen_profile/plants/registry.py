@@ -8,10 +8,10 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, cast
 
-from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.soundness import faults_of
-from gen_profile.plugins import CURE, load_plugin
+from gen_profile.support.errors import SpecError
+from gen_profile.support.plugins import CURE, load_plugin
 
 # a machine's module is named after its type, and loads only when it is asked for
 BUILT_IN = (

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from gen_profile.bounded_file import read_bounded
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import ExternalFmu
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
 from gen_profile.spec.values import Pattern, Words
+from gen_profile.support.bounded_file import read_bounded
 
 KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "time_limit")
 INPUTS = ("acceleration", "velocity", "setpoint")

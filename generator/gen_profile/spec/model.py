@@ -43,8 +43,8 @@ from gen_profile.spec.values import (
     Words,
     example,
 )
-from gen_profile.summary import Drawable
-from gen_profile.units import AxisScale, axis_factor
+from gen_profile.support.summary import Drawable
+from gen_profile.support.units import AxisScale, axis_factor
 
 DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move

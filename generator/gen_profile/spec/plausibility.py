@@ -12,12 +12,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array
-from gen_profile.phrase import Phrase, placed
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import RESIDUAL_SHARE, Spec
-from gen_profile.units import RATES
+from gen_profile.support.errors import SpecError
+from gen_profile.support.phrase import Phrase, placed
+from gen_profile.support.units import RATES
 
 STEP = 1e-6  # m (or rad), for differences of forces and outputs about rest
 # (unit of the axis, what) → beyond which it is implausible, and impossible
@@ -92,7 +92,7 @@ def _implausibilities(spec: Spec) -> Iterator[Implausibility]:
 
 
 def _odd(place: str, problem: str, /, *, refused: bool = False, **values: Any) -> Implausibility:
-    """Question the value at a place; the problem is a template, as `gen_profile.phrase.Phrase` takes them."""
+    """Question the value at a place; the problem is a template of `gen_profile.support.phrase.Phrase`."""
     return placed(place, Phrase(problem, **values)), refused
 
 

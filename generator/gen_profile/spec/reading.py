@@ -10,12 +10,12 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gen_profile.bounded_file import DOCUMENT, is_folder, read_bounded
-from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.spec.tables import Table, structure
-from gen_profile.suggestion import found, listed, meant, number_meant, suggestion
+from gen_profile.support.bounded_file import DOCUMENT, is_folder, read_bounded
+from gen_profile.support.errors import OutputError, SpecError
+from gen_profile.support.suggestion import found, listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
 Given = TypeVar("Given")

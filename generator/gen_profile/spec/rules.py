@@ -3,15 +3,15 @@
 from collections.abc import Iterator
 from types import SimpleNamespace
 
-from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.plants.virtual_work import end_load_is_a_body
 from gen_profile.spec.can import SENSOR_BYTES, CanSensorSpec
 from gen_profile.spec.model import RobustnessSpec, Spec
 from gen_profile.spec.planner import SensorSpec
 from gen_profile.spec.structure import place
-from gen_profile.suggestion import suggestion
-from gen_profile.units import RATES, UNITS
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.suggestion import suggestion
+from gen_profile.support.units import RATES, UNITS
 
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
 SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold

@@ -12,10 +12,10 @@ from typing import Annotated, Any, ClassVar, Union, get_args, get_origin, get_ty
 
 import attrs
 
-from gen_profile.errors import SpecError
-from gen_profile.phrase import Phrase, placed
 from gen_profile.spec.values import NONE, Named, Words
-from gen_profile.suggestion import found, suggestion
+from gen_profile.support.errors import SpecError
+from gen_profile.support.phrase import Phrase, placed
+from gen_profile.support.suggestion import found, suggestion
 
 Kind = Any  # an annotation
 MISFIT: Any = object()  # in place of a value that does not fit
@@ -40,8 +40,8 @@ class Faults:
     def add(self, place: str, problem: str, /, *causes: str, **values: Any) -> None:
         """Note a problem, such as ``must be positive``, of a place such as ``plant.m1``.
 
-        With values, the problem is a template, as `gen_profile.phrase.Phrase` takes them. It is no fault of
-        its own where something is wrong at its causes, which are places, too.
+        With values, the problem is a template, as `gen_profile.support.phrase.Phrase` takes them. It is no
+        fault of its own where something is wrong at its causes, which are places, too.
         """
         if not any(self._told(one) for one in (place, *causes)):
             self._sentences[place] = placed(place, Phrase(problem, **values) if values else problem)

@@ -9,8 +9,6 @@ from typing import Annotated, Any
 
 import attrs
 
-from gen_profile.errors import SpecError
-from gen_profile.phrase import Phrase
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.plants.registry import find_plant, plant_types
@@ -20,7 +18,9 @@ from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec
 from gen_profile.spec.rules import broken_rules
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, place
 from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, between
-from gen_profile.suggestion import found, listed, meant, suggestion
+from gen_profile.support.errors import SpecError
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.suggestion import found, listed, meant, suggestion
 
 Table = dict[str, Any]
 

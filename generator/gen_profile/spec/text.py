@@ -6,9 +6,9 @@ import tomli_w
 import tomlkit
 from tomlkit.items import InlineTable, Item, Table
 
-from gen_profile.errors import GenProfileError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import overridden, parse_spec
+from gen_profile.support.errors import GenProfileError
 
 CHANGED = ("plant", "robustness", "check")
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 
 import attrs
 
-from gen_profile.errors import SpecError
-from gen_profile.phrase import Phrase
-from gen_profile.suggestion import found
+from gen_profile.support.errors import SpecError
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.suggestion import found
 
 NONE: Mapping[str, Any] = MappingProxyType({})  # a default
 

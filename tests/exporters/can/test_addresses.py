@@ -8,8 +8,8 @@ import pytest
 from exporters.can.bench import QUICK_STOP, Bench
 from exporters.motions import quintic, target
 
-from gen_profile.errors import ExportError
 from gen_profile.spec.can import CobIdsSpec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.export.exporter import encode
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.record import Phase

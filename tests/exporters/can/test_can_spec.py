@@ -2,9 +2,9 @@
 
 import pytest
 
-from gen_profile.errors import SpecError
 from gen_profile.spec.can import CobIdsSpec
 from gen_profile.spec.reading import preset_spec, spec_from_dict
+from gen_profile.support.errors import SpecError
 
 TRAVEL = "can.travel={cart=[-0.1, 0.5]}"
 

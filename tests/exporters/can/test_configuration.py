@@ -8,7 +8,7 @@ from canopen import SdoAbortedError
 from exporters.can.bench import OTHER_MAKE, Bench
 from motions import quintic, target
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.export.exporter import encode
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant

@@ -6,8 +6,8 @@ import pytest
 from motions import quintic, target
 from system_parts import program
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.export import exporter
 

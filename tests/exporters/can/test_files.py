@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import quintic, target
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames, scaling, startup
 from gen_profile_exporters.can.export.candump import read
 from gen_profile_exporters.can.export.exporter import encode, replay

@@ -8,8 +8,8 @@ from exporters.can.bench import MS, Bench
 from exporters.motions import quintic, target
 from numpy.testing import assert_array_equal
 
-from gen_profile.errors import ExportError
 from gen_profile.spec.can import CobIdsSpec, FixedPdosSpec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.export.exporter import encode, replay
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant

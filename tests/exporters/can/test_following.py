@@ -8,7 +8,7 @@ import pytest
 from exporters.can.bench import Bench, RigidLoad
 from motions import quintic
 
-from gen_profile.streaming.outcome import Source, StreamOutcome
+from gen_profile.delivery.streaming.outcome import Source, StreamOutcome
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.following import standstills
 

@@ -7,7 +7,7 @@ import pytest
 from exporters.can.bench import QUICK_STOP, Bench
 from motions import quintic
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.streaming.record import Phase
 
 FRAMES = 100_000

@@ -14,14 +14,14 @@ import pytest
 from exporters.can.bench import MS, QUICK_STOP, Bench, RigidLoad
 from fmu.kinds import PLANNED, planner_text
 
-from gen_profile.errors import SpecError
+from gen_profile.delivery.streaming.keyboard import Keyboard, Keys
+from gen_profile.delivery.streaming.outcome import Source, StreamOutcome
+from gen_profile.delivery.streaming.planned_motion import CommandList, PlannedMotion
 from gen_profile.planner.commands import play, read_commands
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.can import CanSpec
-from gen_profile.streaming.keyboard import Keyboard, Keys
-from gen_profile.streaming.outcome import Source, StreamOutcome
-from gen_profile.streaming.planned_motion import CommandList, PlannedMotion
+from gen_profile.support.errors import SpecError
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.streaming.record import Book, Phase
 

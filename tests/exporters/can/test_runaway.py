@@ -5,8 +5,8 @@ import pytest
 from exporters.can.bench import MS, QUICK_STOP, Bench, RigidLoad
 from exporters.motions import quintic, target
 
-from gen_profile.errors import ExportError
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.export.exporter import encode
 from gen_profile_exporters.can.following_window import windows

@@ -8,7 +8,7 @@ from exporters.can.bench import MS, QUICK_STOP, Bench, Tampered
 from exporters.motions import quintic, target
 from numpy.testing import assert_array_equal
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import MOVING, State
 from gen_profile_exporters.can.export.exporter import encode, replay

@@ -10,7 +10,7 @@ import canopen
 import pytest
 from exporters.can.bench import Bench
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.cia402 import MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.host.realtime import real_time
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant, dictionary

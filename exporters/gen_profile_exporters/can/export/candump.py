@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 
 import attrs
 
-from gen_profile.errors import ExportError
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.frames import CHANNEL, MICROSECONDS
 
 _FRAME = re.compile(r"\((\d{1,12})\.(\d{6})\) (\S+) ([0-9A-F]{3})#((?:[0-9A-F]{2}){0,8})")

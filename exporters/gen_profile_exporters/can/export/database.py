@@ -3,7 +3,7 @@
 import re
 from fractions import Fraction
 
-from gen_profile.units import AxisScale
+from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.scaling import exact

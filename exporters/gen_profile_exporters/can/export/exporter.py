@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.export import candump, database, traces
 from gen_profile_exporters.can.export.candump import Frame, altered

@@ -10,8 +10,8 @@ from typing import Any
 import attrs
 import can
 
-from gen_profile.errors import SpecError
-from gen_profile.suggestion import suggestion
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import suggestion
 
 # what is no hardware of this computer: who looks for its channels has to ask the network, or finds any number
 NOT_HARDWARE = {"virtual", "udp_multicast", "socketcand"}

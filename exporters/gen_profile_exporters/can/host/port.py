@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import attrs
 import can
 
-from gen_profile.errors import SpecError
-from gen_profile.suggestion import suggestion
+from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import suggestion
 from gen_profile_exporters.can.host import detection
 
 

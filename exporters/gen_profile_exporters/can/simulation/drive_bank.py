@@ -9,7 +9,7 @@ import attrs
 import can
 import canopen
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import MOVING
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock

@@ -15,8 +15,8 @@ import can
 from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
 
-from gen_profile.errors import StreamAborted
-from gen_profile.units import AxisScale
+from gen_profile.support.errors import StreamAborted
+from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import frames, startup
 from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.following_window import useful

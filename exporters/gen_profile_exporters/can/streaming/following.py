@@ -7,7 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.streaming.watch import WatchedAxis
 from gen_profile_exporters.exporter import Target

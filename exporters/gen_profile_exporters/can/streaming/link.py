@@ -13,7 +13,7 @@ import can
 import canopen
 from canopen.sdo.client import SdoClient
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 

@@ -9,8 +9,8 @@ import attrs
 import can
 import numpy as np
 
-from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.export.exporter import played, read_setpoints
 from gen_profile_exporters.can.frames import Integers, SetpointFrame, message

@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MOVING, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS

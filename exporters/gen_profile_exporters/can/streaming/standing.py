@@ -2,7 +2,7 @@
 
 import attrs
 
-from gen_profile.units import AxisScale
+from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import magnitude_counts
 

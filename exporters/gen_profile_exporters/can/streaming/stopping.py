@@ -16,7 +16,7 @@ from contextlib import suppress
 import attrs
 import can
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import Controlword
 from gen_profile_exporters.can.host.clock import NANOSECONDS

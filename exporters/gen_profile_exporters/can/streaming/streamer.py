@@ -12,7 +12,7 @@ from contextlib import suppress
 import can
 import numpy as np
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import pdos
 from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
 from gen_profile_exporters.can.following_window import windows

@@ -7,7 +7,7 @@ from functools import partial
 import attrs
 import can
 
-from gen_profile.errors import StreamAborted
+from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock

@@ -17,8 +17,8 @@ from gen_profile.cli.deployment.commands import deploy
 from gen_profile.cli.options import Number, PathType, SpecChoice, option
 from gen_profile.cli.outcome import as_json, print_outcome
 from gen_profile.cli.report import report
-from gen_profile.errors import GenProfileError, OutputError
-from gen_profile.plugins import require_installed
+from gen_profile.support.errors import GenProfileError, OutputError
+from gen_profile.support.plugins import require_installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -153,7 +153,7 @@ class _Guide:
         self, key: str, question: str, unchanged: str, given: Words, readings: Words
     ) -> tuple[Words, Words]:
         """Add an answer to the keys or the readings, once it is one that the spec takes."""
-        from gen_profile.identification.measurements import parse_reading
+        from gen_profile.studies.identification.measurements import parse_reading
 
         while (text := self.answer("", question, unchanged)) != unchanged:
             try:
@@ -190,9 +190,9 @@ class _Guide:
 
     def write(self, path: Path, overrides: Words) -> None:
         """Write what was answered into the spec."""
-        from gen_profile.identification.identify import write_spec
         from gen_profile.spec.reading import parse_spec
         from gen_profile.spec.text import changed_text
+        from gen_profile.studies.identification.identify import write_spec
 
         there = path.exists()
         text, source, folder = SpecChoice(path if there else None, None if there else self._preset, ()).text()
@@ -201,7 +201,7 @@ class _Guide:
 
     def files(self) -> list[Path]:
         """List what was delivered, blocks first."""
-        from gen_profile.artefacts.manifest import FILENAME, parse_manifest
+        from gen_profile.support.artefacts.manifest import FILENAME, parse_manifest
 
         folder = self._options["folder"]
         manifest = parse_manifest((folder / FILENAME).read_bytes(), FILENAME)

@@ -14,11 +14,11 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import InputFile, Number, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
-from gen_profile.errors import SpecError
+from gen_profile.support.errors import SpecError
 
 if TYPE_CHECKING:
-    from gen_profile.identification.measurements import SwingLog
     from gen_profile.spec.model import Spec
+    from gen_profile.studies.identification.measurements import SwingLog
 
 
 def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -47,7 +47,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
         if not comma:
             raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
 
-        from gen_profile.identification.identify import read_swing
+        from gen_profile.studies.identification.identify import read_swing
 
         read = partial(read_swing, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit)
         return command(read=read, **given)
@@ -95,9 +95,9 @@ def identify(
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
     from gen_profile.cli import words
-    from gen_profile.identification.identify import identify as run
-    from gen_profile.identification.identify import write_spec
-    from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
+    from gen_profile.studies.identification.identify import identify as run
+    from gen_profile.studies.identification.identify import write_spec
+    from gen_profile.studies.identification.measurements import Measurement, parse_period, parse_reading
 
     spec, rewritten = _to_change(chosen)
     if picture is not None and not logs:
@@ -163,12 +163,12 @@ def learn(
 
     A run is a log of the swing, from before the motion until some swings after it, or what was seen then.
     """
+    from gen_profile.assurance.verification.check import replayed
     from gen_profile.cli import words
-    from gen_profile.designs.design import design
-    from gen_profile.identification.identify import write_spec
-    from gen_profile.identification.learning import learn as run
-    from gen_profile.identification.measurements import parse_reading
-    from gen_profile.verification.check import replayed
+    from gen_profile.delivery.designs.design import design
+    from gen_profile.studies.identification.identify import write_spec
+    from gen_profile.studies.identification.learning import learn as run
+    from gen_profile.studies.identification.measurements import parse_reading
 
     spec, rewritten = _to_change(chosen)
     options.require_formats(formats)

@@ -15,11 +15,11 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.deployment.access import Access, client_options
 from gen_profile.cli.options import Count, Number, OutputFile, option
 from gen_profile.cli.outcome import print_outcome, print_warnings
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.support.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from gen_profile.identification.encoder import Encoder
     from gen_profile.motion.profile import Array
+    from gen_profile.studies.identification.encoder import Encoder
 
 MOST_NODE = 127
 DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and columns beside it
@@ -51,8 +51,8 @@ def log_swing(
     SOURCE is a phone with phyphox, by the address that its remote access shows, an OPC UA server, or a CAN
     bus, as can:socketcan:can0.
     """
-    from gen_profile.artefacts.writing import deliver
-    from gen_profile.identification.phone import COLUMNS, Phone
+    from gen_profile.studies.identification.phone import COLUMNS, Phone
+    from gen_profile.support.artefacts.writing import deliver
 
     if counts is not None and not source.startswith("can:"):
         raise SpecError("--counts: is for an encoder on a CAN bus, as can:socketcan:can0; leave it out.")
@@ -60,7 +60,7 @@ def log_swing(
         if node is None:
             raise SpecError("--node: name the node whose value swings, as ns=4;s=GVL.rAngle.")
         access = Access(url=source, instance="", data_block=None, **security).opcua()
-        from gen_profile.deployment.opcua import OpcUaNode
+        from gen_profile.delivery.deployment.opcua import OpcUaNode
 
         with closing(OpcUaNode(access, node)) as link:
             table = _logged(link.tables(), seconds)
@@ -85,7 +85,7 @@ def log_swing(
 
 
 def _encoder(source: str, node: str | None, counts: int | None, bitrate: int) -> Encoder:
-    from gen_profile.plugins import require_installed
+    from gen_profile.support.plugins import require_installed
 
     _, interface, channel = (*source.split(":", 2), "", "")[:3]
     if not interface or not channel:
@@ -95,7 +95,7 @@ def _encoder(source: str, node: str | None, counts: int | None, bitrate: int) ->
     if node is None or not node.isdecimal() or not 1 <= int(node) <= MOST_NODE:
         raise SpecError(f"--node: name the encoder's number on the bus, from 1 to {MOST_NODE}.")
     require_installed("CAN needs canopen", "can", "canopen")
-    from gen_profile.identification.encoder import Encoder
+    from gen_profile.studies.identification.encoder import Encoder
     from gen_profile_exporters.can.host.port import Port
 
     port = Port(interface=interface, channel=channel)
@@ -106,10 +106,10 @@ def _logged(tables: Iterator[Array], seconds: float | None) -> Array:
     """Log until Ctrl-C, or for so long by the sensor's clock."""
     import numpy as np
 
-    from gen_profile.deployment.mailbox import LinkLostError
-    from gen_profile.identification.measurements import LEAST_SAMPLES
-    from gen_profile.identification.phone import about_its_axis
-    from gen_profile.interrupts import interrupts_collected
+    from gen_profile.delivery.deployment.mailbox import LinkLostError
+    from gen_profile.studies.identification.measurements import LEAST_SAMPLES
+    from gen_profile.studies.identification.phone import about_its_axis
+    from gen_profile.support.interrupts import interrupts_collected
 
     table = np.empty((0, 0))
     try:
@@ -144,7 +144,7 @@ def _curve() -> Iterator[Callable[[Array], None]]:
     from rich.live import Live
     from rich.text import Text
 
-    from gen_profile.streaming.live_terminal import curves
+    from gen_profile.delivery.streaming.live_terminal import curves
 
     console = Console(stderr=True)
     with Live(console=console, auto_refresh=False) as live:

@@ -13,13 +13,13 @@ import click
 
 from gen_profile.cli import options
 from gen_profile.cli.options import Count, PathType, option
-from gen_profile.errors import SpecError
-from gen_profile.plugins import require_installed
+from gen_profile.support.errors import SpecError
+from gen_profile.support.plugins import require_installed
 
 if TYPE_CHECKING:
-    from gen_profile.deployment.mailbox import ControllerLink
-    from gen_profile.deployment.opcua import OpcUaAccess
-    from gen_profile.deployment.table import BlockTable
+    from gen_profile.delivery.deployment.mailbox import ControllerLink
+    from gen_profile.delivery.deployment.opcua import OpcUaAccess
+    from gen_profile.delivery.deployment.table import BlockTable
 
 _OPC_UA = re.compile(r"opc\.tcp://[^\s/@]+:(\d{1,5})(/\S*)?", re.ASCII)
 _S7 = re.compile(r"s7://([^\s/@:]+)(?::(\d{1,5}))?/([0-7])/(\d{1,2})", re.ASCII)
@@ -99,16 +99,16 @@ class Access:
         DeploymentError
         """
         if self.url.startswith("ads:"):
-            from gen_profile.deployment.ads import AdsLink
+            from gen_profile.delivery.deployment.ads import AdsLink
 
             host, net_id, port = _groups(_ADS, self.url)
             place = (net_id, int(port), host or ".".join(net_id.split(".")[:4]))
             return AdsLink(self.url, place, self.instance, table)
         if self.data_block is None:
-            from gen_profile.deployment.opcua import OpcUaLink
+            from gen_profile.delivery.deployment.opcua import OpcUaLink
 
             return OpcUaLink(self.opcua())
-        from gen_profile.deployment.s7 import TCP_PORT, S7Link
+        from gen_profile.delivery.deployment.s7 import TCP_PORT, S7Link
 
         host, tcp, rack, slot = _groups(_S7, self.url)
         processor = (host, int(rack), int(slot), int(tcp or TCP_PORT))
@@ -116,7 +116,7 @@ class Access:
 
     def opcua(self) -> OpcUaAccess:
         """Say how an OPC UA server is reached; ask for the password, if there is to be one."""
-        from gen_profile.deployment.opcua import OpcUaAccess
+        from gen_profile.delivery.deployment.opcua import OpcUaAccess
 
         values = attrs.asdict(self, filter=attrs.filters.exclude("data_block"))
         return OpcUaAccess(**values, password=password(self.user))

@@ -24,16 +24,16 @@ from gen_profile.cli.options import Count, Number, OutputFile, PathType, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.support.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gen_profile.artefacts.signature import Key
-    from gen_profile.deployment.mailbox import ControllerLink
-    from gen_profile.deployment.simulated_block import SimulatedController
-    from gen_profile.deployment.table import BlockTable
-    from gen_profile.progress import Progress
+    from gen_profile.delivery.deployment.mailbox import ControllerLink
+    from gen_profile.delivery.deployment.simulated_block import SimulatedController
+    from gen_profile.delivery.deployment.table import BlockTable
+    from gen_profile.support.artefacts.signature import Key
+    from gen_profile.support.progress import Progress
 
 
 @cli.command(
@@ -90,11 +90,11 @@ def deploy(
 
 def _deploy(artefact: Path, given: dict[str, Any], by: str, *, rollback: bool) -> dict[str, Any]:
     """Have the table used, and record it."""
-    from gen_profile.artefacts.writing import require_place
-    from gen_profile.deployment.deploy import deploy as run
-    from gen_profile.deployment.mailbox import Mailbox
-    from gen_profile.deployment.record import RECORD, append_record, read_record
-    from gen_profile.deployment.table import read_table
+    from gen_profile.delivery.deployment.deploy import deploy as run
+    from gen_profile.delivery.deployment.mailbox import Mailbox
+    from gen_profile.delivery.deployment.record import RECORD, append_record, read_record
+    from gen_profile.delivery.deployment.table import read_table
+    from gen_profile.support.artefacts.writing import require_place
 
     with progress() as tell:
         tell("reading the artefact")
@@ -114,7 +114,7 @@ def _deploy(artefact: Path, given: dict[str, Any], by: str, *, rollback: bool) -
 
 def _verify(artefact: Path, given: dict[str, Any]) -> None:
     """Tell whether the controller uses the table."""
-    from gen_profile.deployment.record import recorded
+    from gen_profile.delivery.deployment.record import recorded
 
     with ExitStack() as stack, progress() as tell:
         table, link = verified(artefact, given, stack, tell)
@@ -127,9 +127,9 @@ def verified(
     artefact: Path, given: dict[str, Any], stack: ExitStack, tell: Progress
 ) -> tuple[BlockTable, ControllerLink]:
     """Connect to a controller, by what `Access` takes, that uses a file's table."""
-    from gen_profile.deployment.deploy import verify
-    from gen_profile.deployment.mailbox import Mailbox
-    from gen_profile.deployment.table import read_table
+    from gen_profile.delivery.deployment.deploy import verify
+    from gen_profile.delivery.deployment.mailbox import Mailbox
+    from gen_profile.delivery.deployment.table import read_table
 
     tell("reading the artefact")
     table = read_table(artefact)
@@ -144,7 +144,7 @@ def verified(
 def _watch(artefact: Path, given: dict[str, Any], seconds: float | None, log: Path | None) -> None:
     """Hold what the block issues to what was proved, and end with what differs."""
     from gen_profile.cli.deployment.watching import reporting, words
-    from gen_profile.deployment.watching.watch import watch
+    from gen_profile.delivery.deployment.watching.watch import watch
 
     with ExitStack() as stack:
         with progress() as tell:
@@ -161,8 +161,8 @@ def _watch(artefact: Path, given: dict[str, Any], seconds: float | None, log: Pa
 
 
 def _sign(artefact: Path, document: dict[str, Any], key: Key) -> None:
-    from gen_profile.artefacts.signature import sign_file
-    from gen_profile.deployment.record import RECORD
+    from gen_profile.delivery.deployment.record import RECORD
+    from gen_profile.support.artefacts.signature import sign_file
 
     comment = f"deployments of {artefact.stem}, the latest at {document['at']}"
     click.echo(f"Signed by {key.identity}: {sign_file(artefact.parent / RECORD, comment, key)}", err=True)
@@ -218,7 +218,7 @@ def plc_sim(artefact: Path, *, data_block: int | None, ads: bool, **given: Any) 
             "computer in."
         )
     make = _simulated(data_block, ads=ads, **given)
-    from gen_profile.deployment.table import read_table
+    from gen_profile.delivery.deployment.table import read_table
 
     def ready(address: str) -> None:
         name, shown = controller.instance, controller.fingerprint
@@ -241,14 +241,14 @@ def _simulated(
     """Choose the controller that is made of a table."""
     require_protocol("ADS" if ads else "OPC UA" if data_block is None else "S7")
     if ads:
-        from gen_profile.deployment.ads_sim import SimulatedAdsController
+        from gen_profile.delivery.deployment.ads_sim import SimulatedAdsController
 
         return partial(SimulatedAdsController, port=port)
     if data_block is not None:
-        from gen_profile.deployment.s7_sim import SimulatedS7Controller
+        from gen_profile.delivery.deployment.s7_sim import SimulatedS7Controller
 
         return partial(SimulatedS7Controller, number=data_block, port=port)
-    from gen_profile.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
+    from gen_profile.delivery.deployment.plc_sim import PlcSimOptions, SimulatedOpcUaController
 
     server = PlcSimOptions(
         port=port, secure=not no_security, certificate=certificate, user=user, password=password(user)

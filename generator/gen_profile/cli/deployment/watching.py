@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gen_profile.deployment import block_state
-from gen_profile.deployment.block_state import BlockState, MotionState, PlannerState
-from gen_profile.deployment.table import PlannerTable
-from gen_profile.deployment.watching.judge import Watched
-from gen_profile.deployment.watching.run_so_far import so_far
-from gen_profile.errors import OutputError
+from gen_profile.delivery.deployment import block_state
+from gen_profile.delivery.deployment.block_state import BlockState, MotionState, PlannerState
+from gen_profile.delivery.deployment.table import PlannerTable
+from gen_profile.delivery.deployment.watching.judge import Watched
+from gen_profile.delivery.deployment.watching.run_so_far import so_far
 from gen_profile.planner.interface import LOST
+from gen_profile.support.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Group
 
-    from gen_profile.deployment.table import BlockTable
-    from gen_profile.deployment.watching.watch import Report
+    from gen_profile.delivery.deployment.table import BlockTable
+    from gen_profile.delivery.deployment.watching.watch import Report
 
 HEIGHT, MARGIN = 6, 12  # lines of an axis's picture, and columns beside it
 REDRAWN = 0.1  # s between two pictures
@@ -153,7 +153,7 @@ def picture(table: BlockTable) -> Callable[[BlockState, float, int], Group]:
     from rich.console import Group
     from rich.text import Text
 
-    from gen_profile.streaming.live_terminal import curves
+    from gen_profile.delivery.streaming.live_terminal import curves
 
     run = so_far(table)
 

@@ -18,13 +18,13 @@ from gen_profile.cli.outcome import lead_nowhere, print_outcome
 from gen_profile.cli.planner import planned, planner_options, status_line
 from gen_profile.cli.progress import progress
 from gen_profile.cli.streaming.words import at_start, lateness_words, outcome_words, plan_words
-from gen_profile.errors import OutputError, SpecError, StreamAborted
-from gen_profile.plugins import require_installed
-from gen_profile.progress import Progress, no_progress
+from gen_profile.support.errors import OutputError, SpecError, StreamAborted
+from gen_profile.support.plugins import require_installed
+from gen_profile.support.progress import Progress, no_progress
 
 if TYPE_CHECKING:
+    from gen_profile.delivery.streaming.outcome import Source, StreamOutcome
     from gen_profile.spec.can import CanSpec
-    from gen_profile.streaming.outcome import Source, StreamOutcome
     from gen_profile_exporters.can.host.port import Port
     from gen_profile_exporters.can.streaming.record import Book
 
@@ -68,7 +68,7 @@ def stream(table: Path | None, **given: Any) -> None:
     first, or a planner block, which plans under commands. No safety function: emergency stop and STO stay in
     hardware.
     """
-    from gen_profile.streaming import stream as run
+    from gen_profile.delivery.streaming import stream as run
 
     require_installed("Streaming needs canopen", "can", "canopen")
     request = StreamRequest(**given)
@@ -124,12 +124,12 @@ def drive_sim(
     Ends after one stream, when all drives have been switched off again, or by Ctrl-C, and tells how far the
     load sways.
     """
-    from gen_profile.streaming import stream as run
+    from gen_profile.delivery.streaming import stream as run
 
     require_installed("Streaming needs canopen", "can", "canopen")
-    from gen_profile.artefacts.writing import deliver
-    from gen_profile.evaluation.phrases import mm, number
-    from gen_profile.streaming.load import CraneLoad
+    from gen_profile.delivery.streaming.load import CraneLoad
+    from gen_profile.dynamics.evaluation.phrases import mm, number
+    from gen_profile.support.artefacts.writing import deliver
     from gen_profile_exporters.can.simulation import drive_dictionary
     from gen_profile_exporters.can.streaming import joint_bus
     from gen_profile_exporters.exporter import target_of
@@ -219,7 +219,7 @@ class StreamRequest:
         ------
         GenProfileError
         """
-        from gen_profile.streaming.stream import designed, require_rest, verified
+        from gen_profile.delivery.streaming.stream import designed, require_rest, verified
         from gen_profile_exporters.can.streaming import joint_bus
         from gen_profile_exporters.exporter import target_of
 
@@ -249,7 +249,7 @@ class StreamRequest:
         ------
         GenProfileError
         """
-        from gen_profile.streaming import slow_motion
+        from gen_profile.delivery.streaming import slow_motion
 
         if self.to_start and self.jog:
             raise SpecError("--to-start and --jog: choose one of them.")
@@ -273,7 +273,7 @@ class StreamRequest:
 
     def measured(self, source: Source, tell: Progress) -> tuple[str, ...]:
         """Measure this machine if that is asked for, and say before anything moves what came of it."""
-        from gen_profile.streaming.stream import rehearsed_cycles, self_test
+        from gen_profile.delivery.streaming.stream import rehearsed_cycles, self_test
 
         if not self.self_test:
             return ()
@@ -286,8 +286,8 @@ class StreamRequest:
     @contextmanager
     def shown(self, source: Source) -> Iterator[tuple[Progress, Book | None]]:
         """Show a stream: by its phases, and by curves, which need the terminal for themselves."""
-        from gen_profile.streaming import live_page, live_terminal
-        from gen_profile.streaming.live import watched
+        from gen_profile.delivery.streaming import live_page, live_terminal
+        from gen_profile.delivery.streaming.live import watched
 
         if self.block is not None and sys.stderr.isatty():  # where the axes are, and how far a stop leads
             with status_line() as tell:
@@ -347,7 +347,7 @@ def _require_room(table: Path, source: Source) -> None:
 
 def _conclude(outcome: StreamOutcome, table: Path | None) -> None:
     """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
-    from gen_profile.artefacts.writing import deliver
+    from gen_profile.support.artefacts.writing import deliver
 
     aborted = f"Stream aborted: {outcome.record.reason}"
     code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [aborted])

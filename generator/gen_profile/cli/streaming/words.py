@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gen_profile.streaming.outcome import Source, StreamOutcome
+    from gen_profile.delivery.streaming.outcome import Source, StreamOutcome
     from gen_profile_exporters.can.host.lateness import Lateness
 
 
@@ -45,7 +45,7 @@ def lateness_words(late: Lateness) -> str:
 
 def outcome_words(outcome: StreamOutcome) -> str:
     """Say what became of a stream."""
-    from gen_profile.evaluation.phrases import mm, number
+    from gen_profile.dynamics.evaluation.phrases import mm, number
 
     document, late = outcome.to_dict(), outcome.record.lateness
     of_all = "" if document["cycles_planned"] is None else f" of {document['cycles_planned']}"

@@ -1,0 +1,1 @@
+"""What vouches for an artefact: verdicts, certificates, and proofs of planner blocks."""

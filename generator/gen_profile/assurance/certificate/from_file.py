@@ -1,0 +1,232 @@
+"""Certificates of artefacts that lie on disk: made, and checked again."""
+
+import zlib
+from collections.abc import Sequence
+from functools import partial
+from math import isclose
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from gen_profile.assurance.certificate.arithmetic.balls import Array
+from gen_profile.assurance.certificate.axes.setpoint_limits import Asked, asked_of_axes
+from gen_profile.assurance.certificate.boxes import covers
+from gen_profile.assurance.certificate.certify import SLACK, Attempt, Progress, attempt
+from gen_profile.assurance.certificate.document import Certificate, certificate_path, damaged, encode, parse
+from gen_profile.assurance.certificate.in_order import in_order
+from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayBounds, limits_of
+from gen_profile.assurance.certificate.theorem import SAME_TIME, Theorem, ranges_of
+from gen_profile.assurance.verification.check import spec_and_manifest
+from gen_profile.assurance.verification.plausibility import another_move
+from gen_profile.motion.profile import SampledProfile
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_path
+from gen_profile.support.artefacts.manifest import sha256
+from gen_profile.support.artefacts.reading import read_artefact, read_motion, require_companions
+from gen_profile.support.artefacts.writing import deliver, require_place
+from gen_profile.support.errors import CertificateError
+from gen_profile.support.progress import require_progress
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import find_exporter, format_of
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Artefact:
+    """What a certificate is about."""
+
+    path: Path
+    sha256: str
+    spec: Spec
+    setpoints: SampledProfile
+
+
+def certify_artefact(
+    path: Path | str, spec: Spec | Path | str | None = None, *, progress: Progress = lambda _, __: None
+) -> Certificate:
+    """Prove that no machine of a spec's ranges sways more than a bound after a file's motion.
+
+    docs/certificate.md states what is proved. A certificate is written beside the file where every limit is
+    proved to be kept: its name with ``.certificate.json``.
+
+    Parameters
+    ----------
+    path : Path or str
+        Any artefact of a motion.
+    spec : Spec, or the path of one, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    progress : callable
+        Told how many boxes of machines are done, and of how many so far.
+
+    Returns
+    -------
+    Certificate
+        Of what could be proved; `Certificate.proved` tells whether that is all.
+
+    Raises
+    ------
+    CertificateError
+        No proof is written for this machine, or what the spec asks; or setpoints break limits of the axes.
+    OutputError, ExportError, SpecError, CosimulationError
+        As of `gen_profile.check_artefact`.
+
+    Examples
+    --------
+    >>> gp.certify_artefact("deploy/paper.csv").proved  # what gp.design wrote
+    True
+    """
+    require_progress(progress)
+    artefact = _read(as_path(path), spec)
+    require_place(certificate_path(artefact.path))  # before there is a proof to lose
+    asked = asked_of_axes(artefact.spec, artefact.setpoints)
+    certificate = _certificate(artefact, asked, attempt(artefact.spec, artefact.setpoints, progress))
+    if certificate.proved:
+        deliver(certificate_path(artefact.path), encode(certificate))
+    return certificate
+
+
+def check_certificate(
+    path: Path | str,
+    certificate: Path | str,
+    spec: Spec | Path | str | None = None,
+    *,
+    progress: Progress = lambda _, __: None,
+) -> Certificate:
+    """Prove again what a certificate says of a file, with nothing solved and nothing believed of it.
+
+    Parameters
+    ----------
+    path : Path or str
+        The artefact.
+    certificate : Path or str
+    spec : Spec, or the path of one, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    progress : callable
+        Told how many boxes of machines are done, and of how many.
+
+    Raises
+    ------
+    CertificateError
+        It is damaged, is about something else, or proves less than it says.
+    OutputError, ExportError, SpecError
+        As of `gen_profile.check_artefact`.
+
+    Examples
+    --------
+    >>> _ = gp.certify_artefact("deploy/paper.csv")
+    >>> gp.check_certificate("deploy/paper.csv", "deploy/paper.csv.certificate.json").proved
+    True
+    """
+    require_progress(progress)
+    artefact = _read(as_path(path), spec)
+    claimed = parse(read_artefact(as_path(certificate)))
+    theorem = _require_about(claimed, artefact)
+    stated = np.array([sway.bound for sway in claimed.sways])
+    bounds, largest_met, done = np.zeros(len(stated)), np.zeros(len(stated)), 0
+    for count, again in in_order(
+        partial(_bound_again, theorem, claimed, stated), theorem.batches(range(len(claimed.boxes)))
+    ):
+        bounds = np.maximum(bounds, again.sway.max(axis=0))  # which keeps nan
+        largest_met = np.fmax(largest_met, again.largest_met.max(axis=0))
+        done += count
+        progress(done, len(claimed.boxes))
+    for sway, said, bound in zip(claimed.sways, stated.tolist(), bounds.tolist(), strict=True):
+        if not bound <= said:
+            raise CertificateError(
+                f"The certificate does not prove what it says: the {sway.limit.load} is bounded by "
+                f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
+            )
+    met = zip(claimed.sways, largest_met.tolist(), strict=True)
+    return attrs.evolve(claimed, sways=tuple(attrs.evolve(sway, largest_met=most) for sway, most in met))
+
+
+def _bound_again(
+    theorem: Theorem, claimed: Certificate, targets: Array, rows: Sequence[int]
+) -> tuple[int, SwayBounds]:
+    """Carry the proof out again for some boxes: how many, and their bounds.
+
+    Raises
+    ------
+    CertificateError
+    """
+    boxes, scales = ([part[row] for row in rows] for part in (claimed.boxes, claimed.scales))
+    try:
+        coefficients = np.stack([claimed.motions[row].coefficients() for row in rows])
+    except (ValueError, TypeError, KeyError, zlib.error) as error:
+        raise damaged(error) from error
+    theorem.require_shapes(boxes, coefficients, np.array(scales))
+    return len(boxes), theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(targets)
+
+
+def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
+    content = read_motion(path)
+    spec, manifest = spec_and_manifest(path, content, spec)
+    require_companions(manifest, path, content)
+    setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))
+    for sentence in another_move(spec, setpoints):
+        raise CertificateError(sentence)
+    return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
+
+
+def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certificate:
+    """State what came out."""
+    theorem = result.theorem
+    bounds = [None] * len(theorem.limits)
+    if result.boxes:
+        bounds = (result.bounds.max(axis=0) * (1.0 + SLACK)).tolist()
+    sways = zip(theorem.limits, bounds, result.largest_met.tolist(), strict=True)
+    return Certificate(
+        spec_sha256=artefact.spec.sha256(),
+        artefact_sha256=artefact.sha256,
+        ranges=theorem.ranges.ends,
+        arrival=theorem.arrival,
+        until=theorem.until,
+        asked=asked,
+        sways=tuple(
+            ProvedSway(limit=limit, bound=bound, largest_met=largest_met)
+            for limit, bound, largest_met in sways
+        ),
+        fraction=result.fraction,
+        axes=theorem.axes,
+        boxes=result.boxes,
+        terms=theorem.terms,
+        motions=result.motions,
+        scales=result.scales,
+        rounded=bool(artefact.setpoints.resolution.any()),
+    )
+
+
+def _require_about(claimed: Certificate, artefact: _Artefact) -> Theorem:
+    """Refuse a certificate of anything else, or of a part of it.
+
+    Raises
+    ------
+    CertificateError
+    """
+    if claimed.artefact_sha256 != artefact.sha256:
+        raise CertificateError(
+            f"The certificate is about another file than {artefact.path}, or that was altered."
+        )
+    if claimed.spec_sha256 != artefact.spec.sha256():
+        raise CertificateError("The certificate is about another spec: other machines or limits.")
+    theorem = Theorem(
+        spec=artefact.spec,
+        setpoints=artefact.setpoints,
+        ranges=ranges_of(artefact.spec),
+        limits=tuple(sway.limit for sway in claimed.sways),
+        axes=claimed.axes,
+        terms=claimed.terms,
+    )
+    if claimed.asked != asked_of_axes(artefact.spec, artefact.setpoints):
+        raise CertificateError("The certificate does not prove what it says of the setpoints.")
+    if not len(claimed.boxes) == len(claimed.motions) == len(claimed.scales):
+        raise CertificateError("The certificate is damaged: its arrays do not fit together.")
+    whole = dict(claimed.ranges) == theorem.ranges.ends and covers(claimed.boxes)
+    if not (whole and theorem.limits == limits_of(artefact.spec) and claimed.proved):
+        raise CertificateError("The certificate does not cover all machines and limits of the spec.")
+    watched = (
+        isclose(claimed.until, theorem.until, rel_tol=SAME_TIME) and claimed.until <= claimed.axes.knots[-1]
+    )
+    if not watched or claimed.arrival != theorem.arrival:
+        raise CertificateError("The certificate is about another time.")
+    return theorem

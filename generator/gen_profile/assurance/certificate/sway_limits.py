@@ -1,0 +1,99 @@
+"""Limits of sway, where each is watched, and what is proved of it."""
+
+import attrs
+
+from gen_profile.assurance.certificate.arithmetic.balls import Array
+from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE
+from gen_profile.spec.model import Spec
+
+
+@attrs.frozen(kw_only=True)
+class SwayLimit:
+    """How much a load may sway.
+
+    Attributes
+    ----------
+    load : str
+    allowed : float
+        m.
+    on_the_way : bool
+        Whether it holds at any time, or after the move only. It is of the end load as a whole, then.
+    """
+
+    load: str
+    allowed: float
+    on_the_way: bool = False
+
+
+@attrs.frozen(kw_only=True)
+class ProvedSway:
+    """What is proved of a limit.
+
+    Attributes
+    ----------
+    limit : SwayLimit
+    bound : float or None
+        Proved one in m, of all machines that there are any of.
+    largest_met : float
+        Greatest sway that was met, in m; of it nothing is proved.
+    """
+
+    limit: SwayLimit
+    bound: float | None
+    largest_met: float
+
+    @property
+    def reason(self) -> str | None:
+        """Say that the limit is not proved to be kept; nothing where it is, or where there is no bound."""
+        limit, bound = self.limit, self.bound
+        if bound is None or bound <= limit.allowed:
+            return None
+        when, place = "after the move", "check.residual_sway"
+        if limit.on_the_way:
+            when, place = "on the way", f"{SWAY_TOLERANCE:g} of limits.sway"
+        return (
+            f"The {limit.load} is proved to sway by at most {1e3 * bound:.4g} mm {when}, and "
+            f"{1e3 * limit.allowed:.4g} mm are allowed ({place}); the greatest sway met is "
+            f"{1e3 * self.largest_met:.4g} mm."
+        )
+
+
+def limits_of(spec: Spec) -> tuple[SwayLimit, ...]:
+    """List what the check allows: every load after the move, and the end load on the way where limited."""
+    after = tuple(SwayLimit(load=load, allowed=limit) for load, limit in spec.check.residual_sway.items())
+    if spec.limits.sway is None:
+        return after
+    allowed = SWAY_TOLERANCE * spec.limits.sway
+    return (*after, SwayLimit(load=spec.machine().end_load_name, allowed=allowed, on_the_way=True))
+
+
+@attrs.frozen(kw_only=True)
+class WatchedSway:
+    """A sway whose greatest value is wanted.
+
+    Attributes
+    ----------
+    loads : slice
+        Of the machine's; of several directions the vector's length counts.
+    first : int
+        Piece from which on.
+    """
+
+    loads: slice
+    first: int
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SwayBounds:
+    """What is proved, or nan.
+
+    Attributes
+    ----------
+    sway : (boxes, watches) array
+        Greatest sway in m.
+    largest_met : (boxes, watches) array
+        Greatest sway in m that the approximation has at some nodes; nothing is proved of it.
+    """
+
+    sway: Array
+    largest_met: Array

@@ -1,0 +1,125 @@
+"""Judging one history: which limits the block kept, and what sways on."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import attrs
+
+from gen_profile.assurance.proof.histories import History
+from gen_profile.assurance.proof.numbering import LONG, RHYTHMS, Numbering
+from gen_profile.assurance.proof.verdict import TAKEN_BACK, JudgedHistory
+from gen_profile.planner.design import quick_limits
+from gen_profile.planner.interface import BlockAxis
+from gen_profile.spec.model import Spec
+from gen_profile_exporters.st_to_c import FAULTS
+from gen_profile_fmu.running.block_run import NO_NUMBER, AxisExtremes, BlockRun
+
+ROUNDING = 1e-9  # by which setpoints may miss a limit, in m and s
+STEADY = 1e-9  # m, by which setpoints may move while the axis stands
+
+Judge = Callable[[Numbering, Sequence[int]], list[JudgedHistory]]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class WatchedRun:
+    """What became of a history.
+
+    Attributes
+    ----------
+    run : BlockRun
+    faults : tuple of str
+        What the block did other than commanded, in words that end a sentence.
+    left : float
+        m, that stated errors leave at most on the linear machine, as long as the block promises.
+    later : mapping of str to sequence of float
+        Slow periods more than limits take, in which commands of a kind are carried out.
+    """
+
+    run: BlockRun
+    faults: tuple[str, ...] = ()
+    left: float = 0.0
+    later: Mapping[str, Sequence[float]] = attrs.field(factory=dict)
+
+
+def judge_run(
+    spec: Spec, watched: WatchedRun, history: History, *, cycle: float, number: int, group: str
+) -> JudgedHistory:
+    """Judge what became of a history.
+
+    Parameters
+    ----------
+    spec : Spec
+    watched : WatchedRun
+    history : History
+        Of that run.
+    cycle : float
+        s.
+    number : int
+    group : str
+    """
+    loads = spec.machine().loads
+    last = max(command.time for command in history.commands)
+    run = watched.run
+    limits = _shares(spec, history, run)
+    return JudgedHistory(
+        number=number,
+        group=group,
+        history=history,
+        cycles=run.cycles,
+        rests_after=max(0.0, run.stands * cycle - last) if run.stands >= 0 else None,
+        promise=run.promise and not history.misinformed,
+        residual=dict(zip(loads, run.residual.tolist(), strict=True)),
+        on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
+        limits=limits,
+        left=watched.left,
+        later=watched.later,
+        faults=(*_faults(history, run, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
+    )
+
+
+def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
+    """Shares of the limits that are taken, by quantity, and by axis where there are several."""
+    shares: dict[str, float] = {}
+    for (number, named), axis in zip(history.axes.items(), run.axes, strict=True):
+        own = spec.limits.of(number)
+        assert own.velocity and own.acceleration and own.jerk and own.travel
+        acceleration, jerk = quick_limits(spec, number) if history.brakes else (own.acceleration, own.jerk)
+        start, (low, high) = history.places[number], own.travel
+        shares |= {
+            f"{named.prefix}velocity": axis.velocity / own.velocity,
+            f"{named.prefix}acceleration": axis.acceleration / acceleration,
+            f"{named.prefix}jerk": axis.jerk / jerk,
+            f"{named.prefix}beyond_travel_{named.unit}": max(
+                min(low, start) - axis.lowest, axis.highest - max(high, start), 0.0
+            ),
+        }
+    return shares
+
+
+def _faults(history: History, run: BlockRun, limits: dict[str, float], *, lasts: bool) -> Iterator[str]:
+    """Say what is wrong, each in words that end a sentence; in one that lasts long errors may add up."""
+    if run.fault:
+        yield "a setpoint is no number" if run.fault == NO_NUMBER else f"the block {FAULTS[run.fault]}"
+        return
+    for named, axis in zip(history.axes.values(), run.axes, strict=True):
+        yield from _axis_faults(history, named, axis, limits)
+    if run.stands < 0:
+        yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
+    if not run.promise and not (history.brakes or history.disturbed or lasts):
+        yield TAKEN_BACK
+
+
+def _axis_faults(
+    history: History, named: BlockAxis, axis: AxisExtremes, limits: dict[str, float]
+) -> Iterator[str]:
+    of, which = (f" of {named.name}", f"axis {named.name}") if named.name else ("", "axis")
+    for name in ("velocity", "acceleration", "jerk"):
+        ratio = limits[f"{named.prefix}{name}"]
+        if not ratio <= 1.0 + ROUNDING:
+            yield f"the {name}{of} is above its limit by {100.0 * (ratio - 1.0):.3g} %"
+    beyond = limits[f"{named.prefix}beyond_travel_{named.unit}"]
+    if not beyond <= ROUNDING and not history.moved:
+        yield f"the {which} leaves its travel by {beyond:.3g} {named.unit}"
+    if not axis.gap <= ROUNDING and not (history.brakes or history.moved):  # a quick stop ends within a cycle
+        yield f"a setpoint{of} jumps by {axis.gap:.3g} {named.unit}"
+    if not axis.creep <= STEADY:
+        yield f"the {which} moves on at rest by {axis.creep:.3g} {named.unit}"

@@ -1,0 +1,270 @@
+"""What the proof of a planner block found: values only, no work."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.assurance.proof.followed import ON_AVERAGE, WAY
+from gen_profile.assurance.proof.histories import History
+from gen_profile.assurance.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
+from gen_profile.assurance.proof.obedience import LATE, WORDS
+from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
+from gen_profile.assurance.verification.verdict import Examination
+from gen_profile.support.summary import Summarised
+
+GROUPS = {
+    CORNERS: "ends of all live and uncertain ranges at once",
+    DRAWS: "drawn from all ranges and commands",
+    SEARCH: "steps that climb from the worst of these",
+    RHYTHMS: "many commands in one rhythm, and steps that climb from the worst",
+    LONG: "eight hours of commands",
+}
+QUANTILES = (0.5, 0.9, 0.99)
+AGREEMENT = 1e-9  # m, by which FMPy may find another sway
+FEWEST, SURE = 20, 2.0  # commands of a kind; and standard deviations of their mean
+LISTED = 10  # of the worst histories
+NAMED = {
+    POSITION: "Targets from rest are reached",
+    WAY: "Targets on the way are reached",
+    VELOCITY: "A stick's velocities are reached",
+    STOP: "Stops end",
+}
+TAKEN_BACK = "the block takes its promise back"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class JudgedHistory:
+    """One history, and what became of it.
+
+    Attributes
+    ----------
+    number : int
+    group : str
+        One of `GROUPS`.
+    history : History
+    cycles : int
+    rests_after : float or None
+        Time in s from the last command to standstill.
+    promise : bool
+        Whether the block promises at the end, by what it knows itself, that no sway remains.
+    residual, on_the_way : mapping of str to float
+        Greatest sway of every load in m: once the axes stand, and at any time.
+    limits : mapping of str to float
+        Of every axis the greatest velocity, acceleration and jerk, each as a share of its limit, and by how
+        much, in m (or rad), the travel was left.
+    faults : tuple of str
+        What else is wrong, in words that end a sentence.
+    left : float
+        m, that stated errors leave at most on the linear machine, as long as the block promises.
+    later : mapping of str to sequence of float
+        Slow periods more than limits take, in which commands of a kind are carried out.
+    """
+
+    number: int
+    group: str
+    history: History
+    cycles: int
+    rests_after: float | None
+    promise: bool
+    residual: Mapping[str, float]
+    on_the_way: Mapping[str, float]
+    limits: Mapping[str, float]
+    faults: tuple[str, ...]
+    left: float = 0.0
+    later: Mapping[str, Sequence[float]] = attrs.field(factory=dict)
+
+    def fraction(self, limit: Mapping[str, float], error_bound: float) -> float:
+        """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""
+        if not self.promise:
+            return 0.0
+        return max((self.residual[load] + error_bound) / most for load, most in limit.items())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "number": self.number,
+            "group": self.group,
+            **self.history.starts,
+            "live": dict(self.history.live),
+            "parameters": dict(self.history.parameters),
+            "commands": [self.history.described(command) for command in self.history.commands],
+            "changes": self.history.other_inputs,
+            **({} if self.history.sensed is None else {"sensor": self.history.sensed.to_dict()}),
+            "hoisting": {
+                name: [{"time_s": time, "value": value} for time, value in corners]
+                for name, corners in self.history.hoisting.items()
+            },
+            "promise": self.promise,
+            "rests_after_s": self.rests_after,
+            "residual_peaks_m": dict(self.residual),
+            "sway_peaks_m": dict(self.on_the_way),
+            "limits": dict(self.limits),
+            "faults": list(self.faults),
+        }
+
+
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Proof(Summarised, Examination):
+    """Verdict on a planner block.
+
+    Attributes
+    ----------
+    limit : mapping of str to float
+        Allowed residual sway of every load in m.
+    error_bound : float
+        No residual is further than this from the truth, in m.
+    seed, count : int
+        With which the histories were drawn, and how many.
+    parents : sequence of sequences of int
+        From which histories each round of the search began.
+    judged : tuple of JudgedHistory
+    by_fmpy : tuple of int
+        Numbers of the histories that FMPy's own importer co-simulated, too.
+    apart : float
+        m, by which it found another sway at most.
+    sway_limit : float or None
+        Allowed sway of the end load at any time in m, which no planner block keeps.
+    faults : tuple of str
+        What else is wrong with the file, a sentence each.
+    """
+
+    limit: Mapping[str, float]
+    error_bound: float
+    seed: int
+    count: int
+    parents: Sequence[Sequence[int]]
+    judged: tuple[JudgedHistory, ...]
+    by_fmpy: tuple[int, ...]
+    apart: float
+    sway_limit: float | None = None
+    faults: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "proof": "passed" if self.passed else "failed",
+            "histories": len(self.judged),
+            "worst": f"history {self.worst.number}, {100.0 * self.fraction(self.worst):.3g} % of the limit",
+        }
+
+    def fraction(self, judged: JudgedHistory) -> float:
+        """Share of the limit of residual sway that a history takes up, the error bound included."""
+        return judged.fraction(self.limit, self.error_bound)
+
+    @property
+    def worst(self) -> JudgedHistory:
+        """The history that takes up the greatest share of the limit."""
+        return max(self.judged, key=self.fraction)
+
+    def reasons(self) -> tuple[str, ...]:
+        """Say why the proof failed, a sentence each; none when it passed."""
+        sentences = []
+        if self.fraction(self.worst) > 1.0:
+            load = max(self.limit, key=lambda name: self.worst.residual[name] / self.limit[name])
+            sentences.append(
+                f"The {load} sways by {1e3 * self.worst.residual[load]:.4g} mm after history "
+                f"{self.worst.number}, and {1e3 * self.limit[load]:.4g} mm are allowed "
+                "(check.residual_sway): narrow check.uncertain, allow more, or accelerate less."
+            )
+        by_kind: dict[str, list[JudgedHistory]] = {}
+        for judged in self.judged:
+            for fault in judged.faults:
+                by_kind.setdefault(kind_of(fault), []).append(judged)
+        for kind, those in by_kind.items():
+            first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
+            others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
+            cure = CURES.get(kind, "")
+            sentences.append(f"In history {those[0].number} {first}{others}{cure}.")
+        sentences += late_on_average(self.judged)
+        if not self.apart <= AGREEMENT:
+            sentences.append(
+                f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
+                "please report it."
+            )
+        return (*sentences, *self.faults)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Say what is wrong without counting: sway on the way."""
+        end_load = list(self.limit)[-1]
+        swaying = max(self.judged, key=lambda one: one.on_the_way[end_load])
+        if self.sway_limit is None or swaying.on_the_way[end_load] <= self.sway_limit:
+            return ()
+        return (
+            f"The {end_load} sways by {1e3 * swaying.on_the_way[end_load]:.4g} mm on the way in history "
+            f"{swaying.number}, and {1e3 * self.sway_limit:.4g} mm are stated (limits.sway), which a planner "
+            "block does not look at: accelerate less.",
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON and the manifest."""
+        ranked = sorted(self.judged, key=self.fraction, reverse=True)
+        return {
+            "passed": self.passed,
+            "limits_m": dict(self.limit),
+            "error_bound_m": self.error_bound,
+            "histories": self.count,
+            "seed": self.seed,
+            "slowed": True,  # as those of the first manifests were not
+            "habits": True,
+            "search_parents": [list(numbers) for numbers in self.parents],
+            "share": self.fraction(self.worst),
+            "worst": self.described(self.worst),
+            "next_worst": [
+                {"number": one.number, "share": self.fraction(one), "promise": one.promise}
+                for one in ranked[1:LISTED]
+            ],
+            "groups": [self._group(name) for name in GROUPS if self._of(name)],
+            "limits": {name: max(one.limits[name] for one in self.judged) for name in self.judged[0].limits},
+            "longest_rest_s": max((one.rests_after or 0.0 for one in self.judged), default=0.0),
+            "fmpy": {"histories": list(self.by_fmpy), "apart_m": self.apart},
+            "reasons": list(self.reasons()),
+        }
+
+    def described(self, judged: JudgedHistory) -> dict[str, Any]:
+        """Nest plain values of a history for JSON, its share of the limit among them."""
+        return {**judged.to_dict(), "share": self.fraction(judged)}
+
+    def _of(self, group: str) -> list[JudgedHistory]:
+        return [one for one in self.judged if one.group == group]
+
+    def _group(self, name: str) -> dict[str, Any]:
+        shares = [self.fraction(one) for one in self._of(name)]
+        quantiles = np.quantile(shares, QUANTILES)
+        return {
+            "group": name,
+            "what": GROUPS[name],
+            "histories": len(shares),
+            "worst_share": max(shares),
+            "quantiles": {f"{part:g}": float(q) for part, q in zip(QUANTILES, quantiles, strict=True)},
+        }
+
+
+def lateness(judged: Sequence[JudgedHistory]) -> dict[str, list[float]]:
+    """Collect by how many slow periods later than their limits allow commands are carried out, by kind."""
+    drawn = [one.later for one in judged if one.group in (CORNERS, DRAWS)]
+    return {kind: [value for later in drawn for value in later.get(kind, ())] for kind in ON_AVERAGE}
+
+
+def late_on_average(judged: Sequence[JudgedHistory]) -> Iterator[str]:
+    """Say which of these are carried out later on average than allowed, beyond doubt."""
+    for kind, late in lateness(judged).items():
+        if len(late) < FEWEST:
+            continue
+        least = np.mean(late) - ON_AVERAGE[kind] - SURE * np.std(late) / len(late) ** 0.5
+        if least > 0.0:
+            yield f"{NAMED[kind]} later than allowed on average, by {least:.2g} slow periods or more."
+
+
+def kind_of(fault: str) -> str:
+    """Leave out the numbers of a fault."""
+    return re.split(" by |, at ", fault, maxsplit=1)[0]
+
+
+CURES = {
+    kind_of(WORDS[what]): "; where the controller can do more in a cycle, raise planner.operations, as plans "
+    "then come sooner"
+    for what in LATE
+} | {WORDS["given up"]: ": narrow check.uncertain, allow more (check.residual_sway), or accelerate less"}

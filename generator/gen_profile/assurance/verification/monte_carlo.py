@@ -1,0 +1,144 @@
+"""The scenarios of a check beyond its machines: other drives, random draws, faults of timing."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from gen_profile.assurance.verification.batch import Feed, many_machines, residual_peaks
+from gen_profile.assurance.verification.cosimulation import STEP_PHASE, longest_step
+from gen_profile.assurance.verification.setpoint_path import (
+    delay,
+    followed_up,
+    follows_exactly,
+    lag_of,
+    transmitted,
+)
+from gen_profile.assurance.verification.verdict import Check, Finding
+from gen_profile.dynamics.evaluation.residual_sway import STANDSTILL, observation_time
+from gen_profile.dynamics.evaluation.scenarios import Scenario, scenarios
+from gen_profile.dynamics.problem.dynamics import parameter_rows
+from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
+from gen_profile.spec.model import Spec
+from gen_profile.support.progress import Progress, no_progress
+from gen_profile_fmu.running.many_runs import ManyRuns
+
+CHECKING = "checking by co-simulation"
+BATCH = 50  # rows between two signs of life
+SAMPLE_PHASE = 0.02  # rad of the fastest mode between two samples of a residual
+CURVATURE = 1.2  # of a sway between samples, relative to a harmonic one's of the same peak
+
+
+def standstill(spec: Spec, setpoints: SampledProfile) -> float:
+    """Time in s from which the axes stand in all scenarios beyond the machines."""
+    path = spec.check.path
+    lag = max(spec.actuator.tau or 0.0, *(path.lag or (0.0,)))
+    return float(setpoints.times[-1]) + setpoints.cycle_time + delay(path) + STANDSTILL * lag
+
+
+def with_further(
+    spec: Spec,
+    setpoints: SampledProfile,
+    check: Check,
+    rows: Sequence[Scenario],
+    progress: Progress = no_progress,
+) -> Check:
+    """Try more scenarios on setpoints that were judged on the machines.
+
+    Every row is a co-simulation of the plant's FMU, driven by the replayed setpoints on their way to the
+    axes. How far its peaks are from those of a second one bounds its error: with every other setpoint where
+    the drives interpolate them in time, else with integration steps of half the length. That comes on top of
+    what the machines' check found.
+
+    Parameters
+    ----------
+    spec : Spec
+    setpoints : SampledProfile
+    check : Check
+        Of the machines; it may hold none.
+    rows : sequence of Scenario
+        Of `gen_profile.dynamics.evaluation.scenarios.further_scenarios`.
+    progress : callable
+        Told how many rows are done, and of how many, at every tenth of the way.
+
+    Raises
+    ------
+    SpecError
+        What the spec says of the path does not fit the artefact's cycle.
+    CosimulationError
+    """
+    if not rows:
+        return check
+    findings, error = list(check.findings), 0.0
+    with many_machines(spec.machine()) as runs:
+        for first in _batches(rows):
+            batch = rows[first]
+            peaks, apart = _batch(spec, setpoints, batch, runs)
+            error = max(error, apart)
+            findings += [_finding(spec, row, peak) for row, peak in zip(batch, peaks, strict=True)]
+            if 10 * first.stop // len(rows) > 10 * first.start // len(rows):
+                progress(CHECKING, first.stop, len(rows))
+    return attrs.evolve(check, findings=tuple(findings), error_bound=check.error_bound + error)
+
+
+def _batches(rows: Sequence[Scenario]) -> list[slice]:
+    """Cut rows into batches of one group each."""
+    cuts = [0]
+    for index in range(1, len(rows)):
+        if index - cuts[-1] == BATCH or rows[index].group != rows[index - 1].group:
+            cuts.append(index)
+    return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], len(rows)], strict=True)]
+
+
+def _batch(
+    spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario], runs: ManyRuns
+) -> tuple[Array, float]:
+    """Peaks of some rows, shape (rows, loads), and the error bound of them all in m."""
+    plant, since, after = spec.machine(), standstill(spec, setpoints), watched(spec, setpoints)
+    on_the_way = spec.limits.sway is not None
+    max_step = np.array([longest_step(spec, row) for row in rows])
+    tau = np.array([lag_of(spec, row) for row in rows])
+
+    def peaks(feed: Feed, steps: Array) -> Array:
+        return residual_peaks(
+            runs,
+            spec,
+            followed_up(feed, after, spec.move.final_velocity),
+            parameter_rows(plant, [row.parameters for row in rows]),
+            tau=tau,
+            max_step=steps,
+            since=since,
+            on_the_way=on_the_way,
+        )
+
+    feed = transmitted(spec, setpoints, rows)
+    greatest = peaks(feed, max_step)
+    straight = rows[0].group == "samples" and spec.check.path.between == "linear"
+    if straight or follows_exactly(rows[0]):
+        other = peaks(feed.thinned(2), max_step)
+    else:
+        other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
+    between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest.max())
+    return greatest, float(np.abs(greatest - other).max()) + between
+
+
+def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) -> Array:
+    """Choose times in s after the last setpoint, alike for all rows: no row depends on another.
+
+    Parameters
+    ----------
+    phase : float
+        rad of the fastest mode between two of them.
+    """
+    machines = scenarios(spec)
+    begin = float(setpoints.times[-1]) + setpoints.cycle_time + delay(spec.check.path)
+    spacing = phase / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
+    until = standstill(spec, setpoints) + observation_time(spec)
+    return begin + grid_times(grid_length(until - begin, spacing), spacing)
+
+
+def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:
+    """Take the peaks; amplitudes of modes are known of the machines' trajectories only."""
+    residual = dict(zip(spec.machine().loads, map(float, peaks), strict=False))
+    transient = None if spec.limits.sway is None else float(peaks[-1])
+    return Finding(scenario=row, residual=residual, modal=residual, on_the_way=transient)

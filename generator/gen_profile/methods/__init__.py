@@ -1,0 +1,1 @@
+"""How motions are found: optimal control and input shapers."""

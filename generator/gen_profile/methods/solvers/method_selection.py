@@ -1,0 +1,154 @@
+"""Which solver for which problem."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import attrs
+import numpy as np
+
+from gen_profile.dynamics.problem.limits import breaches
+from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.problem import Problem
+from gen_profile.methods.solvers.direct import solver as direct
+from gen_profile.methods.solvers.direct import worst_case
+from gen_profile.methods.solvers.direct.relaxation import SHORTEST, Relaxation, Relaxed, shortest
+from gen_profile.methods.solvers.direct.transient_sway import SLACK, sway_on_the_way
+from gen_profile.methods.solvers.indirect import solver as indirect
+from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.search import Search
+from gen_profile.methods.solvers.solution import SIMPLER, WIDER, Solution, Status
+from gen_profile.motion.actuator import lag_compensated
+from gen_profile.spec.model import LimitsSpec
+from gen_profile.spec.values import SolverName
+from gen_profile.support.progress import Progress, no_progress
+from gen_profile.support.work import afford
+
+ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
+SOLVING = 2.0  # s of work for a method
+DIRECTLY = 3.0  # likewise for the direct one
+NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
+PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
+LEAST = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
+BLEND = 4.0  # order of the norm by which these times and the period count together
+RANGE = 2.0  # times the work for a whole range
+
+
+def attempt(
+    problem: Problem, method: SolverName = "auto", *, coarse: bool = False, near: Relaxed | None = None
+) -> Solution:
+    """Solve a problem by the method that suits it, without finding out what would help where that fails.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : str
+        ``"indirect"`` knows no limits; ``"auto"`` takes it where none binds, and the direct method elsewhere.
+    coarse : bool
+        Where limits bind, on few intervals only; over a range, with whatever sway is left.
+    near : Relaxed, optional
+        A motion at which the direct method begins, in place of rest.
+    """
+
+    def in_time(solve: Callable[[], Solution], seconds: float) -> Solution:
+        usual = 1.0 if problem.worst_case is None else RANGE
+        return afford(solve, seconds * usual) or given_up(problem)
+
+    if problem.worst_case is not None:
+        return in_time(partial(_over_a_range, problem, coarse=coarse), DIRECTLY)
+    directly = partial(_direct, problem, coarse=coarse, near=near)
+    if method == "direct":
+        return in_time(directly, DIRECTLY)
+    solution = in_time(partial(indirect.solve, problem), SOLVING)
+    if method == "indirect" or keeps_limits(solution) or solution.status is Status.INFEASIBLE:
+        return solution
+    other = in_time(directly, DIRECTLY)
+    return solution if other.optimum is None and solution.optimum is None else other
+
+
+def given_up(problem: Problem) -> Solution:
+    """Tell that a problem takes too much work."""
+    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, advice=SIMPLER)
+
+
+def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution:
+    """Begin near by, or at rest; where that misleads, at the motion of least violation."""
+    cost, _ = direct.resolve_sway_cost(problem)  # once for all motions
+    settled = attrs.evolve(problem, sway_weight=cost.beta, sway_scale=cost.gamma)
+    solution = direct.solve(settled, None if near is None else near.start(problem), coarse=coarse)
+    if problem.limits.stated() and not keeps_limits(solution):
+        nearest = least_violation(settled)
+        if nearest is not None and nearest.wider > NEARLY:
+            return _infeasible(problem, nearest)
+        other = solution if nearest is None else direct.solve(settled, nearest.start(settled), coarse=coarse)
+        solution = solution if other.optimum is None else other
+    return attrs.evolve(solution, problem=problem)
+
+
+def _infeasible(problem: Problem, nearest: Relaxed) -> Solution:
+    return attrs.evolve(
+        nearest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, advice=WIDER
+    )
+
+
+def least_violation(problem: Problem) -> Relaxed | None:
+    """Find the motion for which all limits must be widened least; none without limits."""
+    places = tuple(problem.limits.stated())
+    return Relaxation(problem).least(places) if places else None
+
+
+def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
+    """Look for the least worst case only where the nominal machine's motion can keep the limits."""
+    nearest = least_violation(problem)
+    if nearest is not None and nearest.wider > NEARLY:
+        return _infeasible(problem, nearest)
+    if nearest is None or not coarse:
+        return worst_case.solve(problem)
+    return attrs.evolve(nearest.solution, problem=problem)
+
+
+def minimum_time(
+    problem: Problem, progress: Progress = no_progress, near: Relaxed | None = None, search: Search = SHORTEST
+) -> Relaxed | None:
+    """Find the shortest motion for a problem's limits and robustness; None where none was found.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose duration does not matter.
+    progress : Progress
+    near : Relaxed, optional
+        A motion that is about as long.
+    search : Search
+        How exactly, unless over a range.
+    """
+    guess = near or usual_duration(problem)
+    if problem.worst_case is None:
+        return shortest(problem, guess, progress=progress, search=search)
+    return worst_case.shortest_motion(problem, guess, progress)
+
+
+def usual_duration(problem: Problem) -> float:
+    """About how long in s the shortest motion takes, which no axis does in less time than by itself."""
+    slowest = float(linearize(problem.plant, problem.parameters, problem.target).frequencies[0])
+    times = [PERIODS * 2.0 * math.pi / slowest]
+    if problem.limits.sway is not None:  # a pendulum's, under a constant acceleration
+        times.append(math.sqrt(LEAST[2] * max(map(abs, problem.distance)) / problem.limits.sway) / slowest)
+    for axis, way in enumerate(problem.distance):
+        limits = problem.limits.of(axis)
+        for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+            times += [] if limit is None else [(LEAST[order] * abs(way) / limit) ** (1.0 / order)]
+    return float(np.linalg.norm(times, BLEND))
+
+
+def keeps_limits(solution: Solution) -> bool:
+    """Tell whether a solution is one and keeps its problem's limits."""
+    if solution.optimum is None:
+        return False
+    problem = solution.problem
+    if problem.limits == LimitsSpec():
+        return True
+    sway = 0.0 if problem.limits.sway is None else sway_on_the_way(solution)
+    sway = max(sway, problem.sway_spread * sway / SLACK)
+    command = lag_compensated(optimal_profile(solution), problem.tau)
+    return not breaches(problem.limits, command, sway)

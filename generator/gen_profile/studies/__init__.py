@@ -1,0 +1,1 @@
+"""Many motions or machines at once: comparisons, sweeps, and parameters found from measurements."""

@@ -1,0 +1,301 @@
+"""Tables that loggers write: columns between semicolons, tabs or commas, decimals with points or commas."""
+
+import codecs
+import csv
+import errno
+import math
+import re
+from array import array
+from collections.abc import Collection, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array
+from gen_profile.support.bounded_file import read_bounded
+from gen_profile.support.errors import OutputError
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.suggestion import finite_number, number_meant, suggestion
+
+SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
+MOST_BYTES = 1 << 25
+# units as loggers write them, in brackets or behind a name, and what they are called here
+SPELLINGS = {"°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad"}
+SPELLINGS |= {"°/s": "deg/s", "dps": "deg/s"}
+SPELLINGS |= {"sec": "s", "seconds": "s", "sek": "s", "µs": "us", "μs": "us", "µm": "um", "μm": "um"}
+_BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")
+_BEHIND = re.compile(r".+[_ ](ms|us|s|rad|deg|mm|um)", re.IGNORECASE)
+# what is a unit, and no remark, though it may be one that nothing here is measured in
+_UNIT = re.compile(r".*[/^²³·].*|[kmµ]?[VAWNg]|kg|t|%|k?Hz|m?bar|°C|K|min|h|ms|us|s|rad|deg|m|mm|um")
+_DAY_FIRST = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})(?!\d)")  # as in 27.11.2026
+MISSING = {"nan", "na", "n/a", "null", "none", "-", "--"}  # what loggers write where they have no value
+AS_ISO = "; write dates as 2026-11-27 10:00:00"
+LEAVE_EMPTY = "; leave the cell empty where nothing was measured"
+GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
+# what a file begins with that is no text, and what to do about it
+OTHERS = {
+    b"PK\x03\x04": "a workbook (xlsx, ods) or another archive: open it and save the sheet as CSV",
+    b"\xd0\xcf\x11\xe0": "an old workbook (xls): open it and save the sheet as CSV",
+    b"PAR1": "a Parquet table: convert it to CSV",
+    b"\x1f\x8b": "compressed (gzip): unpack it",
+    b"MDF ": "an MDF measurement: export its signals as CSV",
+}
+
+
+@attrs.frozen(kw_only=True)
+class LogTable:
+    """A table's cells, without blanks around them; rows may differ in length.
+
+    Attributes
+    ----------
+    rows : sequence of sequence of str
+        Of what is no blank line; at least one. It tells each one's line in the file, too.
+    decimal_comma : bool
+        Whether a comma may stand for a decimal point.
+    source : str
+        Where it comes from, for errors.
+    """
+
+    rows: "_Rows"
+    decimal_comma: bool
+    source: str
+
+    def cell(self, row: int, place: int) -> str:
+        """Text of a cell; empty where the row, or the table, ends before."""
+        cells = self.rows[row] if row < len(self.rows) else ()
+        return cells[place] if place < len(cells) else ""
+
+    def number(self, row: int, place: int) -> float:
+        """Value of a cell; NaN where it holds no finite number."""
+        text = self.cell(row, place)
+        return finite_number(text.replace(",", ".") if self.decimal_comma else text)
+
+    def seconds(self, row: int, place: int) -> float:
+        """Time of a cell: a number, a date (ISO 8601, or day first) or a time of day, in s; else NaN."""
+        value = self.number(row, place)
+        if not math.isnan(value):
+            return value
+        text = _DAY_FIRST.sub(lambda day: f"{day[3]}-{day[2]:0>2}-{day[1]:0>2}", self.cell(row, place))
+        try:
+            moment = datetime.fromisoformat(f"{'1970-01-01 ' * (text[2:3] == ':')}{text.replace(',', '.')}")
+        except ValueError:
+            return math.nan
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+    def head(self, columns: Collection[str]) -> int:
+        """Find the row of these columns' names; where all are numbers, the last above values and units."""
+        if names := {column for column in columns if not column.isdecimal()}:
+            return next((row for row, cells in enumerate(self.rows) if names & set(cells)), 0)
+        places, above = [int(column) - 1 for column in columns], list[int]()
+        for row in range(len(self.rows)):
+            if len(self.rows[row]) <= max(places, default=0):
+                continue
+            cells = [self.cell(row, place) for place in places]
+            if self._holds_values(row, places):
+                return above[-1] if above else row
+            units = above and all(not cell or _UNIT.fullmatch(_spelt(cell)) for cell in cells)
+            if any(cells) and not units:
+                above.append(row)
+        return above[0] if above else 0
+
+    def _holds_values(self, row: int, places: Sequence[int]) -> bool:
+        """Tell whether cells hold times, values or what stands for none, and not all of them that."""
+        known = [place for place in places if not math.isnan(self.seconds(row, place))]
+        others = {self.cell(row, place).lower() for place in places if place not in known}
+        return bool(known) and others <= {"", *MISSING}
+
+    def place(self, head: int, column: str) -> int:
+        """Find a column by its name in a row of names, or by its number from 1.
+
+        Raises
+        ------
+        OutputError
+            There is none.
+        """
+        names = self.rows[head] if self.is_head(head) else []
+        if column in names:
+            return names.index(column)
+        if column.isdecimal() and 1 <= int(column) <= len(self.rows[head]):
+            return int(column) - 1
+        hint: str = Phrase("; there are {rows}, without names.", rows=len(self.rows[head]))
+        if names:
+            hint = suggestion(column, names)
+        raise self._fault("{source}: there is no column {column!r}{hint}", column=column, hint=hint)
+
+    def unit(self, head: int, place: int) -> str:
+        """Read a column's unit off its name or off the cell below that; empty where neither tells one."""
+        if not self.is_head(head):
+            return ""
+        name = self.cell(head, place)
+        match = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
+        unit = _spelt(match[1] if match else self.cell(head + 1, place))
+        return unit if _UNIT.fullmatch(unit) else ""
+
+    def is_head(self, row: int) -> bool:
+        """Tell whether a row holds more than numbers."""
+        return any(math.isnan(self.number(row, place)) for place in range(len(self.rows[row])))
+
+    def numbers(self, head: int, places: Sequence[int], since: float = -math.inf) -> Array:
+        """Read columns of numbers, the first of which are times, below a row; shape (rows, columns).
+
+        What stands above the first time is passed over, and rows in which a logger left a cell empty. Dates
+        count from the first, in s. From the time `since` on they must rise.
+
+        Raises
+        ------
+        OutputError
+            A cell holds no number, numbers with decimal commas stand between commas, or times do not rise.
+        """
+        time, values, read = places[0], array("d"), array("L")
+        below = range(head + self.is_head(head), len(self.rows))
+        first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
+        self._require_separate(head, first)
+        for row in range(first, len(self.rows)):
+            held = [self.cell(row, place) for place in places]
+            if not all(held):
+                continue
+            values_here = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
+            for place, text, value in zip(places, held, values_here, strict=True):
+                if not abs(value) <= GREATEST:
+                    name: str = Phrase("column {number}", number=place + 1)
+                    if self.is_head(head):
+                        name = self.cell(head, place)
+                    line = self.rows.line(row)
+                    hint = LEAVE_EMPTY if text.lower() in MISSING else number_meant(text)
+                    if place == time and not hint and re.match(r"\d+[-/.:]\d", text):
+                        hint = AS_ISO
+                    template = (
+                        "{source}, row {row}: {name} holds {text!r}, which is no number of a log{hint}."
+                    )
+                    raise self._fault(template, row=line, name=name, text=text[:40], hint=hint)
+            values.extend(values_here)
+            read.append(row)
+        table = np.array(values).reshape(-1, len(places))
+        if len(table) and math.isnan(self.number(first, time)):  # a date
+            table[:, 0] -= table[0, 0]
+        self._require_rising(table[:, 0], read, since)
+        return table
+
+    def _require_rising(self, times: Array, rows: Sequence[int], since: float) -> None:
+        counts = np.flatnonzero(times >= since)
+        back = np.flatnonzero(np.diff(times[counts]) <= 0.0)
+        if len(back):
+            before, after = counts[back[0] : back[0] + 2]
+            template = (
+                "{source}, row {row}: the times must rise from row to row, and {after:.9g} follows "
+                "{before:.9g}; sort the rows, remove those that come twice, or cut the log where the clock "
+                "was set back."
+            )
+            row = self.rows.line(rows[after])
+            raise self._fault(template, row=row, after=times[after], before=times[before])
+
+    def _require_separate(self, head: int, first: int) -> None:
+        """Refuse numbers whose decimal commas separate columns, too: they are twice as many as the names."""
+        names, cells = len(self.rows[head]), self.rows[first] if first < len(self.rows) else ()
+        whole = all(cell.lstrip("+-").isdecimal() for cell in cells)
+        if not self.decimal_comma and self.is_head(head) and names > 1 and whole and len(cells) == 2 * names:
+            template = (
+                "{source}, row {row}: holds {count} numbers below {names} names; where decimals have commas, "
+                "separate columns by semicolons or tabs."
+            )
+            raise self._fault(template, row=self.rows.line(first), count=len(cells), names=names)
+
+    def _fault(self, template: str, **values: object) -> OutputError:
+        return OutputError(template, source=self.source, **values)
+
+
+def _spelt(unit: str) -> str:
+    """Call a unit as it is called here, without brackets around it."""
+    bare = unit.strip("[]() ")
+    return SPELLINGS.get(bare.lower(), bare)
+
+
+def read_text(path: Path, option: str) -> str:
+    """Read what a logger wrote.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or is no text.
+    """
+    try:
+        content = read_bounded(path, MOST_BYTES)
+    except OSError as error:
+        if error.errno == errno.EFBIG:
+            raise OutputError(
+                f"{option} {path}: more than {MOST_BYTES >> 20} MiB; cut the move out of it."
+            ) from error
+        raise OutputError(f"{option}: cannot read the log {path}: {error.strerror}.") from error
+    return decoded(content, f"{option} {path}")
+
+
+def decoded(content: bytes, source: str) -> str:
+    """Decode what a logger wrote: UTF-16 or UTF-8 if it is, else Windows' Western European.
+
+    Raises
+    ------
+    OutputError
+        It is no text.
+    """
+    for mark, words in OTHERS.items():
+        if content.startswith(mark):
+            raise OutputError("{source}: this is {words}.", source=source, words=words)
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def read_table(text: str, source: str) -> LogTable:
+    """Split a text into cells.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Where it comes from, for errors.
+
+    Raises
+    ------
+    OutputError
+        It is empty, or no table.
+    """
+    rows = _Rows(text, source)
+    lines = rows.lines
+    if not lines:
+        raise OutputError("{source}: the log is empty.", source=source)
+    common = (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines))
+    rows.separator = next(common, ",")
+    return LogTable(rows=rows, decimal_comma=rows.separator != ",", source=source)
+
+
+class _Rows(Sequence[Sequence[str]]):
+    """Lines that are split when they are asked for: all cells at once take ten times the text's memory."""
+
+    def __init__(self, text: str, source: str) -> None:
+        self.lines = [line for line in text.splitlines() if line.strip()]
+        self.separator, self._text, self._source = ",", text, source
+        self._split: tuple[int, list[str]] = (-1, [])  # the row that was asked for last
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def line(self, row: int) -> int:
+        """Count a row's line in the file from 1, blank ones, too."""
+        lines = enumerate(self._text.splitlines(), 1)
+        return [number for number, line in lines if line.strip()][row]
+
+    def __getitem__(self, row: Any) -> Any:
+        if row != self._split[0]:
+            try:
+                cells = next(csv.reader([self.lines[row]], delimiter=self.separator))
+            except csv.Error as error:
+                template = "{source}, row {row}: it is no table ({problem})."
+                raise OutputError(template, source=self._source, row=self.line(row), problem=error) from error
+            self._split = (row, [cell.strip() for cell in cells])
+        return self._split[1]

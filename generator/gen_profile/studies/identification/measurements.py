@@ -1,0 +1,288 @@
+"""What can be measured on a machine: parameters by tape or scale, periods by stopwatch, a logged swing.
+
+Every uncertainty is one standard deviation.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array, read_only
+from gen_profile.spec.reading import as_text
+from gen_profile.studies.identification.log_table import read_table
+from gen_profile.support.errors import OutputError, SpecError
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.summary import Sampled
+from gen_profile.support.units import units_of
+
+_NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
+_VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
+LEAST_SAMPLES = 16
+GREATEST = 1e9  # s, swings or SI units of any reading
+FINEST = 1e-9  # of a value, to which no instrument reads it
+TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
+SI_UNITS = {"angle": "rad", "sway": "m", "rate": "rad/s"}  # of what may be logged of a load
+
+
+@attrs.frozen(kw_only=True)
+class DirectReading:
+    """A parameter read off a tape, a scale or a data sheet, in SI units."""
+
+    parameter: str
+    value: float
+    uncertainty: float
+
+
+@attrs.frozen(kw_only=True)
+class Period:
+    """How long one free swing takes.
+
+    Attributes
+    ----------
+    mode : int
+        1 for the slowest mode.
+    seconds, uncertainty : float
+        Of one period.
+    """
+
+    mode: int
+    seconds: float
+    uncertainty: float
+
+
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class SwingLog(Sampled):
+    """A free swing, logged while the axes stood still.
+
+    Attributes
+    ----------
+    times : (samples,) array
+        s, rising; not necessarily evenly spaced.
+    values : (samples,) array
+        Of one output of one load in rad, m or rad/s, which may be off by a constant.
+    quantity : str
+        ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them, or ``"rate"`` of the
+        angle, as a gyroscope on the load measures it.
+    load : str
+    resolution : float
+        Least step between different values as they were read, as of an encoder that counts.
+    logged : int
+        Samples that were read, of which `averaged` may have made fewer.
+    """
+
+    times: Array = attrs.field(converter=read_only)
+    values: Array = attrs.field(converter=read_only)
+    quantity: str
+    load: str
+    resolution: float = attrs.field()
+    logged: int = attrs.field()
+
+    @resolution.default
+    def _resolution(self) -> float:
+        return float(np.diff(np.unique(self.values)).min(initial=np.inf))
+
+    @logged.default
+    def _logged(self) -> int:
+        return len(self.times)
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return SI_UNITS[self.quantity]
+
+    def averaged(self, width: float, most: int) -> SwingLog:
+        """Take the means of what was logged within every so many seconds, so many of them at most.
+
+        Averages of a small swing are a swing of the same frequency and damping; noise they have less of, and
+        hum of the mains hardly any.
+        """
+        bins = (self.times / width).astype(np.int64)
+        _, first = np.unique(bins, return_index=True)
+        ends = np.append(first, len(bins))[: most + 1]
+        counts, last = np.diff(ends), int(ends[-1])
+        means = [np.add.reduceat(signal[:last], ends[:-1]) / counts for signal in (self.times, self.values)]
+        return attrs.evolve(self, times=means[0] - means[0][0], values=means[1])
+
+
+Measurement = DirectReading | Period | SwingLog
+
+
+def parse_reading(text: str, option: str = "measured") -> DirectReading:
+    """Read ``L1=0.47±0.005``, given by an option of some name.
+
+    Raises
+    ------
+    SpecError
+
+    Examples
+    --------
+    >>> gp.parse_reading("L1=0.47±0.005")
+    DirectReading(parameter='L1', value=0.47, uncertainty=0.005)
+    """
+    match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", as_text(text, f"{option}: a text"))
+    if match is None:
+        comma = _decimal_points(text)
+        raise SpecError(
+            f"{option} {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
+        )
+    name, value, uncertainty = match.groups()
+    spread = _spread(f"{option} {text!r}", float(value), float(uncertainty))
+    return DirectReading(parameter=name, value=float(value), uncertainty=spread)
+
+
+def parse_period(text: str) -> Period:
+    """Read ``17.3±0.2/10``: ten swings in 17.3 s; ``2:0.70±0.01`` is one swing of the second mode.
+
+    Raises
+    ------
+    SpecError
+
+    Examples
+    --------
+    >>> gp.parse_period("17.3±0.2/10")
+    Period(mode=1, seconds=1.73, uncertainty=0.02)
+    """
+    match = re.fullmatch(
+        rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", as_text(text, "period: a text")
+    )
+    if match is None:
+        raise SpecError(
+            f"period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
+            f"swings, or 2:0.70±0.01 for the second mode (+- will do for ±){_decimal_points(text)}."
+        )
+    mode, seconds, uncertainty, swings = match.groups()
+    where, total = f"period {text!r}", float(seconds)
+    count = _positive(where, "number of swings", float(swings or 1))
+    return Period(
+        mode=int(_positive(where, "mode", float(mode or 1))),
+        seconds=_positive(where, "time", total) / count,
+        uncertainty=_spread(where, total, float(uncertainty)) / count,
+    )
+
+
+def _decimal_points(text: str) -> str:
+    """Continue a sentence about a reading with decimal commas."""
+    pointed = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", text)
+    return f"; write decimal points: {pointed}" if pointed != text else ""
+
+
+def parse_swing(
+    text: str,
+    source: str,
+    *,
+    columns: tuple[str, str],
+    per_second: float | None,
+    per_unit: float | None,
+    after: float,
+    quantity: str,
+    load: str,
+) -> SwingLog:
+    """Read a log: two columns of a table, below their names and whatever else stands there.
+
+    Rows in which the logger left one of the two empty are left out.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Where it comes from, for errors.
+    columns : (str, str)
+        Of time, and of the value: names, or numbers from 1. Dates and times are given in s from the first.
+    per_second : float or None
+        How many of the time's unit make a second; None for what the column's name says, or s.
+    per_unit : float or None
+        How many of the value's unit make an SI unit; None for what the column's name says, or one.
+    after : float
+        Time in s from which on the axes stood still; earlier rows are left out.
+    quantity, load : str
+        What the value is; see `SwingLog`.
+
+    Raises
+    ------
+    OutputError
+        The table cannot be read.
+    """
+    cells = read_table(text, source)
+    head = cells.head(columns)
+    places = [cells.place(head, column) for column in columns]
+    known = ((per_second, "time", TIME_UNITS), (per_unit, quantity, units_of(SI_UNITS[quantity])))
+    scales = [
+        per or _per_stated(cells.cell(head, place), cells.unit(head, place), source, measured, units)
+        for place, (per, measured, units) in zip(places, known, strict=True)
+    ]
+    table = cells.numbers(head, places, after * scales[0]) / scales
+    return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
+
+
+def _per_stated(name: str, unit: str, source: str, measured: str, units: Mapping[str, float]) -> float:
+    """Say how many of the unit that a column states, if it does, make an SI unit."""
+    if unit and unit not in units:
+        others = [other for other, si in SI_UNITS.items() if unit in units_of(si)]
+        cure: str = "name another column"
+        if others:
+            cure = Phrase("take it for a log of the {quantity} (signal)", quantity=others[0])
+        template = (
+            "{source}: column {name!r} is in {unit}, which measures no {measured}; {cure}, or state the "
+            "unit if the name is wrong."
+        )
+        raise OutputError(template, source=source, name=name, unit=unit, measured=measured, cure=cure)
+    return units[unit] if unit else 1.0
+
+
+def cut_swing(
+    times: Array, values: Array, source: str, *, after: float, quantity: str, load: str
+) -> SwingLog:
+    """Leave out of a log what was logged before the axes stood still.
+
+    Parameters
+    ----------
+    times, values : (samples,) arrays
+        s, and SI units.
+    source : str
+        Where it comes from, for errors.
+    after : float
+        Time in s from which on the axes stood still.
+    quantity, load : str
+        What the value is; see `SwingLog`.
+
+    Raises
+    ------
+    OutputError
+        What is left is no swing.
+    """
+    times, values = times[times >= after], values[times >= after]
+    if len(times) < LEAST_SAMPLES:
+        template = "{source}: a swing needs at least {least} samples, found {count}."
+        raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
+    if quantity == "angle":
+        require_angle(values)
+    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
+
+
+def require_angle(values: Array) -> None:
+    """Refuse, by a `SpecError`, angles in rad that go over more than half a turn, as degrees do."""
+    if (span := float(np.ptp(values))) > np.pi:
+        raise SpecError(
+            "unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?", span=span
+        )
+
+
+def _positive(where: str, what: str, value: float) -> float:
+    if not value > 0.0:
+        raise SpecError(f"{where}: the {what} must be greater than 0.")
+    if value > GREATEST:
+        raise SpecError(f"{where}: the {what} must be {GREATEST:g} at most.")
+    return value
+
+
+def _spread(where: str, value: float, uncertainty: float) -> float:
+    """Hold an uncertainty to what an instrument may have."""
+    if abs(value) > GREATEST:
+        raise SpecError(f"{where}: the value must be {GREATEST:g} at most.")
+    if 0.0 < uncertainty < FINEST * abs(value):
+        raise SpecError(f"{where}: nothing is measured to {uncertainty:g} of {value:g}; state what is known.")
+    return _positive(where, "uncertainty", uncertainty)

@@ -1,0 +1,1 @@
+"""What every chapter uses: errors, units, files, JSON, progress."""
