@@ -1,7 +1,9 @@
 """From Structured Text to C99: the subset of IEC 61131-3 that planner and playback blocks are written in.
 
-One function block per text: scalars of BOOL, INT (as wide as DINT here), DINT and LREAL and one-dimensional
-arrays of them, assignments, IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL.
+Function blocks, the last of which is the text's own and has instances of those before it: scalars of BOOL,
+INT (as wide as DINT here), DINT and LREAL and one-dimensional arrays of them, assignments, IF, CASE, FOR,
+WHILE, calls of instances, which are handed scalars as inputs and arrays by VAR_IN_OUT, their outputs, and
+ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL.
 The C code needs no library but libm and allocates nothing; an instance is one structure. Compiled without
 contraction of products and sums, it computes bit for bit what the text says.
 
@@ -28,6 +30,7 @@ from gen_profile_exporters.st_variables import (
     declared,
     elements,
     refused,
+    require_no_word_of_c,
 )
 from gen_profile_exporters.text_parts import FOLDER, filled, indented
 
@@ -39,9 +42,11 @@ FAULTS = (
     "leaves the range of DINT",
     "takes the square root of a negative number",
 )
+WRITTEN = ("VAR", "VAR_OUTPUT", "VAR_IN_OUT")
 MOST_TURNS = 200_000  # of all loops in one cycle
 PART = 40  # lines beyond which a branch is a function: one of thousands compiles four times as slowly
-TEXTS = ("structured_text.lark", "c/operations.txt", "c/block.c", "c/block.h")  # files that it reads
+C_TEXTS = ("operations.txt", "block.c", "block.h", "instance.c", "structure.h")
+TEXTS = ("structured_text.lark", *(f"c/{name}" for name in C_TEXTS))  # files that it reads
 # operator or function and the types that it takes | C | a macro in its place that checks
 _ROWS = [line.split(" | ") for line in (FOLDER / "c/operations.txt").read_text("ascii").splitlines()]
 _PLAIN = {tuple(taken.split()): code for taken, code, *_ in _ROWS}
@@ -90,23 +95,45 @@ def translate(text: str) -> Translation:
     ExportError
         It is no function block of this subset of the language.
     """
-    name, variables, body, parts = translate_statements(text, {}, checked=True)
+    *used, own = _translated(text, {}, checked=True)
+    if handed := [v.name for v in own.variables if v.section == "VAR_IN_OUT"]:
+        raise ExportError(f"{NO_BLOCK}: nothing hands {handed[0]} to the last block of the text.")
     inputs, outputs = (
-        tuple(one for v in variables if v.section == section for one in elements(v))
+        tuple(one for v in own.variables if v.section == section for one in elements(v))
         for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
-    members = indented(f"{c_member(v)};" for v in variables if v.section != "VAR CONSTANT")
-    initials = c_initials(variables, dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->"))
     source = filled(
         "c/block.c",
-        name=name,
         most_turns=MOST_TURNS,
-        constants="\n".join(c_constants(variables, sum(parts, body))),
-        initials=indented(initials),
-        parts="\n".join(_function(f"{name}_part_{k}", name, part) for k, part in enumerate(parts)),
-        body=indented(body),
+        blocks="".join(filled("c/instance.c", **_code(block, _owner(block.name))) + "\n" for block in used),
+        **_code(own),
     )
-    return Translation(name, inputs, outputs, filled("c/block.h", name=name, members=members), source)
+    header = filled(
+        "c/block.h",
+        name=own.name,
+        structures="".join(f"{_structure(block)}\n" for block in used),
+        structure=_structure(own),
+    )
+    return Translation(own.name, inputs, outputs, header, source)
+
+
+def _code(block: "Statements", owner: str = "") -> dict[str, str]:
+    """Give a block's functions and constants, whose names `owner` begins."""
+    name, variables = block.name, block.variables
+    owners = dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->")
+    parts = (_function(f"{name}_part_{k}", name, part) for k, part in enumerate(block.parts))
+    return {
+        "name": name,
+        "constants": "\n".join(c_constants(variables, sum(block.parts, block.body), owner)),
+        "initials": indented(c_initials(variables, owners)),
+        "parts": "\n".join(parts),
+        "body": indented(block.body),
+    }
+
+
+def _structure(block: "Statements") -> str:
+    members = indented(f"{c_member(v)};" for v in block.variables if v.section != "VAR CONSTANT")
+    return filled("c/structure.h", name=block.name, members=members)
 
 
 class Statements(NamedTuple):
@@ -137,12 +164,24 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     ExportError
         It is no function block of this subset of the language.
     """
+    *used, own = _translated(text, owners, checked=checked)
+    if used:
+        raise ExportError(f"{NO_BLOCK}: it has other blocks in it, which this form does not take.")
+    return own
+
+
+def _translated(text: str, owners: Mapping[str, str], *, checked: bool) -> list[Statements]:
+    """Translate all blocks of a text, in their order; `owners` are those of the last one."""
+    blocks: dict[str, Statements] = {}
     try:
-        tree = _parser().parse(text)
-        variables = declared(tree)
-        _require_writable(tree, variables)
-        translator = _Translator(str(tree.children[0]), variables, owners, checked)
-        translated: Any = translator.transform(tree)
+        trees: Any = _parser().parse(text).children
+        for tree in trees:
+            name = tree.children[0]
+            require_no_word_of_c(name)
+            if name.lower() in blocks:
+                raise refused(name, f"{name} is declared twice")
+            own = owners if tree is trees[-1] else {"VAR CONSTANT": _owner(name)}
+            blocks[name.lower()] = _block(tree, blocks, own, checked=checked)
     except UnexpectedInput as error:
         place = f"line {error.line}, column {error.column}"
         raise ExportError(f"{NO_BLOCK}: {place} is not understood.") from error
@@ -150,8 +189,23 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
         raise error.orig_exc from error
     except RecursionError as error:
         raise ExportError("The text is nested too deeply to be executed here.") from error
-    name, *_, body = translated.children
-    return Statements(str(name), list(variables.values()), body, translator.parts)
+    return [*blocks.values()]
+
+
+def _owner(name: str) -> str:
+    """Begin the names of constants of a block within others, which may have some of the same name."""
+    return f"{name}_"
+
+
+def _block(
+    tree: Any, blocks: Mapping[str, Statements], owners: Mapping[str, str], *, checked: bool
+) -> Statements:
+    name = str(tree.children[0])
+    variables = declared(tree, {key: block.name for key, block in blocks.items()})
+    _require_writable(tree, variables)
+    translator = _Translator(name, variables, owners, checked, blocks)
+    body: Any = translator.transform(tree)
+    return Statements(name, list(variables.values()), body.children[-1], translator.parts)
 
 
 @cache
@@ -164,7 +218,12 @@ def _require_writable(tree: Any, variables: Mapping[str, StVariable]) -> None:
     """Refuse that inputs and constants are written, and counters within their loops."""
     for name in _written(tree):
         variable = variables.get(name.lower())
-        if variable is not None and variable.section not in ("VAR", "VAR_OUTPUT"):
+        if variable is not None and variable.section not in WRITTEN:
+            raise refused(name, f"{name} is {variable.section}, which is not written")
+    for argument in tree.find_data("argument"):  # a whole array is handed over to be written
+        name, index = (*argument.children[1].children, None)[:2]
+        variable = variables.get(str(name).lower())
+        if index is None and variable and variable.length and variable.section not in WRITTEN:
             raise refused(name, f"{name} is {variable.section}, which is not written")
     for loop in tree.find_data("count"):
         counter, *_, body = loop.children
@@ -184,9 +243,15 @@ class _Translator(Transformer[Token, object]):
     """Expressions become `_Code`, statements lines of C."""
 
     def __init__(
-        self, name: str, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool
+        self,
+        name: str,
+        variables: dict[str, StVariable],
+        owners: Mapping[str, str],
+        checked: bool,
+        blocks: Mapping[str, Statements],
     ) -> None:
         super().__init__(visit_tokens=False)
+        self._blocks = blocks
         self._name, self._variables, self._checked = name, variables, checked
         self._owners = {"VAR CONSTANT": "", **owners}
         self._templates = _PLAIN | _CHECKED if checked else _PLAIN
@@ -211,15 +276,58 @@ class _Translator(Transformer[Token, object]):
         variable = self._variables.get(name.lower())
         if variable is None:
             raise refused(name, f"{name} is not declared")
-        if (index is None) != (variable.length == 0):
-            raise refused(name, f"{name} is {'an array' if variable.length else 'no array'}")
-        owned, line = self._owners.get(variable.section, "fb->") + variable.name, name.line or 0
+        owned = self._owners.get(variable.section, "fb->") + variable.name
+        return self._element(name, variable, owned, index)
+
+    def _element(self, name: Token, variable: StVariable, owned: str, index: _Code | None) -> _Code:
+        """Give a variable, or the element of an array."""
+        line = name.line or 0
         if index is None:
-            return _Code(owned, variable.type, line)
+            return _Code(owned, variable.whole_type, line)
+        if not variable.length:
+            raise refused(name, f"{name} is no array")
         self._require(index, "DINT", f"an index of {name}")
         text = f"{index.text} - {variable.lower}" if variable.lower else index.text
         place = f"AT({text}, {variable.length})" if self._checked else text
         return _Code(f"{owned}[{place}]", variable.type, line, index.work)
+
+    def member(self, parts):  # type: ignore[no-untyped-def]
+        name, output, index = parts
+        instance, members = self._instance(name)
+        variable = members.get(output.lower())
+        if variable is None or variable.section != "VAR_OUTPUT":
+            raise refused(output, f"{name} has no output {output}")
+        return self._element(output, variable, f"{instance.text}.{variable.name}", index)
+
+    def _instance(self, name: Token) -> tuple[_Code, dict[str, StVariable]]:
+        """Give an instance, and its variables by their names in lower case."""
+        instance = self._place(name)
+        block = self._blocks.get(instance.type.lower())
+        if block is None:
+            raise refused(name, f"{name} is no instance of a block")
+        return instance, {variable.name.lower(): variable for variable in block.variables}
+
+    def argument(self, parts):  # type: ignore[no-untyped-def]
+        return parts
+
+    def invoke(self, parts):  # type: ignore[no-untyped-def]
+        name, *arguments = parts
+        instance, members = self._instance(name)
+        lines, given = [], set()
+        for parameter, value in filter(None, arguments):
+            variable = members.get(parameter.lower())
+            taken = variable is not None and variable.section in ("VAR_INPUT", "VAR_IN_OUT")
+            if variable is None or not taken or variable.name in given:
+                raise refused(parameter, f"{name} takes no {parameter}, or takes it once")
+            self._require(value, variable.whole_type, f"{parameter} of {name}")
+            if variable.section == "VAR_INPUT" and variable.length:
+                raise refused(parameter, f"{parameter} is an array, which is handed over by VAR_IN_OUT only")
+            given.add(variable.name)
+            lines += [*self._counted(value.work), f"{instance.text}.{variable.name} = {value.text};"]
+        missing = [v.name for v in members.values() if v.section == "VAR_IN_OUT" and v.name not in given]
+        if missing:
+            raise refused(name, f"{name} is called without {missing[0]}")
+        return [*lines, f"CALL({instance.type}_step, {instance.text});"]
 
     @staticmethod
     def _require(code: _Code, type_: str, what: str) -> None:
@@ -255,6 +363,8 @@ class _Translator(Transformer[Token, object]):
 
     def assignment(self, parts):  # type: ignore[no-untyped-def]
         target, value = parts
+        if target.type not in ("BOOL", "DINT", "LREAL"):
+            raise refused(target.line, "what is assigned is one value, not a whole array or instance")
         self._require(value, target.type, "what is assigned here")
         return [*self._counted(target.work + value.work), f"{target.text} = {value.text};"]
 

@@ -238,6 +238,9 @@ class _Translator(Interpreter):
                 f"{name}: {parameter} mixes types",
             )
             given.append(f"{due}={code}")
+        names = {one.partition("=")[0] for one in given}
+        for key, section in declared.sections.items():
+            _check(section != "VAR_IN_OUT" or key in names, f"{name}: {key} is missing")
         return [f"{instance}.call({', '.join(given)})"]
 
     def _whole(self, tree):
@@ -300,7 +303,7 @@ class _Translator(Interpreter):
         name = tree.children[0].children[0].lower()
         scalar, place = self._whole(tree.children[0])
         type_, code = self._whole(tree.children[1])
-        _check(self.sections[name] in ("VAR", "VAR_OUTPUT"), f"{name} must not be written")
+        _check(self.sections[name] in ("VAR", "VAR_OUTPUT", "VAR_IN_OUT"), f"{name} must not be written")
         _check(name not in self.counters, f"{name} counts the loop around it")
         _check(_fits(type_, scalar), f"{name} : {scalar} cannot hold {type_}")
         if scalar in LIMITS:
@@ -472,7 +475,15 @@ class FunctionBlock:
             _check(value.name.lower() == scalar.lower(), f"{name} is no {value.name}")
             return value
         _check(len(value) == bounds[1] - bounds[0] + 1, f"{name} takes another number of values")
+        if self.sections[name] == "VAR_IN_OUT":  # the array itself
+            return value
         return [_given(scalar, item, name) for item in value]
+
+
+def block_of(text):
+    """An instance of the last block of a text, which has the blocks before it within it."""
+    *library, own = [f"{one}END_FUNCTION_BLOCK\n" for one in text.split("END_FUNCTION_BLOCK")[:-1]]
+    return FunctionBlock(own, tuple(library))
 
 
 def _given(scalar, value, name):

@@ -20,6 +20,8 @@ long ${name}_operations;
 /* A fault is a branch that is predicted not to be taken: to select a value in each operation takes twice the time. */
 #define BEGIN() int32_t turns_ = fb->turns_, fault_ = fb->fault_
 #define FIRST() (turns_ = 0)
+#define CALL(name, instance) ((instance).turns_ = turns_, (instance).fault_ = fault_, name(&(instance)), \
+    turns_ = (instance).turns_, fault_ = (instance).fault_)
 #define PART(name) (END(), name(fb), turns_ = fb->turns_, fault_ = fb->fault_)
 #define END() (fb->turns_ = turns_, fb->fault_ = fault_)
 #define AT(index, length) within(&fault_, index, length)
@@ -83,6 +85,7 @@ static inline double root(int32_t *fault, double value)
 #else
 #define BEGIN() ((void)0)
 #define FIRST() ((void)0)
+#define CALL(name, instance) name(&(instance))
 #define PART(name) name(fb)
 #define END() ((void)0)
 #define AT(index, length) (index)
@@ -98,7 +101,7 @@ static inline double root(int32_t *fault, double value)
 #define EITHER(one, other) ((one) || (other))
 #endif
 
-$constants
+$blocks$constants
 
 static void ${name}_init($name *fb) {
     memset(fb, 0, sizeof *fb);

@@ -4,13 +4,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef struct {
-$members
-#ifdef CHECKED
-    int32_t fault_, turns_;
-#endif
-} $name;
-
+$structures$structure
 /* Once, before all else. */
 static void ${name}_init($name *fb);
 
