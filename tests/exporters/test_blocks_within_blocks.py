@@ -7,8 +7,8 @@ import pytest
 from lark.exceptions import LarkError
 from st_interpreter import StError, block_of
 
-from gen_profile.errors import ExportError
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.st_to_c import translate, translate_statements
 
 INNERMOST = """

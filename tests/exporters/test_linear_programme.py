@@ -1,0 +1,142 @@
+"""The block of linear programmes, translated to C, beside SciPy's HiGHS and beside the tests' interpreter."""
+
+import os
+
+import attrs
+import numpy as np
+import pytest
+from counted_block import CountedBlock, compile_counting
+from solved_programmes import FOUND, NONE, ROWS, UNFINISHED, Programmes, crane_problem, text
+from st_interpreter import block_of
+
+COUNT = int(os.environ.get("LINEAR_PROGRAMMES", "1000"))
+MET = 1e-6  # of full speed: bounds and sums of what is found
+LEAST = 2e-3  # full speeds: beyond the least cost
+
+
+@pytest.fixture(scope="module")
+def programmes():
+    return Programmes()
+
+
+def problem_of(*seed, **changes):
+    return attrs.evolve(crane_problem(np.random.default_rng(seed)), **changes)
+
+
+def differences(programmes, seed, numbers):
+    """What the block says of random programmes otherwise than HiGHS, and how often it found some."""
+    words, found = [], 0
+    for number in numbers:
+        problem = problem_of(seed, number)
+        result, speeds, iterations = programmes.solve(problem)
+        due = problem.by_highs(problem.costs)
+        found += result == FOUND
+        if result != (NONE if due is None else FOUND):
+            words.append(f"{number}: {result} after {iterations}, HiGHS {due is not None}")
+        elif due is not None and problem.missed(speeds) > MET:
+            words.append(f"{number}: missed by {problem.missed(speeds)}")
+        elif due is not None and problem.costs is not None and problem.costs @ (speeds - due) > LEAST:
+            words.append(f"{number}: costs {problem.costs @ speeds}, HiGHS {problem.costs @ due}")
+    return words, found
+
+
+def test_random_programmes_are_found_or_refused_as_by_highs(programmes):
+    words, found = differences(programmes, 1, range(60))
+    assert not words
+    assert 20 < found < 40
+
+
+@pytest.mark.slow
+def test_many_random_programmes_are_found_or_refused_as_by_highs(programmes):
+    words, found = differences(programmes, 2, range(COUNT))
+    assert not words
+    assert 0.35 < found / COUNT < 0.65
+
+
+def one_with(result, programmes, **changes):
+    for number in range(100):
+        problem = problem_of(3, number, **changes)
+        if programmes.solve(problem)[0] == result and programmes.solve(problem)[2] > 4:
+            return problem
+    raise AssertionError("no such programme")
+
+
+@pytest.mark.parametrize("result", [FOUND, NONE])
+def test_it_does_the_same_however_few_operations_a_call_has(programmes, result):
+    problem = one_with(result, programmes)
+    due, speeds, iterations = programmes.solve(problem, operations=60_000)
+    again, slowly, as_many = programmes.solve(problem, operations=700)
+    assert (again, as_many) == (due, iterations) and np.array_equal(slowly, speeds)
+    assert programmes.calls > 60
+    assert max(programmes.spent) <= 700
+
+
+def test_it_never_spends_more_than_it_counts():
+    for number in range(6):
+        problem = problem_of(4, number)
+        block = CountedBlock(compile_counting(text()))
+        row = Programmes().row(problem, operations=5000, iterations=30)
+        block.inputs = dict(zip(block.inputs, row, strict=False))
+        for _ in range(2000):
+            issued = block.step()
+            assert issued["operations"] <= issued["nSpent"] <= 5000
+            block.inputs["bStart"] = 0.0
+            if issued["nResult"]:
+                break
+        assert issued["nResult"]
+
+
+def test_one_that_is_not_finished_is_neither_found_nor_refused(programmes):
+    for wanted in (FOUND, NONE):
+        problem = one_with(wanted, programmes)
+        assert programmes.solve(problem, iterations=3)[0] == UNFINISHED
+
+
+def test_bounds_that_exclude_each_other_are_refused_at_once(programmes):
+    problem = one_with(FOUND, programmes)
+    slow, fast = problem.speeds
+    for changes in (
+        {"speeds": (slow, np.where(np.arange(problem.slots) == 3, -2.0, fast))},
+        {"places": (np.full(problem.slots, 1.0), np.full(problem.slots, 0.5))},
+        {"most": (0.0, problem.most[1])},
+        {"most": (problem.most[0], -1.0)},
+    ):
+        refused = attrs.evolve(problem, **changes)
+        assert programmes.solve(refused)[::2] == (NONE, 0)
+
+
+def test_rows_that_say_the_same_count_once_and_those_that_say_otherwise_exclude_each_other(programmes):
+    problem = next(p for p in (problem_of(5, k) for k in range(99)) if p.equal < 5 and len(p.rows) < ROWS
+                   and programmes.solve(p)[0] == FOUND)  # fmt: skip
+    again = attrs.evolve(
+        problem,
+        rows=np.vstack([problem.rows[:1], problem.rows]),
+        values=np.r_[problem.values[:1], problem.values],
+    )
+    assert programmes.solve(again)[0] == FOUND
+    other = attrs.evolve(again, values=np.r_[problem.values[0] + 0.01, problem.values])
+    assert other.by_highs() is None
+    assert programmes.solve(other)[0] != FOUND
+
+
+@pytest.mark.slow
+def test_c_and_the_interpreter_find_the_same_bits(programmes):
+    oracle = block_of(text())
+    for number in range(4):
+        problem = problem_of(6, number)
+        row = programmes.row(problem, operations=60_000, iterations=12)
+        due = programmes.solve(problem, iterations=12)
+        given = {}
+        for name, value in zip(programmes.names, row, strict=True):
+            base, _, indexed = name.partition("[")
+            kind = {"b": bool, "n": int}.get(name[0], float)
+            if indexed:
+                given.setdefault(base, []).append(float(value))
+            else:
+                given[base] = kind(value)
+        found = oracle.call(**given)
+        while not found["nresult"]:
+            found = oracle.call(**given | {"bStart": False})
+        places = np.array(found["aplace"][: problem.slots])
+        assert (found["nresult"], found["niterations"]) == due[::2]
+        assert np.array_equal(np.diff(places, prepend=0.0), due[1])
