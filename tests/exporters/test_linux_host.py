@@ -165,7 +165,7 @@ def test_a_wrong_word_is_refused(host, words):
 @pytest.mark.slow
 @pytest.mark.parametrize("trap", ["open to all", "a second name", *["another user's"][: os.geteuid() == 0]])
 def test_shared_memory_that_another_user_may_write_is_not_taken(host, trap):
-    """Whoever writes it commands the axes."""
+    """A user who can write it commands the axes."""
     shared = Path("/dev/shm/host_3")
     shared.touch(mode=0o600)
     second = shared.with_name("host_3.second")

@@ -10,8 +10,9 @@ import pytest
 from fmu.caches import share_zig
 
 from gen_profile.support.errors import CosimulationError
+from gen_profile.support.private_folder import cache_folders
 from gen_profile_fmu.building import build
-from gen_profile_fmu.building.cache import cache_folders, cached, is_intact, write_entry
+from gen_profile_fmu.building.cache import cached, is_intact, write_entry
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 

@@ -13,6 +13,7 @@ EXIT_CODES = {
     "GenProfileError": 1,
     "SpecError": 2,
     "OutputError": 2,
+    "UnknownProgram": 2,
     "NoMotion": 3,
     "InfeasibleProblem": 3,
     "SolverDiverged": 3,

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
-from gen_profile.support.private_folder import temporary_folder
-from gen_profile_fmu.building.cache import cached, own_folder
+from gen_profile.support.private_folder import own_folder, temporary_folder
+from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import Compiler, compile_library, find_compiler
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.building.universal_binary import universal_binary

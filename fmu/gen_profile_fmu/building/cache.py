@@ -8,69 +8,24 @@ place by a rename: a reader sees whole files only. The list of checksums comes l
 import errno
 import json
 import logging
-import os
-import sys
-import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
-import platformdirs
-
 from gen_profile.support.artefacts.manifest import sha256
 from gen_profile.support.errors import CosimulationError
-from gen_profile.support.private_folder import is_private, make_private, others_may_write, temporary_folder
+from gen_profile.support.private_folder import (
+    ENVIRONMENT_VARIABLE,
+    cache_folders,
+    others_may_write,
+    own_folder,
+    temporary_folder,
+)
 from gen_profile.support.strict_json import parse_json
 
-ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"
 _logger = logging.getLogger(__name__)
 _known_intact: dict[Path, dict[str, tuple[int, ...]]] = {}  # entries read whole, and their files then
-
-
-def cache_folders() -> Iterator[Path]:
-    """List folders to look in and to write to, the preferred one first.
-
-    That is what the environment variable `GEN_PROFILE_CACHE` names, else the cache folder of the user; then,
-    for users without a home or with one that will not do, a private folder among the temporary files.
-    """
-    named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
-    preferred = Path(named).absolute() if named else _users_folder()
-    if preferred is not None:
-        yield preferred
-    user = "user"
-    if sys.platform != "win32":
-        user = str(os.geteuid())
-    yield Path(tempfile.gettempdir()) / f"gen-profile-{user}"
-
-
-def _users_folder() -> Path | None:
-    """Find the user's cache folder; None for a user without a home."""
-    try:
-        folder = platformdirs.user_cache_path("gen-profile", appauthor=False)
-    except RuntimeError:
-        return None
-    return folder if folder.is_absolute() else None  # "~" stays where some versions find no home
-
-
-def own_folder(folder: Path, within: Path | None = None) -> Path:
-    """Make a folder unless it is there, and refuse one that others may write: what lies in it is run.
-
-    Parameters
-    ----------
-    folder : Path
-    within : Path, optional
-        One above it that is known to be the user's own.
-
-    Raises
-    ------
-    OSError
-    """
-    make_private(folder)
-    temporary = Path(tempfile.gettempdir())  # nothing lies safer there, however it is kept
-    if others_may_write(folder, within) and not (folder.parent == temporary and is_private(folder)):
-        raise PermissionError(errno.EPERM, "others may write there, and what it holds is run")
-    return folder
 
 
 def cached(name: str, make: Callable[[Path], Mapping[str, bytes]]) -> Path:

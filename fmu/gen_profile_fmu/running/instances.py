@@ -23,8 +23,9 @@ from fmpy.fmi2 import (
 
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import CosimulationError
+from gen_profile.support.private_folder import ENVIRONMENT_VARIABLE
 from gen_profile_fmu.building.build import compile_texts
-from gen_profile_fmu.building.cache import ENVIRONMENT_VARIABLE, cached
+from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version, digest, standard_headers

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from io import TextIOWrapper
+from typing import Any
 
 import click
 
@@ -22,6 +23,8 @@ from gen_profile.cli import (  # noqa: F401  # each adds its commands
 )
 from gen_profile.cli.commands import cli
 from gen_profile.cli.outcome import print_error, unprinted
+from gen_profile.support.errors import UnknownProgram
+from gen_profile.support.private_folder import agree
 
 
 def run() -> None:
@@ -40,12 +43,27 @@ def run() -> None:
 
         logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
     try:
-        sys.exit(cli.main(prog_name="gen-profile", standalone_mode=False))
+        sys.exit(_done())
     except Exception as error:
         if debug:
             raise
         # what is interrupted while compiled code runs may end in an error of that code's own
         sys.exit(print_error(click.Abort() if interruptions else _refusal() or error, as_json))
+
+
+def _done() -> Any:
+    """Run the command; once more where it met a program that the user lets run when he is asked."""
+    try:
+        return cli.main(prog_name="gen-profile", standalone_mode=False)
+    except UnknownProgram as error:
+        if not (sys.stdin and sys.stdin.isatty() and sys.stderr.isatty()):
+            raise
+        hashes = ", ".join(f"{path.name} (SHA-256 {sha256})" for path, sha256 in error.programs.items())
+        if not click.confirm(f"{error}\nLet {hashes} run?", err=True):
+            raise
+        for sha256 in error.programs.values():
+            agree(sha256)
+        return cli.main(prog_name="gen-profile", standalone_mode=False)
 
 
 def refuse_interrupted() -> int:

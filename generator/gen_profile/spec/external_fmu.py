@@ -10,6 +10,7 @@ from gen_profile.spec.model import ExternalFmu
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
 from gen_profile.spec.values import Pattern, Words
 from gen_profile.support.bounded_file import read_bounded
+from gen_profile.support.private_folder import agree
 
 KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "time_limit")
 INPUTS = ("acceleration", "velocity", "setpoint")
@@ -64,6 +65,8 @@ def _sha256(path: Path, stated: Any, faults: Faults) -> str:
         return ""
     if stated is not None and stated != actual:
         faults.add("check.fmu", "{path} is not the FMU that was checked with; its SHA-256 differs", path=path)
+    else:
+        agree(actual)
     return actual
 
 

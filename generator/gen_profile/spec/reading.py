@@ -7,19 +7,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from importlib.resources import files
 from numbers import Real
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any, TypeVar
 
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.spec.tables import Table, structure
 from gen_profile.support.bounded_file import DOCUMENT, is_folder, read_bounded
-from gen_profile.support.errors import OutputError, SpecError
+from gen_profile.support.errors import OutputError, SpecError, UnknownProgram
+from gen_profile.support.private_folder import is_agreed
 from gen_profile.support.suggestion import found, listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
 Given = TypeVar("Given")
 HERE = Path()
+PROGRAMS = (("plant", "file"), ("check", "fmu"))  # keys that name code, which runs
 MOST_PARTS = 32  # of a key: its parser takes time and memory by their square
 LONG_KEY = re.compile(
     r"(?<![\w-])(?:(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
@@ -282,6 +284,41 @@ def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
     spec = structure(document, folder)
     refuse_implausible(spec)
     return spec
+
+
+def received_spec(document: Mapping[str, Any], folder: Path) -> Spec:
+    """Read the spec in a manifest, which may be another's: programs that it names are not run unasked.
+
+    Raises
+    ------
+    SpecError
+        It has faults.
+    OutputError
+        It names a program elsewhere than beside it, or without its SHA-256.
+    UnknownProgram
+        The user has not let it run.
+    """
+    unknown = {}
+    for table, key in PROGRAMS:
+        stated = document.get(table)
+        if not isinstance(stated, Mapping) or key not in stated:
+            continue
+        name, sha256 = stated[key], stated.get(f"{key}_sha256")
+        beside = isinstance(name, str) and PureWindowsPath(name).name == name
+        if not beside or not isinstance(sha256, str):
+            raise OutputError(
+                f"The spec in {folder} names the program {name!r} by {table}.{key}; it was not run, as "
+                f"received files name programs beside them only, with {table}.{key}_sha256."
+            )
+        if not is_agreed(sha256):
+            unknown[folder / name] = sha256
+    if unknown:
+        raise UnknownProgram(
+            f"{' and '.join(map(str, unknown))} would run with your rights, and never did. Read it, then "
+            "let it run by an answer in a terminal, or by naming a spec of yours that names it.",
+            programs=unknown,
+        )
+    return spec_from_dict(document, folder)
 
 
 @lru_cache(maxsize=1)  # all cases of a sweep begin at the same

@@ -20,6 +20,7 @@ from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, pla
 from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, between
 from gen_profile.support.errors import SpecError
 from gen_profile.support.phrase import Phrase
+from gen_profile.support.private_folder import agree
 from gen_profile.support.suggestion import found, listed, meant, suggestion
 
 Table = dict[str, Any]
@@ -123,6 +124,7 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
     else:
         try:
             file = read_machine_file(folder / name, sha256)
+            agree(file.sha256)
             plant = plant_of_file(file)
         except SpecError as error:
             faults.add("plant.file", str(error).removeprefix("plant.file: ").removesuffix("."))

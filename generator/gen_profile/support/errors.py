@@ -5,6 +5,7 @@
     GenProfileError
     ├── SpecError            2   the spec, or the way it was asked for
     ├── OutputError          2   the output folder or a file cannot be read or written
+    │   └── UnknownProgram     2   what was received would run a program that the user has not let run
     ├── NoMotion             3   there is no motion for the spec
     │   ├── InfeasibleProblem  3   no such motion exists
     │   ├── SolverDiverged     3   the solver found none
@@ -24,6 +25,8 @@ a code, and by suggestions that were tried.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
+from functools import partial
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 from gen_profile.support.phrase import OR_WITH, Phrase, joined
@@ -96,6 +99,24 @@ class OutputError(GenProfileError):
     """
 
     exit_code = 2
+
+
+class UnknownProgram(OutputError):
+    """What was received names programs that would run with the user's rights, which he has not let run yet.
+
+    Attributes
+    ----------
+    programs : mapping of Path to str
+        Their SHA-256.
+    """
+
+    def __init__(self, *sentences: str, programs: Mapping[Path, str]) -> None:
+        self.programs = programs
+        super().__init__(*sentences)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Keep the programs where it goes to another process."""
+        return partial(UnknownProgram, programs=self.programs), self.args
 
 
 class Code(StrEnum):

@@ -1,17 +1,26 @@
-"""Folders that no other user may write: whether one is, and temporary ones that end with their owner."""
+"""Folders that no other user may write: whether one is, temporary ones, and the user's cache."""
 
+from __future__ import annotations
+
+import errno
 import os
+import re
 import shutil
 import stat
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import mkdtemp
+from typing import TYPE_CHECKING
 
-from filelock import FileLock, Timeout
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 LOCK = ".lock"
+ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
+_AGREED = "agreed"  # folder of empty files, named by the SHA-256 of programs that the user lets run
+_SHA256 = re.compile(r"[0-9a-f]{64}")
 ROOT, OVERFLOW_USER = 0, 65534  # the latter owns what a container's user has no number for
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
@@ -101,8 +110,10 @@ def temporary_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 
 def _locked_folder(parent: Path, prefix: str) -> tuple[Path, FileLock]:
+    from filelock import FileLock  # noqa: PLC0415  # which waits for asyncio
+
     while True:
-        folder = Path(mkdtemp(prefix=prefix, dir=parent))
+        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         lock = FileLock(folder / LOCK)
         try:
             lock.acquire()
@@ -115,6 +126,8 @@ def _locked_folder(parent: Path, prefix: str) -> tuple[Path, FileLock]:
 
 
 def _remove_abandoned(parent: Path, prefix: str) -> None:
+    from filelock import FileLock, Timeout  # noqa: PLC0415
+
     for folder in parent.glob(f"{prefix}*"):
         if not is_private(folder) or not (folder / LOCK).is_file():
             continue
@@ -122,3 +135,67 @@ def _remove_abandoned(parent: Path, prefix: str) -> None:
             with FileLock(folder / LOCK).acquire(blocking=False):
                 shutil.rmtree(folder, ignore_errors=True)
             shutil.rmtree(folder, ignore_errors=True)  # Windows keeps files that are open
+
+
+def cache_folders() -> Iterator[Path]:
+    """List folders to look in and to write to, the preferred one first.
+
+    That is what the environment variable `GEN_PROFILE_CACHE` names, else the cache folder of the user; then,
+    for users without a home or with one that will not do, a private folder among the temporary files.
+    """
+    named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
+    preferred = Path(named).absolute() if named else _users_folder()
+    if preferred is not None:
+        yield preferred
+    user = "user"
+    if sys.platform != "win32":
+        user = str(os.geteuid())
+    yield Path(tempfile.gettempdir()) / f"gen-profile-{user}"
+
+
+def _users_folder() -> Path | None:
+    """Find the user's cache folder; None for a user without a home."""
+    import platformdirs  # noqa: PLC0415
+
+    try:
+        folder = platformdirs.user_cache_path("gen-profile", appauthor=False)
+    except RuntimeError:
+        return None
+    return folder if folder.is_absolute() else None  # "~" stays where some versions find no home
+
+
+def own_folder(folder: Path, within: Path | None = None) -> Path:
+    """Make a folder unless it is there, and refuse one that others may write: what lies in it is run.
+
+    Parameters
+    ----------
+    folder : Path
+    within : Path, optional
+        One above it that is known to be the user's own.
+
+    Raises
+    ------
+    OSError
+    """
+    make_private(folder)
+    temporary = Path(tempfile.gettempdir())  # nothing lies safer there, however it is kept
+    if others_may_write(folder, within) and not (folder.parent == temporary and is_private(folder)):
+        raise PermissionError(errno.EPERM, "others may write there, and what it holds is run")
+    return folder
+
+
+def agree(sha256: str) -> None:
+    """Note a program that the user lets run; where nothing can be kept, he is asked again."""
+    for folder in cache_folders():
+        with suppress(OSError):
+            (own_folder(folder / _AGREED, within=own_folder(folder)) / sha256).touch(mode=0o600)
+            return
+
+
+def is_agreed(sha256: str) -> bool:
+    """Whether the user has let a program run before."""
+    for folder in cache_folders() if _SHA256.fullmatch(sha256) else ():
+        with suppress(OSError):
+            if (own_folder(folder / _AGREED, within=own_folder(folder)) / sha256).is_file():
+                return True
+    return False

@@ -8,7 +8,7 @@
  * It is called every $cycle s. Other programs reach it in shared memory, /dev/shm/$name, which is laid out as `struct
  * image` below: one writes the inputs, a fieldbus's takes the setpoints, and "${file}_opcua.py" serves both by OPC UA.
  * All that belongs to one cycle stands in one row. Only this user and his group may write it (UMask=0007 lets the
- * group): a file of that name that is another user's is refused, and whoever opens it should do the same.
+ * group): a file of that name that is another user's is refused. A program that opens it should do the same.
  *
  * Who commands must change bAlive, in any way, every SECONDS (1; 0 for never): while it does not, bStop is set. The
  * first signal sets bStop, too, and a second one bQuickStop; the program ends once the axis stands, and says how
@@ -83,7 +83,7 @@ static void give_up(const char *what)
     exit(1);
 }
 
-/* Refuse a file that was there before: whoever may write it commands the axes. */
+/* Refuse a file that another user may write: he would command the axes. */
 static void require_own(int file)
 {
     struct stat status;

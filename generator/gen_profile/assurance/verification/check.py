@@ -22,7 +22,7 @@ from gen_profile.dynamics.evaluation.scenarios import Scenario, further_scenario
 from gen_profile.dynamics.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec, spec_from_dict
+from gen_profile.spec.reading import as_names, as_path, as_spec, received_spec
 from gen_profile.spec.values import require_whole
 from gen_profile.support.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.support.artefacts.reading import companions_of, manifest_beside, read_motion, strays
@@ -364,7 +364,7 @@ def spec_and_manifest(
         words = f"{str(error).removesuffix('.')}, or name its spec"
         raise OutputError(f"{words}: gen-profile check {quote(str(path))} SPEC.toml") from error
     try:
-        return spec or spec_from_dict(manifest.spec, path.parent), manifest
+        return spec or received_spec(manifest.spec, path.parent), manifest
     except SpecError as error:
         raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
 

@@ -23,7 +23,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.forms import block_in
 from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import spec_from_dict
+from gen_profile.spec.reading import received_spec
 from gen_profile.support.artefacts.manifest import SEAL, artefact_of, seal_of, sha256
 from gen_profile.support.artefacts.reading import (
     compared,
@@ -226,7 +226,7 @@ def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:
         raise CheckFailed(f"{path.name} is not the library of {index.name}: it was altered; make it again.")
     for sentence in strays(path, compared(path.parent, document.get("companions", {}))):
         raise CheckFailed(sentence)
-    return tuple(spec_from_dict(one, path.parent) for one in document["specs"])
+    return tuple(received_spec(one, path.parent) for one in document["specs"])
 
 
 def _document(path: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import attrs
 
 from gen_profile.delivery.streaming.outcome import Source, StreamOutcome
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import spec_from_dict
+from gen_profile.spec.reading import received_spec
 from gen_profile.support.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.support.artefacts.reading import manifest_beside, read_motion, require_companions
 from gen_profile.support.errors import CheckFailed, SpecError, StreamAborted
@@ -114,7 +114,7 @@ def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: b
         )
     if manifest.check is not None and not manifest.check.get("passed"):
         raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
-    return spec_from_dict(manifest.spec, path.parent)
+    return received_spec(manifest.spec, path.parent)
 
 
 def designed(spec: Spec, tell: Progress) -> Source:

@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 import tomlkit
 
-from gen_profile.spec.reading import Document, overridden, parse_toml, preset_text
+from gen_profile.spec.reading import PROGRAMS, Document, overridden, parse_toml, preset_text
 from gen_profile.spec.values import NONE
 from gen_profile.support.errors import SpecError
 from gen_profile.support.strict_json import parse_json
@@ -75,7 +75,7 @@ class WrittenSpec:
         They are a machine of one's own, and an external FMU.
         """
         programs = {}
-        for name, key in (("plant", "file"), ("check", "fmu")):
+        for name, key in PROGRAMS:
             table = self.document.get(name)
             if isinstance(table, dict) and isinstance(file := table.get(key), str):
                 programs[f"{name}.{key}"] = (self.folder / file).absolute()

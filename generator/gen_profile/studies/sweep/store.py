@@ -24,7 +24,7 @@ from filelock import FileLock, Timeout
 from pyarrow import compute
 
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import overridden, spec_from_dict
+from gen_profile.spec.reading import overridden, received_spec
 from gen_profile.studies.sweep.archive import Archive, is_archive, read_archive, written_archive
 from gen_profile.studies.sweep.case import CaseOutcome, Recipe
 from gen_profile.studies.sweep.grid import Grid, GridAxis
@@ -350,7 +350,7 @@ def case_spec(path: Path, row: Mapping[str, Any], case: Path, changes: Sequence[
     OutputError, SpecError
     """
     manifest = parse_manifest(read_artefact(case / FILENAME, DOCUMENT), str(path / row["folder"] / FILENAME))
-    return spec_from_dict(overridden(dict(manifest.spec), changes), case)
+    return received_spec(overridden(dict(manifest.spec), changes), case)
 
 
 def take_out(path: Path, row: Mapping[str, Any], folder: Path) -> None:
