@@ -149,7 +149,7 @@ class Statements(NamedTuple):
 
 
 def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool = False) -> Statements:
-    """Translate a function block's statements.
+    """Translate a function block's statements, with a macro ``AT(index, length)`` for every index.
 
     Parameters
     ----------
@@ -288,8 +288,7 @@ class _Translator(Transformer[Token, object]):
             raise refused(name, f"{name} is no array")
         self._require(index, "DINT", f"an index of {name}")
         text = f"{index.text} - {variable.lower}" if variable.lower else index.text
-        place = f"AT({text}, {variable.length})" if self._checked else text
-        return _Code(f"{owned}[{place}]", variable.type, line, index.work)
+        return _Code(f"{owned}[AT({text}, {variable.length})]", variable.type, line, index.work)
 
     def member(self, parts):  # type: ignore[no-untyped-def]
         name, output, index = parts

@@ -14,6 +14,15 @@
 #pragma fp_contract(off)
 #endif
 
+/* Beyond its array an index counts as 0, and the step returns 1: nothing else in memory is read or written. */
+static inline int32_t within(int *left, int32_t index, int32_t length)
+{
+    const int beyond = (uint32_t)index >= (uint32_t)length;
+    *left |= beyond;
+    return beyond ? 0 : index;
+}
+#define AT(index, length) within(&left, index, length)
+
 $constants
 
 void ${name}_init(${name}_state *state, ${name}_inputs *in)
@@ -23,8 +32,10 @@ void ${name}_init(${name}_state *state, ${name}_inputs *in)
 $initials
 }
 
-void ${name}_step(${name}_state *state, const ${name}_inputs *in, ${name}_outputs *out)
+int ${name}_step(${name}_state *state, const ${name}_inputs *in, ${name}_outputs *out)
 {
+    int left = 0;
 $body
     *out = state->out;
+    return left;
 }

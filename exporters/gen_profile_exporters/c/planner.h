@@ -42,8 +42,9 @@ $memory
 /* Set the state, and all inputs to their initial values. Once, before all else. */
 void ${name}_init(${name}_state *state, ${name}_inputs *in);
 
-/* Plan and issue the next setpoint. Once in every cycle. */
-void ${name}_step(${name}_state *state, const ${name}_inputs *in, ${name}_outputs *out);
+/* Plan and issue the next setpoint. Once in every cycle. Returns 0, or 1 where an index would have left its array:
+   then stop the axis by other means, and report it as an error of gen-profile. */
+int ${name}_step(${name}_state *state, const ${name}_inputs *in, ${name}_outputs *out);
 
 #ifdef __cplusplus
 }

@@ -180,7 +180,10 @@ static void run(struct image *image, int64_t patience)
         row[STOP] = row[STOP] > 0.0 || signals || (patience && begun - heard >= patience);
         row[QUICK_STOP] = row[QUICK_STOP] > 0.0 || signals > 1;
         take(row, &in);
-        ${name}_step(&state, &in, &out);
+        if (${name}_step(&state, &in, &out)) {
+            fputs("$name would have left an array: this is an error of gen-profile. Stop the axes.\n", stderr);
+            exit(1);
+        }
         issue(&out, row);
         row[LATE] = (begun - due) / 1e9;
         row[STEP] = (now() - begun) / 1e9;

@@ -355,12 +355,19 @@ class ClosedLoop:
             for first in [max(round(change.time / self.cycle), int(change.time > 0.0))]
         ]
         edges = {edge for begin, end, _ in spans for edge in (begin, end) if edge < LONGEST}
+        edges.update(*(range(begin, end) for begin, end, change in spans if change.noise))
         cycles = sorted({*start_cycles, *edges})
         inputs = _rows_at(start_cycles, inputs, cycles)
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
             for name, value in change.inputs.items():
                 inputs[within, list(self._block.inputs).index(name)] = value
+            for name, value in change.noise.items():
+                random = np.random.default_rng([begin, *name.encode("ascii")])
+                off = random.uniform(-value, value, end - begin)
+                if name.startswith("fActPosition"):  # which is given relative to that of the cycle before
+                    off = np.diff(off, prepend=0.0)
+                inputs[within, list(self._block.inputs).index(name)] += off
         return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:

@@ -21,6 +21,7 @@ from gen_profile.assurance.proof.orders import (
     Flags,
     ReceivedOrders,
     TimedOrder,
+    taken_over,
 )
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
@@ -141,6 +142,11 @@ class Followed:
     def slowest(self) -> float:
         """Least velocity limit of a slow interval, in m/s."""
         return min((zone.limit for zone in self.zones if zone.limit), default=inf)
+
+    def taken_over_at(self, cycle: int) -> list[float]:
+        """Tell how fast axes are as they are taken over in a cycle, which is not the first."""
+        given = self.speeds[:, cycle - 1 : cycle + 1].tolist()
+        return [taken_over(last, own.velocity) for last, own in zip(given, self.limits, strict=True)]
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""

@@ -1,6 +1,6 @@
 """How operators and controllers give commands: again and again, by taps, in a rhythm, on second thoughts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import inf, nan
 from typing import Any
 
@@ -20,6 +20,10 @@ WRONG = 0.5  # s, at least, in which values count that cannot be
 OUTSIDE = 10.0  # m (or rad) beyond the targets
 FAR = 1e6  # m (or rad)
 HAND = 0.2  # of the greatest velocity, by which an axis is moved by hand
+MEASURED = 0.5  # share of the take-overs in which position and velocity are measured, not setpoints
+NOISY = (1e-3, 0.3)  # of the greatest velocity, by which a measured one is off
+OLD = 0.02  # s, at most, that a measured position is old
+SPIKE = 5.0  # times the greatest velocity, in one cycle
 OFTEN = 3  # so often some habits are taken
 WAITS = (0.15, 1.0)  # periods, from one command of a rhythm to the next
 UNEVEN = 2.0  # by which every other wait may be longer or shorter
@@ -46,11 +50,14 @@ class Change:
         s; less than a cycle is one.
     inputs : mapping of str to float
         By the block's names.
+    noise : mapping of str to float
+        By how much inputs are off at most, in each cycle by another amount.
     """
 
     time: float
     lasts: float
     inputs: Mapping[str, float]
+    noise: Mapping[str, float] = attrs.field(factory=dict)
 
 
 Manner = tuple[Command | Change, ...]  # what becomes of a command: commands in its place, and changes
@@ -406,17 +413,37 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
             speed = most * HAND * max(0.0, 1.5 * _fraction(how, 5 + k) - 0.5) * (1.0 if how < 0.45 else -1.0)
             taken |= {f"fActPosition{suffix}": speed * around.cycle, f"fActVelocity{suffix}": speed}
     goes = how > 0.3  # still, as it is taken over
-    if how > 0.8 and not around.hoists:  # nowhere, and so not taken over yet
+    nowhere = how > 0.8 and not around.hoists  # and so not taken over yet
+    if nowhere:
         name, k = "fActPosition" if how < 0.9 else "fActVelocity", int(100.0 * how) % len(around.suffixes)
         taken = {f"{name}{around.suffixes[k]}": nan} if how < 0.95 else {"fCycleTime": 0.5 * around.cycle}
+    disabled = lasts + 4.0 * around.cycle * (not goes)
     manner = (
         command,
         _followed(command, later + lasts + around.period),
-        _change(command, later, lasts + 4.0 * around.cycle * (not goes), {"bEnable": 0.0}),
+        _change(command, later, disabled, {"bEnable": 0.0}),
         _change(command, later, lasts + 1.5 * around.cycle * goes, taken),
+        *(() if nowhere else _measured(command, how, around, later=later, lasts=disabled)),
         _change(command, later + lasts + 3.0 * around.period, 0.0, {"bLoadAtRest": 1.0}),
     )
     return manner[:-1] if around.hoists else manner
+
+
+def _measured(
+    command: Command, how: float, around: Surroundings, *, later: float, lasts: float
+) -> Iterator[Change]:
+    """Measure where a disabled axis is, and how fast: with noise, old values, a step and a spike."""
+    if _fraction(how, 10) > MEASURED:
+        return
+    size, old, fault = _log(*NOISY, _fraction(how, 11)), OLD * _fraction(how, 12), _fraction(how, 13)
+    for (_, most), suffix in zip(around.speeds, around.suffixes, strict=True):
+        noise = {f"fActVelocity{suffix}": size * most, f"fActPosition{suffix}": size * most * old}
+        yield attrs.evolve(_change(command, later, lasts + 1.5 * around.cycle, {}), noise=noise)
+        if fault < 1.0 / 3.0:
+            step = {f"fActPosition{suffix}": most * old}
+            yield _change(command, later + lasts * 3.0 * fault, 0.0, step)
+        elif fault < 2.0 / 3.0:
+            yield _change(command, later + lasts, 0.0, {f"fActVelocity{suffix}": SPIKE * most})
 
 
 def _respooled(command: Command, how: float, around: Surroundings) -> Manner:

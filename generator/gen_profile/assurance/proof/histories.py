@@ -126,6 +126,7 @@ class History:
                 "time_s": change.time,
                 "lasts_s": written(change.lasts),
                 "inputs": {name: written(value) for name, value in change.inputs.items()},
+                **({"noise": dict(change.noise)} if change.noise else {}),
             }
             for change in self.changes
         ]
@@ -156,7 +157,7 @@ class History:
 
     def _has(self, name: str) -> bool:
         """Whether an input differs for some time from what the commands say."""
-        return any(known.startswith(name) for change in self.changes for known in change.inputs)
+        return any(known.startswith(name) for one in self.changes for known in (*one.inputs, *one.noise))
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -4,9 +4,9 @@ Beside its inputs, what a command means depends on what the block did: one that 
 and none is taken while a quick stop lasts. Before a run nothing is known of that.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from math import inf
+from math import copysign, inf
 
 import attrs
 import numpy as np
@@ -24,6 +24,7 @@ OF_COMMANDS = (REFUSED, CONTRADICTORY, BLOCKED)  # which go with them
 REPLACED, ABORTED_POSITION, ABORTED_VELOCITY = 3, 1, 2  # why bCommandAborted is set
 ZONES = 8  # intervals of each kind
 ROUNDING = 1e-9  # m (or rad)
+STILL = 1e-3  # of the greatest velocity, that counts as standing
 NUMBERS = 1e9  # m (or rad), up to which an axis may be somewhere
 
 Flags = NDArray[np.bool_]
@@ -66,6 +67,16 @@ class Ends:
     targets: Interval
     quick: tuple[float, float] = (inf, inf)
     margin: float = 0.0
+
+
+def taken_over(speeds: Sequence[float], most: float) -> float:
+    """Tell the velocity with which an axis is taken over: the lesser of the last two, within its limit.
+
+    None that two of different sign leave, or that counts as standing.
+    """
+    least = min(most, *map(abs, speeds))
+    same = all(v > 0.0 for v in speeds) or all(v < 0.0 for v in speeds)
+    return copysign(least, speeds[0]) if same and least > STILL * most else 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -202,6 +213,7 @@ class _Reader:
         self._since = {LIVE: -1, LIMITS: -1}  # cycles from which values are wrong
         self._goal, self._kind = tuple[float, ...](), STOP
         self._tops = tuple(own.velocity for own in inputs.limits)
+        self._speeds: Sequence[float] | None = None
         self._names = cache(lambda name: [axis.of(name) for axis in inputs.axes])
 
     def step(self, cycle: int, row: Mapping[str, float]) -> TimedOrder:
@@ -212,6 +224,7 @@ class _Reader:
         if (before, goal) != (self._kind, self._goal):
             self._edge = cycle
         self._execute, self._velocity = bool(row["bExecute"]), bool(row["bVelocity"])
+        self._speeds = self._of(row, "fActVelocity")
         return TimedOrder(
             begin=cycle, end=cycle, kind=self._kind, values=self._goal, tops=self._tops, edge=self._edge
         )
@@ -236,7 +249,7 @@ class _Reader:
             if self.error:
                 return DISABLED
             self._enabled = True
-            self._braking = any(map(row.get, self._names("fActVelocity")))
+            self._braking = any(self._taken_over(row))
         fault = self._fault(cycle, row)
         self._neutral = self._neutral or not row["bVelocity"]
         rises = bool(row["bExecute"]) and not self._execute
@@ -255,6 +268,12 @@ class _Reader:
         if quick and not (facts is None or (cycle and facts.stands[cycle - 1])):
             self._braking = True
         return QUICK_STOP if quick or self.error == FOLLOWING else self.command
+
+    def _taken_over(self, row: Mapping[str, float]) -> Iterator[float]:
+        """Tell how fast axes are as they are taken over."""
+        now = self._of(row, "fActVelocity")
+        for speeds, own in zip(zip(now, self._speeds or now, strict=True), self._inputs.limits, strict=True):
+            yield taken_over(speeds, own.velocity)
 
     def _mistimed(self, row: Mapping[str, float]) -> bool:
         cycle = self._inputs.cycle

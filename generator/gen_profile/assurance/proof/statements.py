@@ -215,12 +215,12 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
         moving, at = not run.stands[max(0, order.begin - 1)], order.begin
         if order.kind == DISABLED:
             at = order.end
-            moving |= bool(run.velocity[:, at - 1 : at].any())
             moved = run.moved(order.begin, at) > 0.0 and not (run.reserve and _moves_as_stated(run, order))
             begun = bool(run.issued["bBusy"][max(0, order.begin - 1)])  # to move in the next cycle
             refused = bool((run.issued["nErrorId"][: order.begin] == NO_MOTION).any())
-            may_be[at:] |= moving or moved or begun or refused
-            must_be[at:] |= (moving or run.moved(order.begin, at) > FAR_MOVED) and not run.reserve
+            goes = run.taken_over_at(at)
+            may_be[at:] |= moving or moved or begun or refused or any(goes)
+            must_be[at:] |= (any(goes) or run.moved(order.begin, at) > FAR_MOVED) and not run.reserve
         elif order.kind == QUICK_STOP:
             may_be[at:] |= moving or bool(run.issued["bBusy"][max(0, at - 1)])
             must_be[at:] |= moving
@@ -415,12 +415,16 @@ def taken_over(run: Followed) -> Iterator[Allowance]:
         own = slice(order.begin, last + 1)
         x, v = run.position[:, order.begin - 1 : last + 1], run.velocity[:, own]
         known = np.isfinite(run.steps[:, own] + run.speeds[:, own]).all(axis=0)
+        most = np.array([[limits.velocity] for limits in run.limits])
+        speeds = np.clip(run.speeds[:, own], -most, most)
+        if order.end < run.cycles:
+            speeds[:, -1] = run.taken_over_at(order.end)
         apart = np.abs(np.diff(x, axis=1) - np.where(known, run.steps[:, own], 0.0))
         braked = [limits.quick[1] * run.cycle**3 for limits in run.limits]
         apart[:, -1] -= np.abs(v[:, -1]) * run.cycle + braked
         yield from greatest("taken over", apart, EXACT, order.begin)
         allowed = np.array([[limits.quick[0]] for limits in run.limits]) * run.cycle
-        wrong = np.abs(v - np.where(known, run.speeds[:, own], v))
+        wrong = np.abs(v - np.where(known, speeds, v))
         yield from greatest("taken over", wrong[:, :-1], EXACT, order.begin)
         yield from greatest("taken over", wrong[:, -1:] - allowed, EXACT, last)
 
