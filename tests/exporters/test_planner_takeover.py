@@ -7,11 +7,11 @@ import pytest
 from exporters.planner_benches import ON, START, Converter
 from generator.planned_machines import HOIST
 
+from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.proof.closed_loop import ClosedLoop
-from gen_profile.proof.histories import Histories
-from gen_profile.proof.numbering import Numbering
 from gen_profile.spec.reading import parse_spec
 from gen_profile_exporters.block_source import parse_function_block
 
