@@ -287,15 +287,24 @@ def test_a_library_is_deployed_and_any_motion_of_it_that_sways_too_much_stops_th
     assert used(block, libraries) == "old"
 
 
+@pytest.mark.parametrize("name", ["old", "new"])
+def test_a_trial_is_refused_before_anything_is_asked_of_the_controller(planners, name):
+    """Its manifest states 8 histories, as one may that was sealed again."""
+    link = DirectLink(fresh(planners))
+    with pytest.raises(CheckFailed, match=r"is a trial, on 8 histories, and 200 make a proof: .* --trial"):
+        deploy(planners[name], box_of(link))
+    assert link.operations == 0
+
+
 @pytest.mark.slow
 def test_a_planner_is_proved_by_what_was_read_back_and_never_switched_while_enabled(planners):
     block, new = fresh(planners), planners["new"]
     block.set("bEnable", np.array([1.0]))
     block.run(10)
     with pytest.raises(DeploymentError, match="The block moves"):
-        deploy(new, box_of(DirectLink(block)))
+        deploy(new, box_of(DirectLink(block)), trial=True)
     assert used(block, planners) == "old"
-    done = deploy(new, box_of(DirectLink(block)))
+    done = deploy(new, box_of(DirectLink(block)), trial=True)
     assert done.to_dict()["check"]["histories"] == 8 and done.judgement.check.passed
     assert used(block, planners) == "new"
     block.set("bEnable", np.array([1.0]))

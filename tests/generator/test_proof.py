@@ -152,7 +152,9 @@ def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatc
     broken = attrs.evolve(GOOD, fault=1, cycles=0, stands=-1)
     monkeypatch.setattr(ClosedLoop, "watched", lambda *_: WatchedRun(run=broken))
     (reason,) = prove(spec, text, histories=4).reasons()
-    assert reason == ("In history 0 the block goes beyond the end of an array, and likewise in 3 others.")
+    assert reason == (
+        "In history 0 of 4 the block goes beyond the end of an array, and likewise in 3 others."
+    )
 
 
 @pytest.mark.slow

@@ -95,3 +95,42 @@ def test_nothing_is_promised_while_what_was_measured_is_damped():
     assert kind_of(WORDS["kept"]) in kinds(damps)
     damps.issued["bPromise"][:200], damps.issued["nPromise"][:200] = 0.0, 6.0
     assert kind_of(WORDS["kept"]) not in kinds(damps)
+
+
+def proof_of(count, promised):
+    """A proof of so many histories without a fault, of which some end with a promise."""
+    one = SimpleNamespace(number=0, group=DRAWS, faults=(), later={}, residual=ONE_LOAD)
+    judged = [
+        SimpleNamespace(**vars(one), promise=k < promised, fraction=lambda *_: 0.5) for k in range(count)
+    ]
+    return Proof(
+        limit=ONE_LOAD,
+        error_bound=0.0,
+        seed=0,
+        count=count,
+        parents=(),
+        judged=tuple(judged),
+        by_fmpy=(),
+        apart=0.0,
+    )
+
+
+def test_few_histories_are_a_trial_and_all_verdicts_tell_how_many():
+    assert proof_of(199, 150).summary() == {
+        "trial": "passed",
+        "histories": "199 histories of the 200 that make a proof, 150 of them promised",
+        "worst": "history 0, 50 % of the limit",
+    }
+    assert proof_of(200, 150).summary()["histories"] == "200 histories, 150 of them promised"
+    assert (proof_of(199, 1).kind, proof_of(200, 1).kind) == ("trial", "proof")
+
+
+@pytest.mark.parametrize("count", [1, 250])
+def test_where_nothing_was_promised_nothing_is_proved(count):
+    (reason,) = proof_of(count, 0).reasons()
+    assert reason.startswith(f"None of the {count} histories ends with a promise, so no sway was judged")
+    assert proof_of(count, 1).passed
+    again = attrs.evolve(
+        proof_of(count, 0), judged=proof_of(1, 0).judged
+    )  # one that is run again by its number
+    assert again.passed == (count > 1)

@@ -48,7 +48,7 @@ def planner() -> None:
 @options.spec
 @options.export("Form of the block: plc, another that holds one, c, linux or openplc", "plc", _complete_forms)
 @options.folder
-@options.histories("Prove it on N histories of commands; on 200 by default.")
+@options.histories("Prove it on N histories of commands; on 200 by default, and fewer are a trial.")
 @options.scheduler("run the histories")
 @option("--no-check", "Skip the proof; the manifest then says unverified.")
 @option("--keep-failed", "Write the block even where the proof fails.")
@@ -70,7 +70,7 @@ def write(
     spec = chosen.spec()
     if picture is not None and no_check:
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
-    from gen_profile.assurance.proof.prove import HISTORIES
+    from gen_profile.assurance.proof.verdict import HISTORIES
     from gen_profile.cli import words
     from gen_profile.delivery.designs.planner import deploy_planner
     from gen_profile.planner.forms import require_forms

@@ -185,7 +185,7 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
         *groups,
         ("limits", limits),
         ("worst history", f"{proof.worst.number}: residual sway {_remains(proof.worst)}"),
-        ("proof", f"{verdict}: {100.0 * document['share']:.3g} % of the limit"),
+        (proof.kind, f"{verdict} on {proof.carried_by}: {100.0 * document['share']:.3g} % of the limit"),
     ]
 
 

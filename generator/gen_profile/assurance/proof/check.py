@@ -9,8 +9,8 @@ import attrs
 
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.numbering import Numbering
-from gen_profile.assurance.proof.prove import HISTORIES, prove, replay
-from gen_profile.assurance.proof.verdict import Proof
+from gen_profile.assurance.proof.prove import prove, replay
+from gen_profile.assurance.proof.verdict import HISTORIES, Proof
 from gen_profile.assurance.verification.check import JudgedFile, alterations, provenance, spec_and_manifest
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import block_in, refuse_program, refuse_wrapper

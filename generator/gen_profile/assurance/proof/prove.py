@@ -11,14 +11,13 @@ from gen_profile.assurance.proof.closed_loop import ClosedLoop
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.judging import Judge
 from gen_profile.assurance.proof.numbering import KEPT, LONG, RHYTHMS, Numbering
-from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
+from gen_profile.assurance.proof.verdict import HISTORIES, JudgedHistory, Proof
 from gen_profile.assurance.verification.cosimulation import ERROR_FLOOR
 from gen_profile.assurance.verification.monte_carlo import CURVATURE
 from gen_profile.spec.model import Spec
 from gen_profile.support.plugins import require_installed
 from gen_profile.support.progress import Progress, no_progress
 
-HISTORIES = 200
 BY_FMPY = 100  # of so many histories, one is judged by FMPy
 FEWEST_BY_FMPY = 2
 

@@ -22,6 +22,7 @@ GROUPS = {
     RHYTHMS: "many commands in one rhythm, and steps that climb from the worst",
     LONG: "eight hours of commands",
 }
+HISTORIES = 200  # that a proof takes; fewer are a trial
 QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 FEWEST, SURE = 20, 2.0  # commands of a kind; and standard deviations of their mean
@@ -108,7 +109,7 @@ class JudgedHistory:
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
 class Proof(Summarised, Examination):
-    """Verdict on a planner block.
+    """Verdict on a planner block; on fewer than `HISTORIES` it is called a trial.
 
     Attributes
     ----------
@@ -145,14 +146,30 @@ class Proof(Summarised, Examination):
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
         return {
-            "proof": "passed" if self.passed else "failed",
-            "histories": len(self.judged),
+            self.kind: "passed" if self.passed else "failed",
+            "histories": self.carried_by,
             "worst": f"history {self.worst.number}, {100.0 * self.fraction(self.worst):.3g} % of the limit",
         }
 
     def fraction(self, judged: JudgedHistory) -> float:
         """Share of the limit of residual sway that a history takes up, the error bound included."""
         return judged.fraction(self.limit, self.error_bound)
+
+    @property
+    def kind(self) -> str:
+        """What it is called: a proof, or a trial."""
+        return "proof" if self.count >= HISTORIES else "trial"
+
+    @property
+    def promised(self) -> int:
+        """In how many of the histories the block promises at the end that no sway remains."""
+        return sum(one.promise for one in self.judged)
+
+    @property
+    def carried_by(self) -> str:
+        """Say by how many histories it is carried."""
+        of = "" if self.kind == "proof" else f" of the {HISTORIES} that make a proof"
+        return f"{len(self.judged)} histories{of}, {self.promised} of them promised"
 
     @property
     def worst(self) -> JudgedHistory:
@@ -166,7 +183,7 @@ class Proof(Summarised, Examination):
             load = max(self.limit, key=lambda name: self.worst.residual[name] / self.limit[name])
             sentences.append(
                 f"The {load} sways by {1e3 * self.worst.residual[load]:.4g} mm after history "
-                f"{self.worst.number}, and {1e3 * self.limit[load]:.4g} mm are allowed "
+                f"{self.worst.number} of {self.count}, and {1e3 * self.limit[load]:.4g} mm are allowed "
                 "(check.residual_sway): narrow check.uncertain, allow more, or accelerate less."
             )
         by_kind: dict[str, list[JudgedHistory]] = {}
@@ -177,8 +194,13 @@ class Proof(Summarised, Examination):
             first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             cure = CURES.get(kind, "")
-            sentences.append(f"In history {those[0].number} {first}{others}{cure}.")
+            sentences.append(f"In history {those[0].number} of {self.count} {first}{others}{cure}.")
         sentences += late_on_average(self.judged)
+        if not sentences and len(self.judged) == self.count and not self.promised:
+            sentences.append(
+                f"None of the {self.count} histories ends with a promise, so no sway was judged: try more "
+                f"(--histories; {HISTORIES} make a proof)."
+            )
         if not self.apart <= AGREEMENT:
             sentences.append(
                 f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
@@ -203,9 +225,11 @@ class Proof(Summarised, Examination):
         ranked = sorted(self.judged, key=self.fraction, reverse=True)
         return {
             "passed": self.passed,
+            "trial": self.kind == "trial",
             "limits_m": dict(self.limit),
             "error_bound_m": self.error_bound,
             "histories": self.count,
+            "promised": self.promised,
             "seed": self.seed,
             "slowed": True,  # as those of the first manifests were not
             "habits": True,

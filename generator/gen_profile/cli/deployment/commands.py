@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 @option("--for SECONDS", "Watch so long.", Number(min=0.1), into="seconds")
 @option("--log CSV", "Write what is watched, a row for each cycle seen.", OutputFile())
 @option("--rollback", "Go back to this table, which the idle buffer holds.")
+@option("--trial", "Use a planner that was judged on fewer histories than make a proof.")
 @option("--by NAME", "Who deploys, for the record; the user by default.", default="")
 @signing_option("record")
 @signed_by_option
@@ -58,6 +59,7 @@ def deploy(
     seconds: float | None,
     log: Path | None,
     rollback: bool,
+    trial: bool,
     by: str,
     key_path: Path | None,
     public_path: Path | None,
@@ -69,9 +71,9 @@ def deploy(
     """
     if verify and watch:
         raise SpecError("--verify: --watch begins with that; leave one of the two out.")
-    if (verify or watch) and (rollback or key_path is not None or by):
+    if (verify or watch) and (rollback or trial or key_path is not None or by):
         raise SpecError(
-            "--verify, --watch: change and record nothing; leave --rollback, --by and --sign out."
+            "--verify, --watch: change and record nothing; leave --rollback, --trial, --by and --sign out."
         )
     if not watch and (seconds is not None or log is not None):
         raise SpecError("--for, --log: are for --watch; add that, or leave them out.")
@@ -82,13 +84,13 @@ def deploy(
     elif verify:
         _verify(artefact, given)
     else:
-        document = _deploy(artefact, given, by or _user(), rollback=rollback)
+        document = _deploy(artefact, given, by or _user(), rollback=rollback, trial=trial)
         print_outcome(document, _words(artefact, document))
         if key is not None:
             _sign(artefact, document, key)
 
 
-def _deploy(artefact: Path, given: dict[str, Any], by: str, *, rollback: bool) -> dict[str, Any]:
+def _deploy(artefact: Path, given: dict[str, Any], by: str, *, rollback: bool, trial: bool) -> dict[str, Any]:
     """Have the table used, and record it."""
     from gen_profile.delivery.deployment.deploy import deploy as run
     from gen_profile.delivery.deployment.mailbox import Mailbox
@@ -99,12 +101,14 @@ def _deploy(artefact: Path, given: dict[str, Any], by: str, *, rollback: bool) -
     with progress() as tell:
         tell("reading the artefact")
         table = read_table(artefact)
+        if not trial:
+            table.require_proved()
         read_record(artefact.parent)
         require_place(artefact.parent / RECORD)
         access = Access(**given)  # after the file, whose fault no access cures
         tell("connecting")
         with closing(access.opened(table)) as link:
-            done = run(table, Mailbox(link), rollback=rollback, progress=tell)
+            done = run(table, Mailbox(link), rollback=rollback, trial=trial, progress=tell)
             try:
                 return append_record(artefact.parent, done.to_dict(), link.server, by)
             except OutputError as error:
@@ -176,10 +180,18 @@ def _words(artefact: Path, document: dict[str, Any]) -> str:
             f"deployed {entry['at']} by {entry['by']}" if entry else "no deployment there is recorded here"
         )
         return f"{where} uses {artefact}, bit for bit; {since}."
+    checked = f"checked{_on_histories(document['check'])}"
     return (
         f"{where}: {artefact} {document['action']}, {document['values']} values read back bit for bit and "
-        f"checked, checksum {document['checksum']} (before: {document['checksum_before']})."
+        f"{checked}, checksum {document['checksum']} (before: {document['checksum_before']})."
     )
+
+
+def _on_histories(check: dict[str, Any]) -> str:
+    """Say how a planner was judged."""
+    if "histories" not in check:
+        return ""
+    return f" on {check['histories']} histories{' (a trial)' if check['trial'] else ''}"
 
 
 def _user() -> str:

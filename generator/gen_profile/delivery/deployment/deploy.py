@@ -61,7 +61,12 @@ class DeployedTable:
 
 
 def deploy(
-    table: BlockTable, box: Mailbox, *, rollback: bool = False, progress: Progress = no_progress
+    table: BlockTable,
+    box: Mailbox,
+    *,
+    rollback: bool = False,
+    trial: bool = False,
+    progress: Progress = no_progress,
 ) -> DeployedTable:
     """Have a controller use a table, once it is proved to hold it.
 
@@ -71,6 +76,8 @@ def deploy(
     box : Mailbox
     rollback : bool
         Whether to write nothing, since the idle buffer holds the table.
+    trial : bool
+        Whether to take a planner that was judged on fewer histories than make a proof.
     progress : callable
 
     Raises
@@ -78,11 +85,13 @@ def deploy(
     ExportError
         The controller's block cannot take it.
     CheckFailed
-        What was read back leaves too much sway; nothing was switched.
+        What was read back leaves too much sway, or is a trial; nothing was switched.
     DeploymentError
     CosimulationError
     """
     in_force = FORMER
+    if not trial:
+        table.require_proved()
     try:
         before = box.status()
         require_fit(table, before)

@@ -11,6 +11,7 @@ import numpy as np
 
 from gen_profile.assurance.proof.check import BlockJudgement, histories_of, is_planner_block
 from gen_profile.assurance.proof.prove import prove
+from gen_profile.assurance.proof.verdict import HISTORIES
 from gen_profile.assurance.verification.check import (
     Judgement,
     alterations,
@@ -107,6 +108,9 @@ class BlockTable:
         target = target_of(self.spec)
         return tuple(read_playback(one.text(), target) for one in constant_sources(self.source, target))
 
+    def require_proved(self) -> None:
+        """Refuse what was but tried; a motion is checked whole in any case."""
+
     def constant(self, name: str) -> int:
         """Value of one of the block's whole constants."""
         return next(int(one.initial) for one in self.source.variables if one.name == name)
@@ -152,11 +156,29 @@ class PlannerTable(BlockTable):
         machine = self.spec.machine()
         return tuple((machine.actuated[n].name, machine.actuated[n].unit) for n in planned_axes(self.spec))
 
+    @property
+    def histories(self) -> int:
+        """On how many its manifest says that it was proved; the usual number where it was not."""
+        return histories_of(manifest_beside(self.path, read_artefact(self.path), planner=True))
+
+    def require_proved(self) -> None:
+        """Refuse what was but tried.
+
+        Raises
+        ------
+        CheckFailed
+            It was judged on fewer histories than make a proof.
+        """
+        if self.histories < HISTORIES:
+            raise CheckFailed(
+                f"{self.path} is a trial, on {self.histories} histories, and {HISTORIES} make a proof: write "
+                "it again without --histories, or add --trial to use it all the same."
+            )
+
     def check(self, values: Array, progress: Progress) -> BlockJudgement:
         """Prove the block with other numbers, on as many histories as its manifest tells of."""
         text = constant_planner(with_buffer(self.source, list(map(literal, values.tolist())))).text()
-        histories = histories_of(manifest_beside(self.path, read_artefact(self.path), planner=True))
-        proof = prove(self.spec, text, histories=histories, progress=progress)
+        proof = prove(self.spec, text, histories=self.histories, progress=progress)
         return BlockJudgement(path=self.path, text=text, spec=self.spec, check=proof, manifest="none")
 
 

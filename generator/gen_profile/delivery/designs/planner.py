@@ -7,8 +7,8 @@ from typing import Any
 
 import attrs
 
-from gen_profile.assurance.proof.prove import HISTORIES, prove
-from gen_profile.assurance.proof.verdict import Proof
+from gen_profile.assurance.proof.prove import prove
+from gen_profile.assurance.proof.verdict import HISTORIES, Proof
 from gen_profile.delivery.designs.design import deliver_judged, file_entry
 from gen_profile.delivery.designs.planner_suggestions import planner_suggestions
 from gen_profile.planner.design import PlannerBlock, planner_block
@@ -104,7 +104,7 @@ def deploy_planner(
     folder : Path or str
         Made if needed; files of the same names are replaced, others are left alone.
     histories : int
-        Of commands, that it is proved on.
+        Of commands, that it is proved on; fewer than 200 are a trial.
     check : bool
         Without it the manifest says ``"unverified"``.
     keep_failed : bool

@@ -109,6 +109,7 @@ def _verdict(proof: Proof, path: Path) -> Verdict:
         word="Passed.",
         passed=True,
         sentences=[
+            *_trial(proof),
             found if proof.worst.promise else "No residual sway is judged.",
             "Every history kept velocity, acceleration, jerk and travel in every cycle, and came to rest.",
             *_left_swinging(proof),
@@ -116,6 +117,12 @@ def _verdict(proof: Proof, path: Path) -> Verdict:
             *(f"Warning: {sentence}" for sentence in proof.warnings()),
         ],
     )
+
+
+def _trial(proof: Proof) -> Iterator[str]:
+    """Say that too few histories were tried for a proof."""
+    if proof.kind == "trial":
+        yield f"This is a trial, no proof: {proof.carried_by}."
 
 
 def _left_swinging(proof: Proof) -> Iterator[str]:
