@@ -237,7 +237,8 @@ def parse(content: bytes) -> Certificate:
 
 def damaged(error: Exception) -> CertificateError:
     """Say that a certificate is damaged, and how."""
-    return CertificateError(f"The certificate is damaged ({error}); certify the file again.")
+    words = "The certificate is damaged, or of another version of gen-profile"
+    return CertificateError(f"{words} ({error}); certify the file again.")
 
 
 def _number(value: Any) -> float:

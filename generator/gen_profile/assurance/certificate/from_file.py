@@ -38,6 +38,7 @@ class _Artefact:
     path: Path
     sha256: str
     spec: Spec
+    spec_sha256: str
     setpoints: SampledProfile
 
 
@@ -160,12 +161,12 @@ def _bound_again(
 
 def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
     content = read_motion(path)
-    spec, manifest = spec_and_manifest(path, content, spec)
+    spec, manifest, digest = spec_and_manifest(path, content, spec)
     require_companions(manifest, path, content)
     setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))
     for sentence in another_move(spec, setpoints):
         raise CertificateError(sentence)
-    return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
+    return _Artefact(path=path, sha256=sha256(content), spec=spec, spec_sha256=digest, setpoints=setpoints)
 
 
 def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certificate:
@@ -176,7 +177,7 @@ def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certific
         bounds = (result.bounds.max(axis=0) * (1.0 + SLACK)).tolist()
     sways = zip(theorem.limits, bounds, result.largest_met.tolist(), strict=True)
     return Certificate(
-        spec_sha256=artefact.spec.sha256(),
+        spec_sha256=artefact.spec_sha256,
         artefact_sha256=artefact.sha256,
         ranges=theorem.ranges.ends,
         arrival=theorem.arrival,
@@ -207,7 +208,7 @@ def _require_about(claimed: Certificate, artefact: _Artefact) -> Theorem:
         raise CertificateError(
             f"The certificate is about another file than {artefact.path}, or that was altered."
         )
-    if claimed.spec_sha256 != artefact.spec.sha256():
+    if claimed.spec_sha256 != artefact.spec_sha256:
         raise CertificateError("The certificate is about another spec: other machines or limits.")
     theorem = Theorem(
         spec=artefact.spec,

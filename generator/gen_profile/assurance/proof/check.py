@@ -111,10 +111,10 @@ def check_block(
     """
     path = as_path(path)
     content = read_artefact(path)
-    spec, manifest = spec_and_manifest(path, content, spec, planner=True)
+    spec, manifest, digest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)
     _require_inputs(path, text, planner_block(spec).text)
-    agreement, companions = provenance(manifest, content, spec), companions_of(manifest, path, content)
+    agreement, companions = provenance(manifest, content, digest), companions_of(manifest, path, content)
     known = _record(manifest) if agreement != "none" else {}
     count = histories or histories_of(manifest if known else None)
     if history is not None and not 0 <= history < count:

@@ -24,7 +24,7 @@ from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec, received_spec
 from gen_profile.spec.values import require_whole
-from gen_profile.support.artefacts.manifest import FILENAME, Manifest, sha256
+from gen_profile.support.artefacts.manifest import FILENAME, Manifest, seal_of, sha256
 from gen_profile.support.artefacts.reading import companions_of, manifest_beside, read_motion, strays
 from gen_profile.support.errors import CosimulationError, ExportError, OutputError, SpecError
 from gen_profile.support.progress import Progress, no_progress, require_progress
@@ -205,9 +205,9 @@ def check_artefact(
     require_progress(progress)
     path = as_path(path)
     content, format_ = read_motion(path), format_of(path)
-    spec, manifest = spec_and_manifest(path, content, spec)
+    spec, manifest, digest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
-    agreement, companions = provenance(manifest, content, spec), companions_of(manifest, path, content)
+    agreement, companions = provenance(manifest, content, digest), companions_of(manifest, path, content)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     asked, played, variant = varied(spec, setpoints, *map(as_names, (scale, mirror, offset)))
@@ -270,7 +270,7 @@ def replayed(path: Path, spec: Spec) -> SampledProfile:
     """
     content, exporter = read_motion(path), find_exporter(format_of(path))
     try:
-        own, _ = spec_and_manifest(path, content, None)
+        own, *_ = spec_and_manifest(path, content, None)
     except OutputError:
         own = spec
     try:
@@ -333,7 +333,7 @@ def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:
 
 def spec_and_manifest(
     path: Path, content: bytes, spec: Spec | Path | str | None, *, planner: bool = False
-) -> tuple[Spec, Manifest | None]:
+) -> tuple[Spec, Manifest | None, str]:
     """Take a spec that was named, or else the one in the manifest beside a file.
 
     Parameters
@@ -349,6 +349,9 @@ def spec_and_manifest(
     spec : Spec
     manifest : Manifest or None
         None where there is none of this file.
+    spec_sha256 : str
+        Of the spec as the manifest holds it, if it holds this one: a version of the program that knows other
+        keys writes the same spec otherwise.
 
     Raises
     ------
@@ -360,18 +363,27 @@ def spec_and_manifest(
         manifest = manifest_beside(path, content, planner=planner)
     except OutputError as error:
         if spec is not None:
-            return spec, None
+            return spec, None, spec.sha256()
         words = f"{str(error).removesuffix('.')}, or name its spec"
         raise OutputError(f"{words}: gen-profile check {quote(str(path))} SPEC.toml") from error
     try:
-        return spec or received_spec(manifest.spec, path.parent), manifest
-    except SpecError as error:
-        raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
+        own = received_spec(manifest.spec, path.parent)
+    except (SpecError, OutputError) as error:
+        if spec is not None:
+            return spec, manifest, spec.sha256()
+        if isinstance(error, OutputError):
+            raise
+        version = manifest.versions.get("gen-profile", "of some version")
+        raise OutputError(
+            f"The spec in {path.parent / FILENAME}, which gen-profile {version} wrote, is faulty: {error}"
+        ) from error
+    spec = own if spec is None else spec
+    return spec, manifest, seal_of(manifest.spec) if spec == own else spec.sha256()
 
 
-def provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
+def provenance(manifest: Manifest | None, content: bytes, spec_sha256: str) -> str:
     """Tell whether a file is the one of a manifest: it matches, differs, or there is none of this spec."""
-    if manifest is None or manifest.spec_sha256 != spec.sha256():
+    if manifest is None or seal_of(manifest.spec) != spec_sha256:
         return "none"
     if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
         return "matches"

@@ -226,8 +226,8 @@ def _played(path: Path, source: BlockSource, specs: Sequence[Spec]) -> tuple[Blo
 
 def _exported_spec(path: Path, content: bytes, *, planner: bool = False) -> Spec:
     """Read the spec that a block was exported with; refuse one that was altered since."""
-    spec, manifest = spec_and_manifest(path, content, None, planner=planner)
-    for fault in alterations(path, provenance(manifest, content, spec), manifest):
+    spec, manifest, digest = spec_and_manifest(path, content, None, planner=planner)
+    for fault in alterations(path, provenance(manifest, content, digest), manifest):
         raise CheckFailed(fault)
     require_companions(manifest, path, content)
     return spec

@@ -136,8 +136,8 @@ def artefact_report(path: Path, **options: Any) -> Report:
         As of `report`; or the file is not what its manifest says, or this version writes another one.
     """
     content = read_motion(path)
-    spec, manifest = spec_and_manifest(path, content, None)
-    if provenance(manifest, content, spec) != "matches":
+    spec, manifest, digest = spec_and_manifest(path, content, None)
+    if provenance(manifest, content, digest) != "matches":
         raise OutputError(f"{path} was altered after its export: gen-profile check judges it as it is now.")
     require_companions(manifest, path, content)
     made = report(spec, [format_of(path)], **options)
