@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections import Counter, defaultdict
+from collections import defaultdict
 from functools import cache
 from pathlib import Path
 
@@ -21,8 +21,6 @@ PACKAGES = {
 }
 
 SAYING = (ast.Raise, ast.Yield)  # of errors, and of warnings
-MOST_LINES = 500
-MOST_FILES = 16  # the package's own included
 
 
 def layers():
@@ -182,23 +180,3 @@ def test_only_the_command_line_names_flags_in_errors():
             said = [part for node in nodes if isinstance(node, SAYING) for part in ast.walk(node)]
             texts = [str(part.value) for part in said if isinstance(part, ast.Constant)]
             assert not [text for text in texts if re.search(r"(^|[ (])--([a-z]|$)", text)], file
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_a_folder_has_so_few_files_that_they_are_seen_at_once(package):
-    files = [
-        file
-        for file in (PACKAGES[package] / package).rglob("*.*")
-        if "__pycache__" not in file.parts and file.suffix != ".pyi"
-    ]
-    assert max(Counter(file.parent for file in files).values()) <= MOST_FILES
-
-
-def test_a_file_is_short_enough_to_be_read_at_once():
-    folders = [*PACKAGES.values(), ROOT / "tests", ROOT / "examples"]
-    files = [
-        file for folder in folders for kind in ("py", "js", "c", "h") for file in folder.rglob(f"*.{kind}")
-    ]
-    ours = [file for file in files if "uPlot" not in file.parts]
-    assert len(ours) > 500
-    assert [file for file in ours if len(file.read_text("utf-8").splitlines()) > MOST_LINES] == []
