@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is loaded: th
 
 import pytest
 from hypothesis import settings
-from turns import TURNS, reasons, turn_of
+from turns import TURNS, reasons, turns
 
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
@@ -32,13 +32,14 @@ TURN = pytest.StashKey[str]()
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Give `-n auto` two processes more than processors, since many tests wait for other programs.
+    """Give `-n auto` a process a processor, and two more where slow tests wait for other programs.
 
-    Those of a module stay together, as far as they can, so that its fixtures are made once.
+    Each process collects all tests, a tenth of the work of the quick ones. The tests of a module stay
+    together, as far as they can, so that its fixtures are made once.
     """
     if config.option.dist == "no":
         config.option.dist = "worksteal"
-    return (os.cpu_count() or 1) + 2
+    return (os.cpu_count() or 1) + 2 * (config.option.markexpr != "not slow")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -76,9 +77,10 @@ def take_turns(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the slow tests whose turn it is not, and note how many for the last lines."""
     turn, changed = config.getoption("--turn") % TURNS, set(config.getoption("--changed").split())
     slow = {item: item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
-    why = {file: reasons(file, changed) for file in {*slow.values()}}
+    files = {*slow.values()}
+    why, turn_of = {file: reasons(file, changed) for file in files}, turns(files)
     rooms = {item for item, file in slow.items() if why[file]}
-    due = {item for item, file in slow.items() if turn_of(file) == turn} - rooms
+    due = {item for item, file in slow.items() if turn_of[file] == turn} - rooms
     keep(config, items, {*items} - slow.keys() | rooms | due)
     named = ", ".join(sorted({PurePosixPath(one).stem for one in set().union(*why.values())})) or "none"
     left = len(slow) - len(rooms) - len(due)

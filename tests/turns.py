@@ -7,7 +7,6 @@ every test runs.
 
 from collections.abc import Set
 from pathlib import PurePosixPath
-from zlib import crc32
 
 TURNS = 3
 TOO_LARGE = frozenset({"docs", "examples", "exporters", "generator"})  # to be one room
@@ -26,6 +25,6 @@ def reasons(test: str, changed: Set[str]) -> set[str]:
     return {room for room in rooms_of(changed) if f"_{room}_" in name} | ({test} & changed)
 
 
-def turn_of(test: str) -> int:
-    """Give a file's turn, 0 to 2, by its name, so that a new file moves no other."""
-    return crc32(test.encode()) % TURNS
+def turns(files: Set[str]) -> dict[str, int]:
+    """Give each file its turn, 0 to 2: a room's stand side by side, so that each turn has a third of them."""
+    return {file: place % TURNS for place, file in enumerate(sorted(files))}

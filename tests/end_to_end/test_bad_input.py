@@ -195,12 +195,14 @@ def test_an_impossible_move_is_refused_with_the_cure(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_installed_program_shows_no_traceback(tmp_path):
     (tmp_path / "spec.toml").write_text(FILES["all at once"][0], "utf-8")
     outcome = run_process("spec.toml", cwd=tmp_path)
     assert_faults(outcome, tmp_path, FILES["all at once"][1])
 
 
+@pytest.mark.slow
 def test_debugging_shows_the_traceback(tmp_path):
     outcome = run_process("--preset", "papre", "--debug", cwd=tmp_path)
     assert outcome.code == 1

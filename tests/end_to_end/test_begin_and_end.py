@@ -76,6 +76,7 @@ def test_what_cannot_be_is_refused_in_a_sentence(tmp_path, monkeypatch, words, c
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_crane_that_stands_calms_its_load(tmp_path):
     task = ("move.distance=0", "move.initial={theta1=0.1}", "robustness={}", "cost.sway_scale=auto")
     words = (*(word for change in task for word in ("--set", change)), "--out", tmp_path, "--json")

@@ -131,6 +131,7 @@ TAMPERED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tamper", "said"), TAMPERED.items(), ids=[one.__name__ for one in TAMPERED])
 def test_a_tampered_certificate_is_refused(copied, tamper, said):
     artefact, beside = copied
@@ -201,6 +202,7 @@ def test_a_file_that_leaves_the_travel_is_not_certified(copied):
     )
 
 
+@pytest.mark.slow
 def test_ranges_that_are_too_wide_for_a_certificate_are_refused(copied):
     spec = gp.preset_spec(PRESET, [CYCLE, "check.uncertain={L0=0.9, m=0.9, g=0.9, c=0.9}"])
     with pytest.raises(CertificateError, match="too wide"):

@@ -67,6 +67,7 @@ def commissioned(site, *arguments, answers):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_wrong_answer_is_asked_for_again(site):
     """The keyboard ends before all is answered, so nothing is written."""
     answers = ["bay-crane", "350", "six", "2000", "6.2±x", "6.2±0.1"]

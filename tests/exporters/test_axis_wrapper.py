@@ -81,6 +81,7 @@ def test_a_pulse_is_enough_and_another_motion_can_follow(vendor):
     np.testing.assert_allclose(bench.commanded[-1], 0.1, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("move", [ONE, TWO], ids=["one", "two"])
 @pytest.mark.parametrize("mishap", MISHAPS)
 def test_a_mishap_on_the_way_is_told_and_never_followed_by_a_jump(vendor, mishap, move):

@@ -61,6 +61,7 @@ def refuses(fb, begin):
     return not moved and not any(row["bdone"] or row["baborted"] for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", [ONE, TWO], ids=["one axis", "two axes"])
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_the_block_refuses_to_start_with_any_altered_constant(layout, profile):
@@ -120,6 +121,7 @@ def test_replay_refuses_any_altered_number(layout, profile):
             structured_text.read_table(text[: number.start()] + new + text[number.end() :], goal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("container", CONTAINERS, ids=lambda module: module.__name__.rpartition(".")[2])
 def test_a_container_is_refused_with_any_altered_constant(container):
     goal = goal_of(ONE, "segments")
@@ -173,6 +175,7 @@ def test_replay_takes_other_white_space_and_comments(tables, read):
     assert [motion.payload_hash() for motion in read(edited, goal)] == hashes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("container", [structured_text, twincat, siemens_scl])
 @TABLES
 @pytest.mark.parametrize("place", ["    nState : DINT;", "    bMoving", "VAR_INPUT\n", "    fSum : LREAL;\n"])

@@ -41,6 +41,7 @@ def test_gram_integrates_squares(degree):
     assert coefficients @ gram(degree) @ coefficients == pytest.approx(square.integ()(1.0), rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [3, 4])
 @given(local=st.lists(numbers, min_size=8, max_size=8))
 def test_derivatives_of_a_piece_belong_together(order, local):

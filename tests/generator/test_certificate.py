@@ -163,6 +163,7 @@ def test_rounding_to_coarse_counts_is_taken_as_it_is():
     assert (found.largest_met <= found.bounds[0]).all() and found.bounds.max() < 4e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", [0.0, 0.03])
 def test_an_exact_solution_in_arb_is_below_the_bound_and_close(tau):
     """Of the flexible joint: between setpoints its arm swings freely, or as its lagging drive pulls."""
@@ -208,6 +209,7 @@ def behind_lags():
     return attempt(*planned("single-pendulum-crane", "export.cycle_time=0.01", lag))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("find", [crane, behind_lags])
 def test_no_machine_of_a_dense_grid_sways_more_and_the_worst_nearly_as_much(find):
     found = find()
@@ -279,6 +281,7 @@ def test_a_loose_limit_leaves_the_smooth_motion_near_to_the_axes():
     assert theorem.gap.position.max() < 1e-6
 
 
+@pytest.mark.slow
 def test_parts_of_ranges_are_wide_where_phases_turn_little():
     spec, setpoints = planned("double-pendulum-crane", "robustness.uncertain={L1=0.4, m2=0.5}")
     theorem, boxes = certify._prepared(spec, setpoints)

@@ -115,6 +115,7 @@ def test_operations_enclose_all_complex_values_around(enclosed, exact):
         require_inside(enclosed(x, y), [exact(a, b) for a, b in zip(rim, other, strict=True)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("enclosed", "exact"), UNARY.values(), ids=UNARY.keys())
 def test_functions_enclose_what_underflows_or_nearly_overflows(enclosed, exact):
     with np.errstate(all="ignore"), flint.ctx.workprec(2300):

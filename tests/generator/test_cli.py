@@ -209,6 +209,7 @@ def test_a_closed_output_does_not_stop_the_work(tmp_path, closed):
     assert (tmp_path / "out" / "manifest.json").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [["plants"], ["plants", "--json"], ["--help"]])
 def test_an_output_that_takes_nothing_is_told_in_a_sentence(arguments, monkeypatch):
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # else Python does not try again as it ends

@@ -30,6 +30,7 @@ def limited(**limits):
     return crane_problem(limits=LimitsSpec(**limits))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("effort", "tau"), EFFORTS)
 @pytest.mark.parametrize("beta", [0.0, 20.0, 50.0])
 def test_agrees_with_the_indirect_method(effort, tau, beta):
@@ -57,6 +58,7 @@ def test_redundant_sensitivities_are_named():
     assert solution.status is Status.CONVERGED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", [None, 0.05])
 @pytest.mark.parametrize(("name", "limit"), LIMITS.items())
 def test_limits_hold_for_the_command_at_every_instant(name, limit, tau):
@@ -118,6 +120,7 @@ def test_a_wild_move_is_refused_not_returned():
     assert solution.advice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [0.0, 50.0])
 def test_programs_that_overshoot_back_and_forth_settle(weight):
     """Long ropes and little time: linearised about one another's motions, the programs swap two of them."""
@@ -165,6 +168,7 @@ def test_few_programs_find_what_a_fine_mesh_does(machine, task, loss):
     assert few.raise_for_status().cost == pytest.approx(many.raise_for_status().cost, rel=loss)
 
 
+@pytest.mark.slow
 def test_a_limit_that_makes_the_cost_of_sway_steep_is_kept():
     """The sway is three times what the cost expects, at whose exponential programs fail that leap there."""
     task = ["cost.effort=snap", "move.duration=6.0", "limits.velocity=0.2"]

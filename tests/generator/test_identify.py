@@ -244,6 +244,7 @@ def test_a_log_is_read_and_told_of(tmp_path):
     assert read_spec(tmp_path / "new.toml").plant.parameters["L0"] == pytest.approx(3.0, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("encoding", "unit", "size"),
     [("utf-16", "deg", 1.0), ("cp1252", "deg", 1.0), ("utf-8", "0.25deg", 0.25), ("utf-8", "0.25 deg", 0.25)],
@@ -386,6 +387,7 @@ uncertain = {L0 = 0.1} # of any sling
 """
 
 
+@pytest.mark.slow
 def test_what_the_author_of_a_spec_wrote_stays(tmp_path):
     """Comments, and a range that is wider than what one measurement leaves open."""
     (tmp_path / "bay.toml").write_text(SPEC, "utf-8")

@@ -193,6 +193,7 @@ def test_a_machine_whose_other_load_swings_too_far_explains_nothing(monkeypatch)
     assert not misfit._may_explain(fit, np.array([1.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
 
 
+@pytest.mark.slow
 def test_a_log_that_nothing_explains_is_said_to_be_of_another_machine():
     """It was said to determine the rope to ± 3466 % only, and to be measured better."""
     foreign = log_of(0.05 * np.cos(3.1 * TIMES) + 0.012 * np.cos(5.3 * TIMES + 1.0) + 0.1 * NOISE)

@@ -226,6 +226,7 @@ def learned_here(*arguments):
     return run_here("learn", "crane.toml", "--played", "played.csv", "--signal", "rate", *arguments)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_spec(site):
     outcome = learned_here("run.csv", "--json")
     assert outcome.code == 0, outcome.err

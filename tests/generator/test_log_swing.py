@@ -164,6 +164,7 @@ def test_addresses_that_are_none(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_log_and_keeps_it(tmp_path):
     app = Phyphox(measuring=True)
     with served(app) as url:

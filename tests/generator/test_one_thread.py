@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 PROGRAM = """
 import json
 from gen_profile.support.one_thread import one_thread
@@ -23,6 +25,7 @@ print(json.dumps([*found, threads()]))
 """
 
 
+@pytest.mark.slow
 def test_libraries_that_are_loaded_later_are_held_until_the_last_of_several_threads_has_ended():
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
     done = subprocess.run(

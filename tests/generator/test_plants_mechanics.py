@@ -54,6 +54,7 @@ def test_machines_obey_lagrange(type_, seed):
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * (1.0 + np.abs(expected).max()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", MACHINES)
 def test_energy_is_kept_without_damping_and_lost_with_it(type_):
     lagrange = Lagrange(type_)

@@ -98,6 +98,7 @@ def test_a_spec_carries_its_machine_wherever_it_goes(folder):
     assert plant_of_file(again) is spec.machine()
 
 
+@pytest.mark.slow
 def test_the_written_machine_is_designed_for_checked_and_found_again(folder, monkeypatch):
     monkeypatch.chdir(folder)
     designed = run_here("own.toml", "--out", "deploy", "--json")

@@ -45,6 +45,7 @@ def test_hamiltonian_is_constant(case):
     assert optimum.hamiltonian_variation < 1e-6
 
 
+@pytest.mark.slow
 def test_canonical_equations_lead_from_node_to_node(case):
     oracle, optimum = case
     n = oracle.size

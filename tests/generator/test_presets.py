@@ -44,6 +44,7 @@ def test_every_quantity_has_its_unit_beside_it(name):
     assert set(numbers) <= beside.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(presets()) - {"bay-crane"}))
 def test_the_limits_that_a_preset_offers_leave_it_its_motion(name):
     before, heading, after = preset_text(name).partition("# [limits]")

@@ -92,6 +92,7 @@ def motion(preset):
     return gp.plan(gp.preset_spec(preset, ["export.cycle_time=0.02"])).command
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tables", ["constants", "variables"])
 @pytest.mark.parametrize("layout", ["segments", "samples", "counts"])
 @pytest.mark.parametrize("preset", ["single-pendulum-crane", "tower-crane", "paper"])
@@ -278,6 +279,7 @@ def test_what_is_no_certificate_is_said_to_be_none(genuine, text):
         check(artefact, manifest, text.encode())
 
 
+@pytest.mark.slow
 def test_what_is_not_covered_is_said(tmp_path):
     lag = "actuator={type='first-order', tau=0.2}"
     artefact, certificate = certified(tmp_path, *SPEC[:2], lag)

@@ -98,6 +98,7 @@ def test_a_profile_names_its_machine(serial, fits):
 
 
 class TestOthersSdos:
+    @pytest.mark.slow
     @pytest.mark.parametrize("command", [0x40, 0x60, 0x80, 0xA0])
     def test_they_may_read_while_axes_move(self, command):
         with Bench() as bench:

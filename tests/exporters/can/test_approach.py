@@ -22,6 +22,7 @@ def greatest(position, order):
     return np.abs(np.diff(position.astype(float), order)).max() / PERIOD**order
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stand", [100_900, 99_100, 100_001])
 @pytest.mark.parametrize("mode", ["csp", "ip"])
 def test_it_goes_there_at_a_tenth_of_the_motions_speed(stand, mode):

@@ -19,6 +19,7 @@ def found(bench, record):
     return standstills(bench.plan.motion.at_sync, record.actual, record.answered, PERIOD)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("many", [1, 2, 3])
 @pytest.mark.parametrize("goal", [0.4, -0.2])
 def test_setpoints_that_a_drive_leaves_out(many, goal):

@@ -54,6 +54,7 @@ def answer_slowly(bench):
     bench.clock.actors.append(answer)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timeout", [None, 0.05])
 def test_a_slow_strict_drive_reports_nothing_from_the_first_frame_to_the_last(timeout):
     with Bench(kind=StrictDrive, timeout=timeout) as bench:

@@ -35,6 +35,7 @@ def answers(generator):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make_frame", [noise, answers])
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_nothing_on_the_bus_crashes_it_or_moves_the_axis_elsewhere(make_frame, seed):

@@ -63,6 +63,7 @@ def test_targets_of_cycles_one_after_the_other_are_all_taken():
     assert (record.phase, last) == (Phase.DONE, round(0.2 * COUNTS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("calls", "can"),
     [
@@ -196,6 +197,7 @@ def test_errors_and_lost_promises_are_told():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("calls", [1, 2])
 @pytest.mark.parametrize(
     ("commands", "at", "error"),
@@ -295,6 +297,7 @@ def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     assert any("stick at 0.15 m/s" in words for words in bench.phases)
 
 
+@pytest.mark.slow
 def test_who_sees_the_error_may_go_on(terminal):
     ours, theirs = terminal
     for then in (b"0.05\r", b""):

@@ -43,6 +43,7 @@ def own_settings(bench, watched=OTHER_MASTER):
     return held(bench.drive)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE, attrs.evolve(DriveVariant(), own_mapping=True)])
 @pytest.mark.parametrize("stop", [False, True])
 def test_a_drive_is_left_as_it_was_found(make, stop):
@@ -142,6 +143,7 @@ class TestADriveThatBrakesWhateverItsStatuswordSays:
         )
         return bench.run(), set(ramps), said
 
+    @pytest.mark.slow
     def test_it_keeps_its_ramp_until_it_stands(self, word):
         with Bench(**RAMPS) as bench:
             record, ramps, said = self.stopped(bench, word)
@@ -153,6 +155,7 @@ class TestADriveThatBrakesWhateverItsStatuswordSays:
         assert put_back == (500_000 if known else 1_400_000)
         assert known or "(cart: statusword 0001h, which is no state of CiA 402)" in record.reason
 
+    @pytest.mark.slow
     def test_one_that_does_not_brake_is_not_said_to_stand(self, word):
         with Bench(**RAMPS) as bench:
             ways = ("_obey", "_lose_connection", "fault")

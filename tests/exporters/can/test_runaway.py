@@ -44,6 +44,7 @@ def assert_stopped(bench, record, window):
     assert bench.drive.state is State.SWITCH_ON_DISABLED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "window"),
     [

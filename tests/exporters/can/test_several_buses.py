@@ -73,6 +73,7 @@ def test_a_fault_on_one_bus_stops_all(bench, node):
     assert max(setpoints) <= min(quick_stopped(bench))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("channel", "lost", "ways"),
     [

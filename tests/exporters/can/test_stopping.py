@@ -94,6 +94,7 @@ def test_a_dead_drive_confirms_nothing():
     assert "Not every axis is known to stand (cart: no answer)" in record.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", ["configure", "align", "enable", "hold", "disable"])
 @pytest.mark.parametrize("ways", [("sending",), ("sending", "receiving")], ids=["sending", "both ways"])
 def test_an_interface_that_is_down_is_a_sentence_whenever_it_goes_down(phase, ways):

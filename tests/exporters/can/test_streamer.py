@@ -137,6 +137,7 @@ VELOCITY = {"mode": "csv", "following_error": 0.005}
 class TestVelocities:
     """Drives that take speed only (60FFh)."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE])
     def test_they_lead_the_axes_to_the_target(self, make):
         profile = quintic((0.0, 0.3), (0.0, -0.7))
@@ -292,6 +293,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE], ids=["usual", "other"])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_stops_the_axis(fault, make):
