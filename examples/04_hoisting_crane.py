@@ -1,7 +1,8 @@
 """A crane that hoists on the way: the rope, and with it the natural frequency, changes while the load moves.
 
 An input shaper knows one frequency for each mode, here that of the rope at the target, where the load would
-swing on. The optimal motion follows the equations, and uses the hoist as a second actuator.
+swing on. The optimal motion follows the equations, and uses the hoist as a second actuator; where
+the move does not ask the hoist to move, it is held.
 
     python examples/04_hoisting_crane.py
 """

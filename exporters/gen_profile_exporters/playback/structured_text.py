@@ -215,14 +215,16 @@ def _checked(table: PlaybackTable) -> int:
 
 
 def axis_lines(table: PlaybackTable) -> list[str]:
-    """Tell for each axis from where to where it moves, its peaks, and what the machine allows."""
+    """Tell for each axis where it moves, its peaks, and what the machine allows."""
     velocity, acceleration, _ = table.peaks
-    jerk = table.limits.jerk
+    jerk, position = table.limits.jerk, table.played.position
+    low, high = position.min(axis=0), position.max(axis=0)
     return [
         f"    Axis {number + 1}, {plain(axis.name)}: {table.start[number]:g} to {table.target[number]:g} "
         f"{axis.unit}, peaks {velocity[number]:.4g} {axis.unit}/s and {acceleration[number]:.4g} "
         f"{axis.unit}/s2,\n"
-        f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3; {_allowed(table.variants[number])}."
+        f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3; on the way {low[number]:g} to "
+        f"{high[number]:g} {axis.unit};\n        {_allowed(table.variants[number])}."
         for number, axis in enumerate(table.axes)
     ]
 

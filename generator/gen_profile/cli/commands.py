@@ -84,8 +84,8 @@ def design(
     document = outcome.to_dict() | {"certificate": worst and worst.to_dict()}
     print_outcome(document, words.design(outcome, certificates))
     warn(outcome.check)
-    if not outcome.passed and outcome.check is not None:
-        fail(outcome.check.reasons(), "The files were kept." if outcome.artefacts else not_written(folder))
+    if not outcome.passed:
+        fail(outcome.reasons(), "The files were kept." if outcome.artefacts else not_written(folder))
     if refusals:
         leave_unproved(refusals)
 

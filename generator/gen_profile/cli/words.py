@@ -393,14 +393,20 @@ def _move(spec: Spec) -> str:
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:
-    from gen_profile.dynamics.evaluation.demands import demands
+    from gen_profile.dynamics.evaluation.demands import axis_demands
+    from gen_profile.motion.metrics import excursion
 
+    spec, command = outcome.spec, outcome.plan.evaluation.command
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
-    peaks: dict[str, list[str]] = {}
-    for one in demands(outcome.spec, outcome.plan.evaluation.command):
-        peaks.setdefault(one.axis.name, []).append(f"{number(one.asked)} {one.unit}")
-    title = kind if len(peaks) == 1 else f"{kind}, {{}}"
-    return [(title.format(axis), ", ".join(of_axis)) for axis, of_axis in peaks.items()]
+    rows = []
+    for column, axis in enumerate(spec.machine().actuated):
+        peaks = ", ".join(f"{number(one.asked)} {one.unit}" for one in axis_demands(spec, command, column))
+        way = f"over {number(excursion(command, column))}"
+        if column in spec.held():
+            way = f"held at {spec.move.start[column]:g}"
+        title = f"{kind}, {axis.name}" if len(spec.axis) > 1 else kind
+        rows.append((title, f"{peaks}; {way} {axis.unit}"))
+    return rows
 
 
 def _by_load(sways: Mapping[str, float]) -> str:

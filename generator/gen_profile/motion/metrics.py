@@ -26,6 +26,12 @@ def greatest(profile: Profile, order: int, axis: int = 0) -> float:
     return max(map(abs, extremes(profile, order, axis)))
 
 
+def excursion(profile: Profile, axis: int) -> float:
+    """Distance between the lowest and the highest place of an axis on its way."""
+    lowest, highest = extremes(profile, 0, axis)
+    return highest - lowest
+
+
 def overshoot(profile: Profile) -> float:
     """Find how far the leading axis leaves the way between its start and its target."""
     axis = profile.leading

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -72,6 +72,8 @@ class MoveSpec(Checked, table="move"):
 
     Attributes
     ----------
+    free : tuple of str
+        Axes that may move on the way although they end where they began; all others are held.
     shortest : bool
         The duration is to be found, and the one given here means nothing.
     initial : mapping of str to float
@@ -84,6 +86,7 @@ class MoveSpec(Checked, table="move"):
     target: tuple[Distance, ...]
     duration: Duration
     shortest: bool = False
+    free: tuple[AxisName, ...] = ()
     initial: Annotated[Mapping[SwingState, float], example("theta1 = 0.05")] = NONE
     final_velocity: tuple[Distance, ...] = attrs.field()
 
@@ -95,6 +98,13 @@ class MoveSpec(Checked, table="move"):
     def distance(self) -> tuple[float, ...]:
         """Signed distance of every axis."""
         return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
+
+    @property
+    def asked(self) -> tuple[bool, ...]:
+        """Whether each axis is asked to move: to another place, or at a speed in the end."""
+        return tuple(
+            bool(way or speed) for way, speed in zip(self.distance, self.final_velocity, strict=True)
+        )
 
     def longest(self, plant: Plant) -> float:
         """Longest distance of the axes that move in m; 0 where none does."""
@@ -190,6 +200,10 @@ class LimitsSpec(Checked, table="limits"):
         names = kinds_of(AxisLimitsSpec)
         stated = {name: getattr(own, name) for name in names if getattr(own, name) is not None}
         return AxisLimitsSpec(**{name: getattr(self, name) for name in names} | stated)
+
+    def only(self, columns: Sequence[int]) -> LimitsSpec:
+        """Limits of some of the axes, numbered anew."""
+        return attrs.evolve(self, axis=dict(own for k, own in enumerate(self.axis.items()) if k in columns))
 
     def place(self, column: int, name: str) -> str:
         """Where one kind of limit of one axis stands in the spec."""
@@ -349,6 +363,22 @@ class Spec(Drawable, Checked):
         """Load the plant."""
         return find_plant(self.plant.type) if self.plant.file is None else plant_of_file(self.plant.file)
 
+    def held(self) -> dict[int, float]:
+        """Where the axes stand that do not move, by their number, in m (or rad).
+
+        Those that the move neither asks to move nor sets free, or whose travel leaves them no room. A
+        machine's only axis is not held: it is what removes a swing in place.
+        """
+        move, axes = self.move, self.machine().actuated
+        if len(axes) == 1:
+            return {}
+
+        def stays(column: int) -> bool:
+            low, high = self.limits.of(column).travel or (0.0, 1.0)
+            return not move.asked[column] and (axes[column].name not in move.free or low == high)
+
+        return {column: place for column, place in enumerate(move.start) if stays(column)}
+
     def changed(self, values: Mapping[str, Any]) -> Spec:
         """Put other values in their places, such as ``limits.axis.x.jerk``; a duration stands."""
         spec = attrs.evolve(self)
@@ -397,6 +427,8 @@ class Spec(Drawable, Checked):
         if self.check.foreign is not None:
             del document["check"]["foreign"]
             document["check"] |= self.check.foreign.to_dict()
+        if not self.move.free:  # as a spec without hashes
+            del document["move"]["free"]
         if document["move"].pop("shortest"):
             document["move"]["duration"] = "minimum"
         return document

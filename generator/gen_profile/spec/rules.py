@@ -73,7 +73,7 @@ def _move(spec: Spec) -> Iterator[Fault]:
         yield "move.distance", "must not be zero on every axis"
     if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
         yield "move.distance", Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE)
-    limited = " ".join(spec.limits.stated())
+    limited = " ".join(spec.limits.only([k for k, asked in enumerate(move.asked) if asked]).stated())
     if move.shortest and not any(name in limited for name in RATES):
         problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'
         yield "move.duration", problem, "limits.axis", *(f"limits.{name}" for name in RATES)
@@ -137,6 +137,20 @@ def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
             if stated and axis.name not in stated:
                 problem = Phrase("required beside the other axes' {what}", what=what)
                 yield place(f"can.{what}", axis.name), problem
+
+
+def _free(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold the names of axes that may help to the machine; in place, some must."""
+    names = [axis.name for axis in plant.actuated]
+    for name in spec.move.free:
+        if name not in names:
+            yield (
+                "move.free",
+                Phrase("{name} is no axis{hint}", name=repr(name), hint=suggestion(name, names)),
+            )
+    if any(spec.move.initial.values()) and len(spec.held()) == len(names):
+        template = 'required where no axis has a way to go: name those that may move, such as ["{axis}"]'
+        yield "move.free", Phrase(template, axis=names[0])
 
 
 def _at_start(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -289,5 +303,6 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
 OF_MACHINE = (
-    _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes, _live, _sensor,
+    _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes,
+    _live, _sensor,
 )  # fmt: skip

@@ -28,7 +28,7 @@ Table = dict[str, Any]
 TABLES = tuple(name for name in kinds_of(Spec) if name != "name")
 REQUIRED = ("plant", "move")
 FILE_KEYS = ("file", "file_sha256")
-MOVE_KEYS = ("distance", "start", "target", "duration", "initial", "final_velocity")
+MOVE_KEYS = ("distance", "start", "target", "duration", "free", "initial", "final_velocity")
 CHECK_KEYS = [*(name for name in kinds_of(CheckSpec) if name not in ("foreign", "default")), *FMU_KEYS]
 PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
 COUNTS_AND_METRES = Annotated[
@@ -216,11 +216,12 @@ def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec
                 template = "{name} must be {form}, found {found:g}{cure}"
                 form = between({"at least": axis.lower, "at most": axis.upper}, axis.unit)
                 faults.add(f"move.{key}", template, name=axis.name, form=form, found=value, cure=cure)
-    kind, speeds = kinds_of(MoveSpec)["initial"], table.get("final_velocity", still)
+    kinds, speeds = kinds_of(MoveSpec), table.get("final_velocity", still)
     return MoveSpec(
         start=start,
         target=target,
-        initial=structurer.fit(table.get("initial", {}), kind, "move.initial", {}),
+        free=structurer.fit(table.get("free", []), kinds["free"], "move.free", ()),
+        initial=structurer.fit(table.get("initial", {}), kinds["initial"], "move.initial", {}),
         final_velocity=_per_axis(speeds, axes, "move.final_velocity", 0.0, structurer),
         **_duration(table, structurer),
     )

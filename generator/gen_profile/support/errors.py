@@ -181,7 +181,9 @@ class Suggestion(NamedTuple):
 
 
 def rounded_up(value: float, digits: int = 3) -> float:
-    """Keep some digits of a positive number, rounded up: what is called enough must be enough."""
+    """Keep some digits of a number that is not negative, rounded up: what is called enough must be enough."""
+    if value == 0.0:
+        return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
     return float(f"{math.ceil(value / unit) * unit:.{digits}g}")
 

@@ -18,6 +18,7 @@ from gen_profile.assurance.verification.verdict import Check
 from gen_profile.assurance.verification.worst_machines import worst_machines
 from gen_profile.dynamics.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.dynamics.evaluation.simulation import Response, Sway
+from gen_profile.dynamics.problem.held_axes import held_axes
 from gen_profile.methods.solvers.draft import Plan
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile, SampledProfile
@@ -85,6 +86,14 @@ class Design(Drawable):
         """Whether no check failed."""
         return self.check is None or self.check.passed
 
+    def reasons(self) -> tuple[str, ...]:
+        """Say why the check failed, and what might help where the nominal machine itself sways too much."""
+        if self.check is None or self.passed:
+            return ()
+        limit = self.check.limit[self.spec.machine().loads[-1]]
+        cures = held_axes(self.spec) if self.plan.figures["sway_residual_peak_m"] > limit else ()
+        return (*self.check.reasons(), *cures)
+
     @property
     def figures(self) -> dict[str, float]:
         """Figures of the plan, and the worst residual sway that the check's search has found."""
@@ -100,6 +109,7 @@ class Design(Drawable):
             "spec_sha256": self.spec.sha256(),
             "solver": self._solver(),
             "figures": self.figures,
+            "axes": self.plan.evaluation.axes,
             "check": None if self.check is None else self.check.to_dict(),
             "artefacts": [{"format": one.format, **file_entry(self.folder, one)} for one in self.artefacts],
         }

@@ -14,7 +14,15 @@ from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.dynamics.problem.parameter_box import machines_inside
 from gen_profile.dynamics.problem.problem import problem_of
 from gen_profile.motion.actuator import lag_compensated
-from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
+from gen_profile.motion.metrics import (
+    excursion,
+    greatest,
+    length,
+    mean_square_root,
+    overshoot,
+    peak,
+    root_mean_square,
+)
 from gen_profile.motion.profile import Array, Profile, require_motion
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
@@ -22,6 +30,7 @@ from gen_profile.support.errors import InfeasibleProblem, SpecError, rounded_dow
 from gen_profile.support.summary import Summarised
 
 COARSE_SAMPLES = 501  # of machines all over the ranges, between which the greatest is a parabola's
+PEAKS = {"velocity": "m_per_s", "acceleration": "m_per_s2", "jerk": "m_per_s3"}  # units as keys tell them
 ACCURACY = 1e-6  # of their integration, relative
 PICTURED = 1e-4  # likewise where nothing but a picture is made of it
 
@@ -73,10 +82,8 @@ class MotionEvaluation(Summarised):
             [float(machine) for sway in sways for machine in peak(length(sway[:, :, end_load]))[:, 0]]
             for sways in ((during, others), _afterwards(self))
         )
-        names = ("velocity", "acceleration", "jerk")
-        units = ("m_per_s", "m_per_s2", "m_per_s3")
         table = {"duration_s": duration}
-        for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1):
+        for order, (name, unit) in enumerate(PEAKS.items(), start=1):
             table[f"{name}_max_{unit}"] = greatest(motion, order, motion.leading)
             if order > 1:
                 table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
@@ -91,10 +98,24 @@ class MotionEvaluation(Summarised):
         if command is not motion:
             table |= {
                 f"command_{name}_max_{unit}": greatest(command, order, motion.leading)
-                for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
+                for order, (name, unit) in enumerate(PEAKS.items(), start=1)
             }
             table["command_overshoot_m"] = overshoot(command)
         return table
+
+    @property
+    def axes(self) -> dict[str, dict[str, float]]:
+        """What the drive of every axis is asked for: how far apart the ends of its way are, and its peaks."""
+        return {
+            axis.name: {
+                "excursion_m": excursion(self.command, column),
+                **{
+                    f"{name}_max_{unit}": greatest(self.command, order, column)
+                    for order, (name, unit) in enumerate(PEAKS.items(), start=1)
+                },
+            }
+            for column, axis in enumerate(self.swing.plant.actuated)
+        }
 
     def followed(self, times: Array, others: Sequence[Scenario] = ()) -> tuple[Sway, ...]:
         """Tell how the loads of the machines, and of others, sway at rising times in s."""
@@ -133,7 +154,7 @@ def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
     plant, until = spec.machine(), _watched_until(spec, motion)
     named = [machine.parameters for machine in scenarios(spec)]
     swing = PlantSimulation(plant, motion, named, until, spec.move.initial)
-    inside = machines_inside(problem_of(spec))
+    inside = machines_inside(problem_of(spec, whole=True))
     known, inside_rows = (parameter_rows(plant, rows) for rows in (named, inside))
     same = np.isclose(inside_rows[:, None], known, 1e-9)
     others = [values for values, rows in zip(inside, same, strict=True) if not rows.all(axis=1).any()]

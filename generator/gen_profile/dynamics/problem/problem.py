@@ -5,6 +5,7 @@ from typing import Literal
 
 import attrs
 
+from gen_profile.dynamics.problem.held_axes import reduced
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import LimitsSpec, Spec
 
@@ -37,6 +38,7 @@ class Problem:
     Attributes
     ----------
     plant : Plant
+        Of a spec only what moves: without held axes, and coordinates that nothing swings then.
     parameters : mapping of str to float
         Value of every plant parameter.
     start, target : tuple of float
@@ -108,8 +110,8 @@ AUTO_SWAY = 1.45  # γ · peak sway: the paper's 50/m · 29.4 mm, rounded
 AUTO_EFFORT = 1.0655  # m/s³, root mean square jerk of the paper's move with β = 0
 
 
-def problem_of(spec: Spec) -> Problem:
-    """State the problem that a spec asks to solve."""
+def problem_of(spec: Spec, *, whole: bool = False) -> Problem:
+    """State the problem that a spec asks to solve, of the axes that may move, or of the whole machine."""
     robustness = spec.robustness
     worst_case = None
     if robustness.method == "range":
@@ -118,21 +120,23 @@ def problem_of(spec: Spec) -> Problem:
             load_limits=tuple(spec.check.residual_sway.values()),
             nominal_zero=robustness.nominal_zero,
         )
+    move = spec.move
+    machine = reduced(spec.machine(), {} if whole else spec.held(), move.initial)
     return Problem(
-        plant=spec.machine(),
+        plant=machine.plant,
         parameters=spec.plant.parameters,
-        start=spec.move.start,
-        target=spec.move.target,
-        duration=spec.move.duration,
+        start=tuple(move.start[axis] for axis in machine.moving),
+        target=tuple(move.target[axis] for axis in machine.moving),
+        duration=move.duration,
         tau=spec.actuator.tau,
         desensitized=tuple(robustness.uncertain) if robustness.method == "sensitivity" else (),
         order=robustness.order,
-        limits=spec.limits,
+        limits=spec.limits.only(machine.moving),
         worst_case=worst_case,
         ranges=spec.checked_ranges(),
         effort=spec.cost.effort,
         sway_weight=spec.cost.sway_weight,
         sway_scale=spec.cost.sway_scale,
-        initial=spec.move.initial,
-        final_velocity=spec.move.final_velocity,
+        initial=move.initial,
+        final_velocity=tuple(move.final_velocity[axis] for axis in machine.moving),
     )

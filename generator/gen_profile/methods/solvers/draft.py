@@ -16,7 +16,7 @@ from gen_profile.dynamics.evaluation.motion_evaluation import (
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE, Breach, breaches
 from gen_profile.methods.solvers import transient_sway
 from gen_profile.methods.solvers.direct.relaxation import Relaxed
-from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.motion import whole_motion
 from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.methods.solvers.solution import Solution
 from gen_profile.motion.profile import Profile, grid_duration
@@ -108,7 +108,7 @@ class Plan(Drawable):
 
 def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Plan:
     """Take the motion of a solution, if it has one."""
-    motion = None if solution.optimum is None else optimal_profile(solution)
+    motion = None if solution.optimum is None else whole_motion(spec, solution)
     return Plan(spec=spec, solution=solution, found=motion, solver_time=solver_time)
 
 

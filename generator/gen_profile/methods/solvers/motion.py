@@ -2,11 +2,13 @@
 
 import math
 
+import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 
 from gen_profile.methods.solvers.solution import Solution
 from gen_profile.motion.profile import Array, Profile
+from gen_profile.spec.model import Spec
 
 
 def optimal_profile(solution: Solution) -> Profile:
@@ -37,6 +39,28 @@ def optimal_profile(solution: Solution) -> Profile:
         method="optimal",
         final_velocity=np.array(problem.final_velocity),
     )
+
+
+def whole_motion(spec: Spec, solution: Solution) -> Profile:
+    """Write the motion of a spec's solution with all axes: those that are held stand still, exactly.
+
+    Raises
+    ------
+    InfeasibleProblem, SolverDiverged
+        When the solution is none.
+    """
+    motion, held = optimal_profile(solution), spec.held()
+    if not held:
+        return motion
+    axes = len(spec.move.start)
+    moving = [axis for axis in range(axes) if axis not in held]
+    given = moving if motion.axes == axes else list(range(motion.axes))
+    target, final_velocity = np.array(spec.move.start), np.zeros(axes)
+    coefficients = np.zeros((*motion.coefficients.shape[:2], axes))
+    coefficients[:, 0] = target
+    coefficients[:, :, moving] = motion.coefficients[:, :, given]
+    target[moving], final_velocity[moving] = motion.target[given], motion.final_velocity[given]
+    return attrs.evolve(motion, coefficients=coefficients, target=target, final_velocity=final_velocity)
 
 
 def _integrate(coefficients: Array, lengths: Array, initial: Array) -> tuple[Array, Array]:

@@ -109,5 +109,5 @@ def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
-    nominal, worst = sways(problem_of(spec), motion)
+    nominal, worst = sways(problem_of(spec, whole=True), motion)
     return breaches(spec.limits, command, max(nominal, worst / SWAY_TOLERANCE))

@@ -5,6 +5,7 @@ from contextlib import suppress
 
 import attrs
 
+from gen_profile.dynamics.problem.held_axes import held_axes
 from gen_profile.dynamics.problem.problem import Problem, problem_of
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers import transient_sway
@@ -79,6 +80,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
                 "check.residual_sway: no duration leaves so little sway on every machine of "
                 "robustness.uncertain; allow more, or narrow the ranges."
             ),
+            *held_axes(spec),
             reasons=[Reason(code=Code.RESIDUAL_SWAY, place="check.residual_sway")],
         )
     return least

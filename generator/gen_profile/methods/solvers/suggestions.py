@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import attrs
 
+from gen_profile.dynamics.problem.held_axes import held_axes
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE
 from gen_profile.dynamics.problem.problem import Problem, problem_of
 from gen_profile.methods.solvers import method_selection as choice
@@ -105,6 +106,8 @@ def explained(spec: Spec, solution: Solution) -> Solution:
     known = solution.method == INDIRECT and not spec.limits.stated() and solution.advice != LONGER
     if solution.optimum is not None:
         return solution
+    if solution.status is Status.NOT_CONTROLLABLE and (freed := " ".join(held_axes(spec))):
+        return attrs.evolve(solution, advice=freed)
     if known:
         gentler = _gentler(spec, solution) if solution.status is Status.DIVERGED else None
         return attrs.evolve(solution, suggestions=(gentler,) if gentler else ())

@@ -65,6 +65,7 @@ class Report:
             "name": self.design.spec.name,
             "spec_sha256": self.design.spec.sha256(),
             "figures": self.design.figures,
+            "axes": self.design.plan.evaluation.axes,
             "check": self.check.to_dict(),
             "measured": None if self.measured is None else self.measured.to_dict(),
             "report": {"path": str(path), "sha256": sha256(self.content), "bytes": len(self.content)},

@@ -14,7 +14,7 @@ from gen_profile.dynamics.evaluation.demands import axis_demands, demands
 from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.dynamics.evaluation.phrases import bound, machine, mm, number, place_unit
 from gen_profile.methods.solvers.solution import Solution
-from gen_profile.motion.metrics import extremes
+from gen_profile.motion.metrics import excursion, extremes
 from gen_profile.presentation.charts.comparison import compared_styles, comparison_figure
 from gen_profile.presentation.charts.curves import (
     hamiltonian_figure,
@@ -77,12 +77,17 @@ def facts(
     """Name the few numbers that say what the motion is."""
     load, finding = check.worst
     margin, several = check.limit[load] - finding.residual[load] - check.error_bound, len(spec.axis) > 1
+    command = evaluation.command
     return [
         ("Duration", f"{number(evaluation.motion.duration)} s"),
         *(
             (f"Peak {one.quantity}" + f", {one.axis.name}" * several, f"{number(one.asked)} {one.unit}")
-            for one in demands(spec, evaluation.command)
+            for one in demands(spec, command)
             if one.quantity != "jerk" or not several
+        ),
+        *(
+            ("Excursion" + f", {axis.name}" * several, f"{number(excursion(command, column))} {axis.unit}")
+            for column, axis in enumerate(spec.machine().actuated)
         ),
         ("Sway on the way, nominal", mm(figures["sway_transient_peak_m"])),
         (f"Residual sway of the {load}, worst", mm(finding.residual[load])),
@@ -142,14 +147,16 @@ def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]
                 yield TableRow(cells=(name, f"{number(one.asked)} {one.unit}", "no limit stated", "", ""))
             else:
                 yield _limit(name, one.asked, one.allowed, one.unit)
-        limits = spec.limits.of(column)
-        if limits.travel is not None:
-            unit, factor = place_unit(spec, column)
-            low, high = (factor * end for end in limits.travel)
-            least, most = (factor * end for end in extremes(evaluation.command, 0, column))
+        unit, factor = place_unit(spec, column)
+        least, most = (factor * end for end in extremes(evaluation.command, 0, column))
+        taken, travel = f"{number(least)} to {number(most)} {unit}", spec.limits.of(column).travel
+        if travel is None:
+            yield TableRow(cells=(f"travel of {axis.name}", taken, "no limit stated", "", ""))
+        else:
+            low, high = (factor * end for end in travel)
             margin = f"{number(min(least - low, high - most))} {unit}"
-            ranges = (f"{number(a)} to {number(b)} {unit}" for a, b in ((least, most), (low, high)))
-            yield TableRow(cells=(f"travel of {axis.name}", *ranges, margin, ""))
+            allowed = f"{number(low)} to {number(high)} {unit}"
+            yield TableRow(cells=(f"travel of {axis.name}", taken, allowed, margin, ""))
 
 
 def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> TableRow:

@@ -104,13 +104,14 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
         taken: list[tuple[str, str, float, float | None]]
         asked = axis_demands(spec, evaluation.command, column)
         taken = [(one.quantity, one.unit, one.asked, one.allowed) for one in asked]
+        least, most = extremes(evaluation.command, 0, column)
+        way, allowed, (unit, factor) = most - least, None, place_unit(spec, column)
         if limits.travel is not None:
-            least, most = extremes(evaluation.command, 0, column)
             low, high = limits.travel
             beyond = max(low - least, most - high)
-            way = high - low + beyond if beyond > ROUNDING * (high - low) else most - least
-            unit, factor = place_unit(spec, column)
-            taken.append(("travel", unit, factor * way, factor * (high - low)))
+            allowed = factor * (high - low)
+            way = high - low + beyond if beyond > ROUNDING * (high - low) else way
+        taken.append(("travel", unit, factor * way, allowed))
         for quantity, unit, takes, allowed in taken:
             yield {
                 "place": spec.limits.place(column, quantity),

@@ -9,7 +9,7 @@ import attrs
 from gen_profile.dynamics.problem.problem import problem_of
 from gen_profile.methods.shapers.impulses import SHAPERS
 from gen_profile.methods.solvers import suggestions, transient_sway
-from gen_profile.methods.solvers.motion import optimal_profile
+from gen_profile.methods.solvers.motion import whole_motion
 from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.methods.solvers.shortest import timed
 from gen_profile.motion.actuator import lag_compensated
@@ -130,7 +130,7 @@ def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
 
 
 def _optimal(spec: Spec) -> Profile:
-    return optimal_profile(suggestions.solve(spec))
+    return whole_motion(spec, suggestions.solve(spec))
 
 
 def _weighed(timed_spec: Callable[[], Spec], sway_weight: float) -> Profile:
@@ -157,7 +157,7 @@ def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) ->
             f"With no more acceleration than the spec's own design takes ({taken:.3g} {unit}/s²) "
             f"there is no such motion in {spec.move.duration:g} s."
         )
-    return optimal_profile(solution)
+    return whole_motion(spec, solution)
 
 
 def _attempt(timed_spec: Callable[[], Spec]) -> Profile | GenProfileError:
