@@ -198,7 +198,7 @@ def test_without_a_manifest_the_spec_must_be_named(folder):
 def test_with_a_spec_a_lone_artefact_can_be_judged(folder, how):
     (folder / "manifest.json").unlink()
     (folder / "bay.toml").write_text(
-        '[plant]\ntype = "double-pendulum-crane"\nm2 = 0.203\n[move]\ndistance = 0.3\nduration = 3\n', "utf-8"
+        '[plant]\ntype = "double-pendulum-crane"\ng = 9.81\n[move]\ndistance = 0.3\nduration = 3\n', "utf-8"
     )
     spec = ["--preset", "paper"] if how == "preset" else [folder / "bay.toml"]
     outcome = run_here("check", folder / "paper.csv", *spec, "--json")

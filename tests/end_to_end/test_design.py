@@ -114,21 +114,17 @@ def test_the_same_format_twice_is_written_once(tmp_path):
 
 def test_a_spec_file_states_the_move(tmp_path):
     (tmp_path / "bay.toml").write_text(
-        'name = "bay"\n[plant]\ntype = "double-pendulum-crane"\nL1 = 5.0\n[move]\ndistance = 4.0\n'
+        'name = "bay"\n[plant]\ntype = "double-pendulum-crane"\nm1 = 90.0\nm2 = 4e2\nL1 = 5.0\nL2 = 1.0\n'
+        "[move]\ndistance = 4.0\n"
         'duration = 12.0\n[axis]\nunit = "mm"\n[export]\ncycle_time = 0.01\n',
         "utf-8",
     )
     outcome = run_here(tmp_path / "bay.toml", "--out", tmp_path)
     assert outcome.code == 0
     (defaults,) = (line for line in outcome.out.splitlines() if "defaults used" in line)
-    assert defaults.split()[2:] == [
-        "plant.m1,",
-        "plant.m2,",
-        "plant.L2,",
-        "plant.g,",
-        "plant.c1,",
-        "plant.c2",
-    ]
+    assert defaults.split("used")[1].strip() == (
+        "plant.g = 9.81 m/s^2, plant.c1 = 0 N m s/rad, plant.c2 = 0 N m s/rad"
+    )
     header, *_, last = (tmp_path / "bay.csv").read_text("utf-8").splitlines()
     assert header.startswith("time_s,position_mm,")
     assert last.split(",")[:2] == ["12.00", "4000.0"]

@@ -44,9 +44,45 @@ def test_editors_of_any_kind_will_do(tmp_path, bom, newline):
 
 
 def test_a_stated_parameter_is_no_default():
-    spec = parse_spec(LEAST.replace("[move]", "L1 = 0.5\n[move]"))
+    spec = parse_spec(LEAST.replace("[move]", "m1 = 2.0\nm2 = 3.0\nL1 = 0.5\nL2 = 0.1\n[move]"))
     assert spec.plant.parameters["L1"] == 0.5
-    assert "L1" not in spec.plant.defaults
+    assert spec.plant.defaults == ("g", "c1", "c2")
+
+
+@pytest.mark.parametrize(
+    ("machine", "stated", "missing"),
+    [
+        ("double-pendulum-crane", "L1 = 6", "L1|m1 = 0.192 kg, m2 = 0.203 kg, L2 = 0.391 m"),
+        ("double-pendulum-crane", "m1 = 2\nm2 = 3", "m1, m2|L1 = 0.47 m, L2 = 0.391 m"),
+        ("single-pendulum-crane", "m = 3", "m|L0 = 2 m"),
+        ("single-pendulum-crane", "L0 = 3\nc = 2", "L0|m = 1000 kg"),  # which then matters
+        ("single-pendulum-crane", "L0 = 3", ""),
+        ("gantry-crane", "m = 3\nc = 2", "m|L = 5 m"),
+        ("tower-crane", "L = 3", ""),
+        ("flexible-joint", "J = 0.01\nk = 20", "J, k|R = 0.3 m"),
+        ("mass-spring-chain-2", "m1 = 1\nm2 = 1\nk2 = 50", "m1, m2, k2|k1 = 100 N/m"),
+        ("slosh-tank", "a = 1", "a|h = 0.25 m"),
+        ("slosh-tank", "mu = 0.1", ""),
+        ("double-pendulum-crane", "g = 9.8", ""),
+    ],
+)
+def test_what_decides_the_swing_is_stated_together(machine, stated, missing):
+    """A machine is the user's or the type's nominal one, not partly either."""
+    way = "[1.0, 0.0]" if machine in ("single-pendulum-crane", "gantry-crane", "tower-crane") else "1.0"
+    text = (
+        f'[plant]\ntype = "{machine}"\n{stated}\n[move]\ndistance = {way}\nduration = 9\n'
+        "[check]\nresidual_sway = 0.01\n"
+    )
+    if not missing:
+        parse_spec(text)
+        return
+    own, others = missing.split("|")
+    with pytest.raises(SpecError) as caught:
+        parse_spec(text)
+    assert caught.value.faults == (
+        f"plant: states {own}, so it must state what else decides the swing: {others} (the values of the "
+        "type's nominal machine).",
+    )
 
 
 # ── files ───────────────────────────────────────────────────────────────────────────────────────────────

@@ -71,8 +71,8 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         *(row for path, proof in certificates.items() for row in (("file", path.name), *_proved(proof))),
         *_cost_of_lag(figures, outcome.spec.cost.effort),
     ]
-    if outcome.spec.plant.defaults:
-        rows.append(("defaults used", ", ".join(f"plant.{name}" for name in outcome.spec.plant.defaults)))
+    if assumed := _assumed(outcome.spec):
+        rows.append(("defaults used", assumed))
     if solution is not None and solution.redundant:
         names = ", ".join(solution.redundant)
         rows.append(("left out", f"sensitivity to {names}: {solution.redundancy}"))
@@ -390,6 +390,12 @@ def _move(spec: Spec) -> str:
     duration = "the shortest time" if spec.move.shortest else f"{spec.move.duration:g} s"
     ranges = (f"{name} ±{100 * fraction:g} %" for name, fraction in spec.robustness.uncertain.items())
     return ", ".join([spec.plant.type, f"{distances} in {duration}", *ranges])
+
+
+def _assumed(spec: Spec) -> str:
+    """List the values that the spec left to the type of its machine, with their sizes."""
+    values, units = spec.plant.parameters, spec.machine().units
+    return ", ".join(f"plant.{name} = {values[name]:g} {units[name]}" for name in spec.plant.defaults)
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:

@@ -61,10 +61,14 @@ PLANT = Plant(
     type="double-pendulum-crane",
     summary="cart, hook and payload on two ropes",
     parameters=(
-        Parameter("m1", "kg", "hook mass", nominal=0.192, lower=1e-4, upper=1e6),
-        Parameter("m2", "kg", "payload mass", nominal=0.203, lower=1e-4, upper=1e6),
-        Parameter("L1", "m", "rope from cart to hook", nominal=0.470, lower=1e-2, upper=200.0),
-        Parameter("L2", "m", "rope from hook to payload", nominal=0.391, lower=1e-2, upper=200.0),
+        Parameter("m1", "kg", "hook mass", nominal=0.192, lower=1e-4, upper=1e6, essential=True),
+        Parameter("m2", "kg", "payload mass", nominal=0.203, lower=1e-4, upper=1e6, essential=True),
+        Parameter(
+            "L1", "m", "rope from cart to hook", nominal=0.470, lower=1e-2, upper=200.0, essential=True
+        ),
+        Parameter(
+            "L2", "m", "rope from hook to payload", nominal=0.391, lower=1e-2, upper=200.0, essential=True
+        ),
         Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
         Parameter("c1", "N m s/rad", "damping at the cart", nominal=0.0, lower=0.0, upper=1e6),
         Parameter("c2", "N m s/rad", "damping at the hook", nominal=0.0, lower=0.0, upper=1e6),

@@ -67,7 +67,8 @@ def _parameters(numbers: range) -> Iterator[Parameter]:
     ):
         for i in numbers:
             words = Phrase(template, i=i)
-            yield Parameter(f"{letter}{i}", unit, words, nominal=nominal, lower=lower, upper=upper)
+            bounds = {"nominal": nominal, "lower": lower, "upper": upper}
+            yield Parameter(f"{letter}{i}", unit, words, **bounds, essential=letter != "c")
 
 
 def _equations(masses: int) -> Callable[..., Equations]:

@@ -10,17 +10,20 @@ computer algebra system that implements NumPy's protocols.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import attrs
+import numpy as np
 
 from gen_profile.plants.drawing import Drawing, Pose
 
 # A float, or a symbol that NumPy functions accept.
 Scalar = Any
 Vector = Sequence[Scalar]
+
+PROBE = 0.1  # rad (or m) and rad/s (or m/s), with which a machine is tried
 
 
 @attrs.frozen
@@ -35,6 +38,9 @@ class Parameter:
         Used where a spec says nothing.
     lower, upper : float
         Allowed values, both ends included.
+    essential : bool
+        Whether it makes the machine swing as it does, as masses and ropes do: a spec that states one such
+        value has to state all that matter.
     """
 
     name: str
@@ -43,6 +49,7 @@ class Parameter:
     nominal: float = attrs.field(kw_only=True)
     lower: float = attrs.field(kw_only=True)
     upper: float = attrs.field(kw_only=True)
+    essential: bool = attrs.field(default=False, kw_only=True)
 
 
 @attrs.frozen(kw_only=True)
@@ -203,3 +210,29 @@ class Plant:
         """
         places = [min(max(1.0, axis.lower), axis.upper) for axis in self.actuated]
         return places, SimpleNamespace(**self.nominal())
+
+
+def decides(plant: Plant, name: str, parameters: Mapping[str, float]) -> bool:
+    """Tell whether a parameter changes how a machine of given parameters swings, or how that shows."""
+    places, _ = plant.probe()
+    angles, rates = (
+        [PROBE / (k + 1.0) for k in range(len(plant.unactuated))],
+        [PROBE for _ in plant.unactuated],
+    )
+
+    def swing(values: Mapping[str, float]) -> tuple[list[float], list[float]]:
+        p, speeds = SimpleNamespace(**values), [PROBE for _ in places]
+        terms = plant.equations(angles, rates, places, speeds, p)
+        pushed = np.sum(np.array(terms.M_au, dtype=np.float64), axis=0)
+        pull = np.array(terms.K_u, dtype=np.float64) + np.array(terms.G_u, dtype=np.float64) - pushed
+        shown = plant.outputs(angles, places, p).sway
+        return np.linalg.solve(np.array(terms.M_uu, dtype=np.float64), pull).tolist(), [
+            float(x) for x in shown
+        ]
+
+    return not np.allclose(
+        np.concatenate(swing(parameters)),
+        np.concatenate(swing({**parameters, name: 1.5 * parameters[name]})),
+        rtol=1e-12,
+        atol=0.0,
+    )

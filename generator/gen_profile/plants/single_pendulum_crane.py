@@ -48,9 +48,15 @@ PLANT = Plant(
     type="single-pendulum-crane",
     summary="cart with a hoist, and a payload on the rope",
     parameters=(
-        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
+        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6, essential=True),
         Parameter(
-            "L0", "m", "from cart to payload with the hoist at 0", nominal=2.0, lower=1e-2, upper=200.0
+            "L0",
+            "m",
+            "from cart to payload with the hoist at 0",
+            nominal=2.0,
+            lower=1e-2,
+            upper=200.0,
+            essential=True,
         ),
         Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
         Parameter("c", "N m s/rad", "damping at the cart", nominal=0.0, lower=0.0, upper=1e9),

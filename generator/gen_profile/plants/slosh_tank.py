@@ -134,9 +134,11 @@ PLANT = Plant(
     type="slosh-tank",
     summary="liquid in a rectangular tank that is moved along its length",
     parameters=(
-        Parameter("a", "m", "tank length along the move", nominal=0.5, lower=1e-2, upper=100.0),
+        Parameter(
+            "a", "m", "tank length along the move", nominal=0.5, lower=1e-2, upper=100.0, essential=True
+        ),
         Parameter("b", "m", "tank width across", nominal=0.3, lower=1e-2, upper=100.0),
-        Parameter("h", "m", "fill height", nominal=0.25, lower=1e-3, upper=100.0),
+        Parameter("h", "m", "fill height", nominal=0.25, lower=1e-3, upper=100.0, essential=True),
         Parameter("rho", "kg/m^3", "density", nominal=998.0, lower=100.0, upper=2e4),
         Parameter("mu", "Pa s", "dynamic viscosity", nominal=1.0e-3, lower=0.0, upper=1e3),
         Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),

@@ -102,8 +102,8 @@ PLANT = Plant(
     type="tower-crane",
     summary="slewing jib with a trolley, and a payload that swings along and across it",
     parameters=(
-        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
-        Parameter("L", "m", "rope", nominal=10.0, lower=1e-2, upper=200.0),
+        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6, essential=True),
+        Parameter("L", "m", "rope", nominal=10.0, lower=1e-2, upper=200.0, essential=True),
         Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
         Parameter("c", "N m s/rad", "damping at the trolley", nominal=0.0, lower=0.0, upper=1e9),
     ),

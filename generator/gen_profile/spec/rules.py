@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from types import SimpleNamespace
 
-from gen_profile.plants.plant import Coordinate, Parameter, Plant
+from gen_profile.plants.plant import Coordinate, Parameter, Plant, decides
 from gen_profile.plants.virtual_work import end_load_is_a_body
 from gen_profile.spec.can import SENSOR_BYTES, CanSensorSpec
 from gen_profile.spec.model import RobustnessSpec, Spec
@@ -137,6 +137,20 @@ def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
             if stated and axis.name not in stated:
                 problem = Phrase("required beside the other axes' {what}", what=what)
                 yield place(f"can.{what}", axis.name), problem
+
+
+def _forgotten(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse a machine that is the user's in one essential value and the type's nominal one in another."""
+    essential = [parameter for parameter in plant.parameters if parameter.essential]
+    stated = [one.name for one in essential if one.name not in spec.plant.defaults]
+    missing = [one for one in essential if one.name not in stated]
+    if stated and (forgotten := [one for one in missing if decides(plant, one.name, spec.plant.parameters)]):
+        template = (
+            "states {stated}, so it must state what else decides the swing: {missing} (the values of the "
+            "type's nominal machine)"
+        )
+        values = ", ".join(f"{one.name} = {one.nominal:g} {one.unit}" for one in forgotten)
+        yield "plant", Phrase(template, stated=", ".join(stated), missing=values)
 
 
 def _free(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -303,6 +317,6 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
 OF_MACHINE = (
-    _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes,
+    _forgotten, _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes,
     _live, _sensor,
 )  # fmt: skip
