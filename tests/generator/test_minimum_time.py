@@ -1,6 +1,7 @@
 """Shortest moves against bisections on linear programs, of several machines and axes."""
 
 import math
+import re
 
 import attrs
 import numpy as np
@@ -9,15 +10,17 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
+from gen_profile.dynamics.problem.limits import Breach
 from gen_profile.dynamics.problem.problem import problem_of
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers import shortest as searching
 from gen_profile.methods.solvers.direct import relaxation
-from gen_profile.methods.solvers.plan import draft
+from gen_profile.methods.solvers.plan import draft, plan
 from gen_profile.methods.solvers.search import least
+from gen_profile.motion.metrics import greatest
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
-from gen_profile.support.errors import Code, CosimulationError, InfeasibleProblem
+from gen_profile.support.errors import Code, CosimulationError, InfeasibleProblem, SolverDiverged
 from gen_profile.support.work import OutOfWork, budget, spend
 
 
@@ -239,3 +242,77 @@ def test_limits_that_take_longer_than_a_move_may_last_are_refused():
 def test_as_much_time_as_a_move_may_last_is_tried_where_its_double_would_not_be_a_move():
     spec = preset_spec("bay-crane", ["move.duration=minimum", "limits.sway=4e-9"])
     assert searching._slow(spec, problem_of(spec)).move.duration == 1e5
+
+
+# ── fixed durations beside the shortest ──────────────────────────────────────────────────────────────────
+
+# presets, with limits that bind on the way
+LIMITED = {
+    "double-pendulum-crane": [
+        "limits.velocity=0.9",
+        "limits.acceleration=0.25",
+        "robustness.uncertain={L1=0.1}",
+    ],
+    "single-pendulum-crane": [
+        "limits.velocity=1.2",
+        "limits.acceleration=0.3",
+        "limits.axis.hoist.velocity=0.5",
+    ],
+    "gantry-crane": ["limits.velocity=1.5", "limits.acceleration=0.4", "limits.jerk=1.0"],
+    "tower-crane": ["limits.axis.slew.acceleration=0.01", "limits.axis.trolley.acceleration=0.2"],
+    "flexible-joint": ["limits.velocity=6", "limits.acceleration=60"],
+    "mass-spring-chain": ["limits.velocity=0.8", "limits.acceleration=2.0"],
+    "slosh-tank": ["limits.acceleration=0.6", "limits.jerk=6.0"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", LIMITED)
+def test_every_duration_from_the_shortest_on_has_a_motion(preset):
+    """The mesh of a fixed duration is as fine as that of the shortest, where it must be."""
+    limits = LIMITED[preset]
+    shortest_found = plan(preset_spec(preset, [*limits, "move.duration=minimum"])).spec.move.duration
+    for times in (1.0, 1.0015, 1.006):
+        spec = preset_spec(preset, [*limits, f"move.duration={times * shortest_found!r}"])
+        motion = plan(spec).motion
+        assert motion.duration == times * shortest_found
+        for column, axis in enumerate(spec.machine().actuated):
+            allowed = spec.limits.of(column)
+            assert greatest(motion, 2, column) <= (1.0 + 1e-6) * allowed.acceleration, axis
+
+
+@pytest.mark.slow
+def test_what_is_only_not_found_is_not_called_impossible():
+    """Half a per cent below the shortest no bound says that there is none; at half of it one does."""
+    limits = ["robustness.uncertain={L1=0.1}", *LIMITED["double-pendulum-crane"]]
+    shortest_found = plan(preset_spec("double-pendulum-crane", [*limits, "move.duration=minimum"]))
+    outcomes = {0.995: (SolverDiverged, "there may be one"), 0.7: (InfeasibleProblem, "No motion meets")}
+    for times, (kind, words) in outcomes.items():
+        duration = times * shortest_found.spec.move.duration
+        with pytest.raises(kind, match=words):
+            plan(preset_spec("double-pendulum-crane", [*limits, f"move.duration={duration!r}"]))
+
+
+def test_a_limit_that_programs_break_by_their_accuracy_is_kept_with_a_reserve(monkeypatch):
+    """As if they were no more accurate than to a ten-thousandth."""
+    problem = crane_problem(limits=LimitsSpec(acceleration=0.3), sway_weight=0.0)
+    solve, asked = choice.direct.solve, []
+
+    def inexactly(problem, *arguments, **options):
+        limit = problem.limits.of(0).acceleration
+        asked.append(limit)
+        loose = attrs.evolve(problem, limits=LimitsSpec(acceleration=1.0001 * limit))
+        return attrs.evolve(solve(loose, *arguments, **options), problem=problem)
+
+    monkeypatch.setattr(choice.direct, "solve", inexactly)
+    solution = choice.attempt(problem, "direct")
+    assert choice.keeps_limits(solution)
+    assert asked == [0.3, pytest.approx(0.3 * (1.0 - 2e-4), rel=1e-5)]
+    assert solution.problem.limits == problem.limits
+
+
+@pytest.mark.parametrize(("found", "allowed"), [(1.2000024, 1.2), (0.30000001, 0.3), (0.71, 0.5)])
+def test_a_sentence_does_not_contradict_itself_by_rounding(found, allowed):
+    words = Breach(place="limits.velocity", found=found, allowed=allowed).sentence()
+    stated, needed = (float(number) for number in re.findall(r"(\d+\.\d+) ?(?:is|\.$)", words))
+    assert stated == allowed < needed <= found + 0.5 * 10.0 ** -len(str(needed).partition(".")[2])

@@ -1,5 +1,6 @@
 """Whether a motion keeps the limits of its spec."""
 
+import math
 from collections.abc import Iterator
 
 import attrs
@@ -31,10 +32,17 @@ class Breach:
     found: float
     allowed: float
 
+    @property
+    def excess(self) -> float:
+        """Share of what is allowed by which that is broken; infinite where nothing is."""
+        return abs((self.found - self.allowed) / self.allowed) if self.allowed else math.inf
+
     def sentence(self) -> str:
-        """Put it into words."""
-        template = "{place}: {allowed:g} is allowed, the motion needs {found:.4g}."
-        return Phrase(template, **attrs.asdict(self))
+        """Put it into words, with so many digits that the numbers contradict each other."""
+        digits = next((n for n in range(4, 17) if float(f"{self.found:.{n}g}") > self.allowed), 17)
+        found = float(f"{self.found:.{digits}g}")
+        template = "{place}: {allowed:.12g} is allowed, the motion needs {found:.12g}."
+        return Phrase(template, place=self.place, allowed=self.allowed, found=found)
 
     def reason(self) -> Reason:
         """Tell it to programs."""

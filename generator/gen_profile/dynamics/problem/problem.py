@@ -1,5 +1,7 @@
 """The optimal control problem of one motion task; knows no algorithm."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Literal
 
@@ -7,7 +9,8 @@ import attrs
 
 from gen_profile.dynamics.problem.held_axes import reduced
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.model import LimitsSpec, Spec
+from gen_profile.spec.model import AxisLimitsSpec, LimitsSpec, Spec
+from gen_profile.support.units import RATES
 
 Effort = Literal["jerk", "snap", "reference"]
 
@@ -97,6 +100,20 @@ class Problem:
     def distance(self) -> tuple[float, ...]:
         """Signed distance of every axis."""
         return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
+
+    def within(self, share: float) -> Problem:
+        """Ask for a share of what the limits allow of velocity, acceleration and jerk, and of the room."""
+        room = 1.0 - share
+
+        def narrow(column: int, own: AxisLimitsSpec) -> AxisLimitsSpec:
+            low, high = own.travel or (0.0, 0.0)
+            ends = (self.start[column], self.target[column])
+            inside = (min(low + room * (high - low), *ends), max(high - room * (high - low), *ends))
+            rates = {name: value * share for name in RATES if (value := getattr(own, name)) is not None}
+            return attrs.evolve(own, **rates, travel=None if own.travel is None else inside)
+
+        axis = {f"axis{column}": narrow(column, self.limits.of(column)) for column in range(len(self.target))}
+        return attrs.evolve(self, limits=LimitsSpec(sway=self.limits.sway, axis=axis))
 
     @property
     def nominal_sway(self) -> float | None:

@@ -2,17 +2,19 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 
 import attrs
 import numpy as np
 
-from gen_profile.dynamics.problem.limits import breaches
+from gen_profile.dynamics.problem.limits import Breach, breaches
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct import solver as direct
 from gen_profile.methods.solvers.direct import worst_case
 from gen_profile.methods.solvers.direct.relaxation import SHORTEST, Relaxation, Relaxed, shortest
+from gen_profile.methods.solvers.direct.solver import ProgramSequence
 from gen_profile.methods.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.methods.solvers.indirect import solver as indirect
 from gen_profile.methods.solvers.motion import optimal_profile
@@ -22,12 +24,17 @@ from gen_profile.motion.actuator import lag_compensated
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.values import SolverName
 from gen_profile.support.progress import Progress, no_progress
-from gen_profile.support.work import afford
+from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
 ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
 DIRECTLY = 3.0  # likewise for the direct one
 NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
+KEPT = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
+REFINING = 0.4  # of the work that is left, for finer meshes that keep the limits
+SETTLING = 0.9  # likewise, for the least cost, after which the motion of least violation will do
+INEXACT = 1e-3  # share of a limit by which programs may break it for no other reason than their accuracy
+RESERVE, RESERVES = 2.0, 2  # times that share less of the limits is asked for then, and how often
 PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
 LEAST = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
 BLEND = 4.0  # order of the norm by which these times and the period count together
@@ -75,14 +82,58 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
     """Begin near by, or at rest; where that misleads, at the motion of least violation."""
     cost, _ = direct.resolve_sway_cost(problem)  # once for all motions
     settled = attrs.evolve(problem, sway_weight=cost.beta, sway_scale=cost.gamma)
-    solution = direct.solve(settled, None if near is None else near.start(problem), coarse=coarse)
+    solution = _with_reserve(settled, None if near is None else near.start(problem), coarse=coarse)
     if problem.limits.stated() and not keeps_limits(solution):
         nearest = least_violation(settled)
         if nearest is not None and nearest.wider > NEARLY:
             return _infeasible(problem, nearest)
-        other = solution if nearest is None else direct.solve(settled, nearest.start(settled), coarse=coarse)
-        solution = solution if other.optimum is None else other
+        if nearest is not None:
+            other = _from_nearest(settled, nearest, coarse=coarse)
+            solution = solution if other.optimum is None else other
+        solution = _unproved(solution)
     return attrs.evolve(solution, problem=problem)
+
+
+def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Solution:
+    """Begin at the motion of least violation; where that fails, take this motion, if it keeps the limits.
+
+    Just above the shortest duration only meshes that are fine where limits begin to bind have a motion.
+    """
+    if not coarse:
+        with suppress(OutOfWork), budget(REFINING * left()):
+            while nearest.wider > KEPT and (finer := _refined(problem, nearest)) is not None:
+                nearest = finer
+        spend(0.0)
+    begun = partial(_with_reserve, problem, nearest.start(problem), coarse=coarse)
+    solution = afford(begun, SETTLING * left()) or given_up(problem)
+    return nearest.solution if solution.optimum is None and nearest.wider <= 1.0 else solution
+
+
+def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:
+    """Bisect intervals where limits begin to bind, if that is worth it, and look for less violation."""
+    finer = nearest.bisected()
+    return None if finer is None else Relaxation(problem, (), finer).least(_places(problem))
+
+
+def _with_reserve(problem: Problem, near: ProgramSequence | None, *, coarse: bool) -> Solution:
+    """Solve directly; where a limit is broken by as much as programs are inexact, ask for so much less."""
+    solution = direct.solve(problem, near, coarse=coarse)
+    for _ in range(RESERVES):
+        excess = max((broken.excess for broken in _broken(solution)), default=0.0)
+        if not 0.0 < excess < INEXACT:
+            break
+        other = direct.solve(problem.within(1.0 - RESERVE * excess), near, coarse=coarse)
+        if other.optimum is None:
+            break
+        solution, problem = attrs.evolve(other, problem=solution.problem), other.problem
+    return solution
+
+
+def _unproved(solution: Solution) -> Solution:
+    """Call nothing impossible that was not found on some meshes, and for which no bound says so."""
+    if solution.status is not Status.INFEASIBLE:
+        return solution
+    return attrs.evolve(solution, status=Status.DIVERGED)
 
 
 def _infeasible(problem: Problem, nearest: Relaxed) -> Solution:
@@ -93,8 +144,12 @@ def _infeasible(problem: Problem, nearest: Relaxed) -> Solution:
 
 def least_violation(problem: Problem) -> Relaxed | None:
     """Find the motion for which all limits must be widened least; none without limits."""
-    places = tuple(problem.limits.stated())
+    places = _places(problem)
     return Relaxation(problem).least(places) if places else None
+
+
+def _places(problem: Problem) -> tuple[str, ...]:
+    return tuple(problem.limits.stated())
 
 
 def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
@@ -103,7 +158,7 @@ def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
     if nearest is not None and nearest.wider > NEARLY:
         return _infeasible(problem, nearest)
     if nearest is None or not coarse:
-        return worst_case.solve(problem)
+        return _unproved(worst_case.solve(problem))
     return attrs.evolve(nearest.solution, problem=problem)
 
 
@@ -143,12 +198,15 @@ def usual_duration(problem: Problem) -> float:
 
 def keeps_limits(solution: Solution) -> bool:
     """Tell whether a solution is one and keeps its problem's limits."""
-    if solution.optimum is None:
-        return False
+    return solution.optimum is not None and not _broken(solution)
+
+
+def _broken(solution: Solution) -> tuple[Breach, ...]:
+    """List the limits that the motion of a solution, if it is one, breaks."""
     problem = solution.problem
-    if problem.limits == LimitsSpec():
-        return True
+    if solution.optimum is None or problem.limits == LimitsSpec():
+        return ()
     sway = 0.0 if problem.limits.sway is None else sway_on_the_way(solution)
     sway = max(sway, problem.sway_spread * sway / SLACK)
     command = lag_compensated(optimal_profile(solution), problem.tau)
-    return not breaches(problem.limits, command, sway)
+    return breaches(problem.limits, command, sway)

@@ -158,12 +158,12 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
             asked = attrs.evolve(problem, duration=duration)
             solution = choice.attempt(asked, "direct", coarse=True, near=near)
             rough[duration] = drafted(lasting(spec, duration), solution)
-        return rough[duration].excess_sway
+        return _excess(rough[duration])
 
     def exactly(duration: float) -> float:
         progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
         exact[duration] = solved(lasting(spec, duration), spread=problem.sway_spread, near=near)
-        return exact[duration].excess_sway
+        return _excess(exact[duration])
 
     def rounded(duration: float) -> float:
         return max(start, in_cycles(spec, duration))
@@ -178,6 +178,12 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
             raise
         return rough[guess]
     return None if duration is None else exact[duration]
+
+
+def _excess(draft: Plan) -> float:
+    """Tell how much more sway a motion leaves than it should; infinite where it breaks limits."""
+    excess = draft.excess_sway
+    return math.inf if excess < math.inf and draft.broken else excess
 
 
 def _drafted(spec: Spec, relaxed: Relaxed) -> Plan:

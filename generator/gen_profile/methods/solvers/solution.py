@@ -25,7 +25,7 @@ class Status(Enum):
     SWINGS_TOO_FAR = "The load would have to swing too far."
     INFEASIBLE = "No motion meets the end conditions within the limits."
     NOT_CONTROLLABLE = "Some part of the machine swings on, whatever the axes do."
-    DIVERGED = "The solver found no motion that meets the optimality conditions."
+    DIVERGED = "The solver found no motion that meets the optimality conditions; there may be one."
     GIVEN_UP = "The search for a motion was given up, for it took too long."
 
 
