@@ -39,8 +39,9 @@ from planned_machines import GANTRY, HOIST, histories_apart, numbering
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
 from gen_profile.assurance.proof.histories import Histories, History
 from gen_profile.assurance.proof.judging import judge_run
-from gen_profile.assurance.proof.numbering import DRAWS, RHYTHMS, SEARCH
-from gen_profile.assurance.proof.verdict import JudgedHistory, kind_of, late_on_average, lateness
+from gen_profile.assurance.proof.numbering import CORNERS, DRAWS, RHYTHMS, SEARCH
+from gen_profile.assurance.proof.promptness import KINDS
+from gen_profile.assurance.proof.verdict import JudgedHistory, kind_of
 from gen_profile.planner import design, execution
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
@@ -307,8 +308,6 @@ def tried_on(mutant: Mutant, one: Machine) -> tuple[str, str, float, int, int]:
             otherwise += found.on_the_way != sound.on_the_way or found.residual != sound.residual
     except GenProfileError as error:
         return "killed", f"{one.name}: no block: {str(error)[:80]}", 0.0, 1, 0
-    if new := next(late_on_average(found_all), ""):
-        return "killed", f"{one.name}: {new}", 0.0, 1, 0
     slowest, kind = later(found_all, one)
     how = f"{one.name}: {kind} later on average by {slowest:.2g} slow periods"
     what = "slower" if slowest > SLOWER else "as good" if otherwise else "unchanged"
@@ -339,7 +338,11 @@ def later(found: Sequence[JudgedHistory], one: Machine) -> tuple[float, str]:
 
 def means(histories: Sequence[JudgedHistory]) -> dict[str, float]:
     """Average in slow periods how late commands of each kind are carried out."""
-    return {kind: float(np.mean(values or [0.0])) for kind, values in lateness(histories).items()}
+    commands = [command for one in histories if one.group in (CORNERS, DRAWS) for command in one.obeyed]
+    late = {
+        kind: [(one.takes - one.alone) / one.period for one in commands if one.kind == kind] for kind in KINDS
+    }
+    return {kind: float(np.mean(values or [0.0])) for kind, values in late.items()}
 
 
 CYCLE = "export.cycle_time=0.01"

@@ -9,7 +9,7 @@ from gen_profile.assurance.proof.habits import Change
 from gen_profile.assurance.proof.histories import Histories, History
 from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.planner.commands import Command
-from gen_profile.planner.design import STEADY
+from gen_profile.planner.stated import STEADY
 
 G = 9.81
 CYCLE = 0.004

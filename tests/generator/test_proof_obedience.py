@@ -10,6 +10,7 @@ from generator.planned_machines import BAY
 from gen_profile.assurance.proof.followed import Followed, Zone
 from gen_profile.assurance.proof.habits import GENTLE, ROUGH
 from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.left_swinging import GivenModes
 from gen_profile.assurance.proof.obedience import WORDS, faults, measured
 from gen_profile.assurance.proof.orders import (
     BLOCKED,
@@ -28,8 +29,8 @@ from gen_profile.assurance.proof.orders import (
 )
 from gen_profile.assurance.proof.verdict import kind_of
 from gen_profile.assurance.proof.watching import BlockWatch
+from gen_profile.methods.quickest.modes import SwayModes
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, CYCLES = 0.01, 6000
@@ -81,7 +82,7 @@ def obedient():
     }
     return Followed(
         cycle=CYCLE,
-        period=2.0,
+        periods=(2.0,),
         reaction=1.5,
         axes=[BlockAxis(name="")],
         limits=[LIMITS],
@@ -159,11 +160,19 @@ def test_a_block_that_obeys_has_no_fault():
 
 
 REST, MOVE, STICKS, STOPS = obedient().orders
-MODES = GivenModes(poles=1j * np.array([[2.0, 2.1]]), gains=np.array([[1.0]]), damped=False)
+MODES = GivenModes(
+    modes=SwayModes(poles=1j * np.array([[2.0], [2.1], [1.9]]), gains=np.full((3, 1, 1, 1), 0.5)),
+    ends=(1, 2),
+    near=1,
+)
 FAULTS = {
-    POSITION: with_orders(REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS),
+    POSITION: with_orders(
+        REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS, periods=(0.1,), reaction=0.1
+    ),
     VELOCITY: with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.9,)), STOPS),
-    STOP: with_orders(REST, attrs.evolve(MOVE, end=150), order(150, CYCLES, STOP), period=1.0),
+    STOP: with_orders(
+        REST, attrs.evolve(MOVE, end=150), order(150, CYCLES, STOP), periods=(0.1,), reaction=0.1
+    ),
     "left": with_output("fPosition", slice(1500, 1600), 5.01),
     "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
     "idle": idle(),
@@ -199,7 +208,7 @@ FAULTS = {
     "distance": with_output("fDistanceToGo", 300, 1.0),
     "time": with_output("fTimeToGo", slice(720, 820), 3.0),
     "stop distance": with_output("fStopDistance", 300, 1.0),
-    "back": with_output("fVelocity", slice(300, 310), -0.1),
+    "back": with_output("fVelocity", slice(300, 310), -0.2),
     "beyond": with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.7,)), STOPS),
     "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
     "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
@@ -255,7 +264,7 @@ def test_a_target_is_left_to_damp_what_was_measured_and_reached_again():
     left.issued["bDamping"][1500:1590] = 1.0
     assert not kinds(left) & {is_left, kind_of(WORDS[POSITION])}
     left.issued["fPosition"][1500:STICK] = TARGET + 0.01
-    assert kind_of(WORDS[POSITION]) in kinds(attrs.evolve(left, reaction=0.01, period=0.01))
+    assert kind_of(WORDS[POSITION]) in kinds(attrs.evolve(left, reaction=0.01, periods=(0.01,)))
 
 
 def test_every_kind_of_fault_is_tried():
@@ -448,7 +457,7 @@ def test_a_live_parameter_that_changes_on_the_way_ends_the_promise():
 def test_what_is_left_goes_with_the_root_of_the_period_where_a_rope_changes_at_rest():
     """After the stop, from 2 rad/s to 1: √2 times as much, to 10 %."""
     changed = CYCLES - 900
-    slower = attrs.evolve(MODES, poles=0.5 * MODES.poles)
+    slower = attrs.evolve(MODES, modes=attrs.evolve(MODES.modes, poles=0.5 * MODES.modes.poles))
     for factor, wrong in (
         (2.0**0.5, set()),
         (1.5, set()),

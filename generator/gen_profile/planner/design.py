@@ -20,7 +20,8 @@ from gen_profile.planner.machine import (
     planned_axes,
     second_order_sway,
 )
-from gen_profile.planner.sensor import between, damping_room, sensor_constants
+from gen_profile.planner.sensor import between, sensor_constants
+from gen_profile.planner.stated import STEADY, quick_limits, target_range
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import SpecError
 from gen_profile.support.one_thread import one_thread
@@ -31,20 +32,16 @@ from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstan
 
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
-STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
 # A cycle may spend so many at least, and so many for each ms, if the spec states none; the more where the
 # slowest mode swings faster than once in LEISURELY s, as it waits for plans.
 OPERATIONS, ZONED_OPERATIONS = 3000, 5000
 LEISURELY = 2.0
 TOLERATED_FRACTION = 0.2  # of the allowed sway, which the block leaves at rest; half of it on the way
-MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
 TOLERANT = 3.0  # times that, where plans may spend a share of the allowed sway
 LEAST_ERROR = 1e-3  # of a frequency, that is watched to second order
 USUAL = 20.0  # slots in half a motion
 LITTLE = 0.3  # weight that does not count
-QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
-QUICK_JERK = 4.0
 
 
 @attrs.frozen(kw_only=True)
@@ -142,24 +139,6 @@ def planner_block(spec: Spec) -> PlannerBlock:
         frequency_error=modes_of_live.error,
         period=period,
     )
-
-
-def quick_limits(spec: Spec, axis: int) -> tuple[float, float]:
-    """Deceleration and jerk of an axis's quick stop, where its limits are stated, in m (or rad) and s."""
-    own = spec.limits.of(axis)
-    assert own.acceleration and own.jerk
-    return (
-        spec.planner.quick_stop or QUICK * own.acceleration,
-        spec.planner.quick_stop_jerk or QUICK_JERK * own.jerk,
-    )
-
-
-def target_range(spec: Spec, axis: int) -> tuple[float, float]:
-    """Least and greatest target of an axis, where its travel is stated: with room for calming and damping."""
-    travel = spec.limits.of(axis).travel
-    assert travel is not None
-    margin = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else damping_room(spec)
-    return travel[0] + margin, travel[1] - margin
 
 
 def _faults(spec: Spec, number: int, suffix: str) -> list[str]:

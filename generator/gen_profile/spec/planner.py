@@ -104,6 +104,8 @@ class PlannerSpec(Checked, table="planner"):
     sway_share : float
         Share of `check.residual_sway` that a motion may leave on the machines of the stated errors, for being
         quick; 0 plans motions that leave none to first order.
+    lateness : float or None
+        Times what is possible that a command may take, and a second beside; None demands nothing.
     quick_stop : float or None
         Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
     quick_stop_jerk : float or None
@@ -121,6 +123,7 @@ class PlannerSpec(Checked, table="planner"):
     zones: bool = False
     operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
     sway_share: Annotated[float, Bounds(least=0.0, most=0.8)] = 0.5
+    lateness: Annotated[float, Bounds(least=1.0, most=100.0)] | None = None
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
     sensor: SensorSpec | None = None

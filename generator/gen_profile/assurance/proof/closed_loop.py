@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gen_profile.assurance.proof.followed import GivenMachine
 from gen_profile.assurance.proof.histories import SHIFT, SLOWEST, Histories, History
 from gen_profile.assurance.proof.judging import WatchedRun, judge_run
+from gen_profile.assurance.proof.left_swinging import GivenModes
 from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.assurance.proof.sensing import sensor_faults
 from gen_profile.assurance.proof.verdict import JudgedHistory
@@ -26,7 +27,6 @@ from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.left_swinging import GivenModes
 from gen_profile.planner.sensor import estimation_error
 from gen_profile.spec.model import Spec
 from gen_profile.support.progress import Progress, no_progress
@@ -123,11 +123,25 @@ class ClosedLoop:
         """Tell what is known of the machine that the block is given."""
         spec = self._spec
         steady = not (history.hoisting or history.sensed or spec.planner.live_noise or spec.planner.live_rate)
-        modes = GivenModes.of(spec, history.live, history.commands[-1].time) if steady else None
         lasting = [one.inputs for one in history.changes if math.isinf(one.lasts)]
         live = {name: given[f"f{name}"] for given in lasting for name in history.live if f"f{name}" in given}
-        last = GivenModes.of(spec, {**history.live, **live}) if steady and live else None
-        return GivenMachine(self._histories.slowest(history), modes, last)
+        return GivenMachine(
+            tuple(self._histories.periods(history).tolist()),
+            self._modes(history, history.live, history.commands[-1].time) if steady else None,
+            self._modes(history, {**history.live, **live}) if steady and live else None,
+        )
+
+    def _modes(self, history: History, live: Mapping[str, float], seconds: float = 0.0) -> GivenModes:
+        """Linearise the machine of some live parameters, those of stated errors, and the one that follows."""
+        histories = self._histories
+        following = [(self._parameters(history), history.places)] if live is history.live else []
+        return GivenModes.of(
+            self._spec.machine(),
+            list(histories.axes),
+            histories.machines_of_errors(live),
+            following,
+            seconds,
+        )
 
     def watched(self, history: History, given: GivenMachine) -> WatchedRun:
         """Let the machine of a history follow the block, and see whether the block obeys.
@@ -151,7 +165,7 @@ class ClosedLoop:
         if run.fault:
             return WatchedRun(run=run)
         judged = self._watch.judged(given, script, orders, block, run)
-        faults = (*judged.faults, *self._sensor_faults(history, given.period, run))
+        faults = (*judged.faults, *self._sensor_faults(history, max(given.periods), run))
         return attrs.evolve(judged, run=attrs.evolve(run, trace=None, copies=None), faults=faults)
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:

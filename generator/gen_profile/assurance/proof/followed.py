@@ -11,44 +11,33 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.assurance.proof.left_swinging import GivenModes
 from gen_profile.assurance.proof.orders import (
     DISABLED,
     NO_MOTION,
     POSITION,
-    STOP,
-    VELOCITY,
+    QUICK_STOP,
     Ends,
     Flags,
     ReceivedOrders,
     TimedOrder,
     taken_over,
 )
+from gen_profile.methods.quickest.axis_alone import AxisLimits
+from gen_profile.methods.quickest.modes import Complex
+from gen_profile.methods.quickest.motion import AxisState, Goal, alone
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.planner.left_swinging import GivenModes
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
-# Times beyond those that distance, velocity, acceleration and jerk take, in slow periods; in brackets the
-# longest met in 6000 histories of twelve machines, but for faults of the block.
-FAR = 1.1  # of the way's time at full speed
-FROM_REST = 1.8  # (1.7)
-ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (4.0)
-TO_STICK = 3.4  # to its velocity, as a motion to a target is stopped first (3.2)
-AHEAD = 1.5  # before an end of the way, or a slow interval, in which a stick's velocity need not be reached
-MORE_AXES = 1.7  # for each further axis, as they are planned one after the other (1.5)
-TO_STOP = 2.8  # (2.75)
-BEFORE_SLOW = 3.0  # slots at full speed, in which a slow interval's limit holds, too
-TO_SLOW = 2.2  # below a new velocity limit: a new target is planned, or a motion stopped, first (1.5)
-TO_TURN = 1.9  # (1.6)
-RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
-CALMED = 3.0  # more where live parameters change on the way (2.1)
-WAY = "on the way"  # a target that is given while an axis moves
-ON_AVERAGE = {POSITION: 0.8, WAY: 0.9, VELOCITY: 1.2, STOP: 1.0}  # (0.72, 0.65, 1.1 of a tank, 0.92)
+LATENESS = 1.5  # times what is possible, that any machine may take where its spec does not say otherwise
+PLANNING = 1.0  # s, beside that, as a motion has to be planned first
+SLOT = 0.05  # periods: what docs/planner.md calls a slot
+CALMING = 0.1  # share of the limits that docs/planner.md keeps for calming where live parameters change
+BEFORE_SLOW = 3.0  # slots at full speed, in which a slow interval's limit holds, too, as docs/planner.md says
+IN_VELOCITY = 1.001e-3  # share of the greatest velocity, by which one counts as reached; documented: 0.001
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
-ENABLED = 2.2  # s, which a block takes more to get ready (2.1, of a damped crane at 4 ms)
-IN_VELOCITY = 1.001e-3  # share of the greatest velocity, by which one counts as reached; the block: 0.001
 
 
 @attrs.frozen(kw_only=True)
@@ -66,9 +55,9 @@ class Zone:
 
 @attrs.frozen
 class GivenMachine:
-    """Slowest period in s of the machine that a block is given, and where known, its first and last modes."""
+    """Longest periods in s of the modes that a block is given, and where known, its first and last modes."""
 
-    period: float
+    periods: tuple[float, ...]
     modes: GivenModes | None = None
     last_modes: GivenModes | None = None
 
@@ -79,8 +68,10 @@ class Followed:
 
     Attributes
     ----------
-    cycle, period, reaction : float
-        s: of the task, of the slowest swing, and in which a new command must be obeyed.
+    cycle, reaction : float
+        s: of the task, and in which a new command must be obeyed, as the block states.
+    periods : tuple of float
+        s, of each mode, the longest where it changes.
     axes : sequence of BlockAxis
     limits : sequence of Ends
         Of the same axes.
@@ -93,8 +84,8 @@ class Followed:
         m, that calming may lead away from a target.
     settle : float
         s, by which damping may put off an arrival.
-    sway_limit : float
-        m, for all that stated errors may leave.
+    sway_limit, share : float
+        m, for all that stated errors may leave, and for what a motion may.
     rest_reports : sequence of int
         Cycles in which the load is seen to hang still.
     zones : sequence of Zone
@@ -112,7 +103,7 @@ class Followed:
     """
 
     cycle: float
-    period: float
+    periods: tuple[float, ...]
     reaction: float
     axes: Sequence[BlockAxis]
     limits: Sequence[Ends]
@@ -122,6 +113,7 @@ class Followed:
     wander: float = 0.0
     settle: float = 0.0
     sway_limit: float = inf
+    share: float = 0.0
     rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
@@ -132,6 +124,20 @@ class Followed:
     modes: GivenModes | None = None
     last_modes: GivenModes | None = None
     last_known: int = 0
+
+    @property
+    def period(self) -> float:
+        """Of the slowest swing, in s."""
+        return max(self.periods)
+
+    @property
+    def settles(self) -> float:
+        """A period of each mode in s: what it takes to let an axis's motion leave none, whatever the motion.
+
+        Two half periods a mode are the length of the shaper that leaves nothing to first order of its error
+        (ZVD, Singer and Seering 1990), and shaped motions keep the limits that the unshaped ones keep.
+        """
+        return sum(self.periods)
 
     @property
     def enabled(self) -> list[int]:
@@ -147,6 +153,13 @@ class Followed:
         """Tell how fast axes are as they are taken over in a cycle, which is not the first."""
         given = self.speeds[:, cycle - 1 : cycle + 1].tolist()
         return [taken_over(last, own.velocity) for last, own in zip(given, self.limits, strict=True)]
+
+    @cached_property
+    def unknown_from(self) -> int:
+        """Cycle from which on it is not known how the load of the machine as given swings."""
+        lost = [order.begin for order in self.orders if order.kind in (QUICK_STOP, DISABLED)]
+        lost += [*self.rest_reports, *np.flatnonzero(self.retold)[:1].tolist()]
+        return min(lost, default=self.cycles)
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""
@@ -292,40 +305,82 @@ def runs_of(flags: Flags) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def slowing(followed: Followed, before: Array, periods: float) -> float:
-    """Tell the time in s in which axes stop from some velocities, (axes,)."""
-    slowest = max(
-        abs(v) / own.acceleration + own.acceleration / own.jerk
-        for v, own in zip(map(float, before), followed.limits, strict=True)
-    )
-    return slowest + (periods + calmed(followed)) * followed.period
+def goals(followed: Followed, order: TimedOrder) -> list[Goal]:
+    """Give each axis's goal of a command; a stick's velocity only as far as the limits let it."""
+    usable = 1.0 - followed.reserve
+    match order.kind:
+        case "position":
+            return [Goal(place=place) for place in order.values]
+        case "velocity":
+            tops = [usable * top for top in order.tops]
+            return [Goal(speed=min(max(v, -top), top)) for v, top in zip(order.values, tops, strict=True)]
+    return [Goal() for _ in followed.axes]
 
 
-def reaching(followed: Followed, before: Array, wanted: Sequence[float]) -> float:
-    """Tell the time in s in which axes come from some velocities, by a stop, to others, each (axes,)."""
-    slowest = max(
-        (abs(v) + abs(w)) / own.acceleration + own.acceleration / own.jerk
-        for v, w, own in zip(map(float, before), wanted, followed.limits, strict=True)
-    )
-    periods = TO_STICK + MORE_AXES * (len(followed.axes) - 1) + calmed(followed)
-    return slowest + periods * followed.period
+def limits_of(followed: Followed, order: TimedOrder) -> list[AxisLimits]:
+    """Give the limits that each axis may use for a command."""
+    usable = 1.0 - followed.reserve
+    tops = order.tops if order.kind == POSITION else [own.velocity for own in followed.limits]
+    return [
+        AxisLimits(
+            velocity=max(usable * top, EXACT),
+            acceleration=usable * own.acceleration,
+            jerk=usable * own.jerk,
+        )
+        for top, own in zip(tops, followed.limits, strict=True)
+    ]
 
 
-def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder) -> float:
-    """Tell the time in s in which axes come from places and velocities, (axes,), to an order's targets."""
-    periods = (ON_WAY if before.any() else FROM_REST) + calmed(followed)
-    usable, moves = 1.0 - followed.reserve, zip(place.tolist(), order.values, before.tolist(), strict=True)
+def states(followed: Followed, cycle: int, moved: Complex | None = None) -> list[AxisState]:
+    """Give each axis's state before a cycle, with what it has made of modes, (axes, machines, modes)."""
+    at = max(cycle - 1, 0)
+    setpoints = (followed.position, followed.velocity, followed.acceleration)
+    axes = zip(*(one[:, at].tolist() for one in setpoints), strict=True)
+    swings = [None] * len(followed.axes) if moved is None else moved
+    return [
+        AxisState(place=x, velocity=v, acceleration=a, moved=np.asarray(own))
+        for (x, v, a), own in zip(axes, swings, strict=True)
+    ]
+
+
+def axes_alone(followed: Followed, order: TimedOrder, cycle: int) -> float:
+    """Tell the least time in s in which axes without loads carry a command out, from a cycle on."""
     slowest = 0.0
-    for k, ((begin, end, v), top, own) in enumerate(zip(moves, order.tops, followed.limits, strict=True)):
-        rise = (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
-        slows = BEFORE_SLOW * own.velocity * followed.period / SLOTS_PER_PERIOD
-        slow = followed.slow_parts(k, begin, end, max(slows, abs(v) * (rise + followed.period)))
-        time = abs(end - begin) / top + sum(way * max(0.0, 1.0 / limit - 1.0 / top) for way, limit in slow)
-        legs = len(slow) * (rise + FROM_REST * followed.period)
-        slowest = max(slowest, FAR * time / usable + rise + legs)
-    return slowest + periods * followed.period + (0.0 if before.any() else followed.reaction)
+    own = zip(limits_of(followed, order), states(followed, cycle), goals(followed, order), strict=True)
+    for axis, (limits, state, goal) in enumerate(own):
+        time = alone(limits, state, goal)
+        if goal.place is not None:
+            slow = slow_ways(followed, axis, state, goal.place)
+            time += sum(way * max(0.0, 1.0 / limit - 1.0 / limits.velocity) for way, limit in slow)
+        slowest = max(slowest, time)
+    return slowest
 
 
-def calmed(followed: Followed) -> float:
-    """Tell how many periods more it takes where live parameters change on the way."""
-    return CALMED if followed.reserve else 0.0
+def slow_ways(followed: Followed, axis: int, state: AxisState, place: float) -> list[tuple[float, float]]:
+    """Give lengths and limits of slow intervals that an axis may pass on its way to a place."""
+    limits = followed.limits[axis]
+    beyond = BEFORE_SLOW * SLOT * followed.period * limits.velocity
+    turns = abs(state.velocity) * bounded(followed, abs(state.velocity) / limits.acceleration)
+    return followed.slow_parts(axis, state.place, place, max(beyond, turns * (state.velocity != 0.0)))
+
+
+def bounded(followed: Followed, alone_time: float, motions: int = 1) -> float:
+    """Tell in s what so many motions, which axes alone make in some time, need take without any sway.
+
+    A closed form for all machines and states: nothing is as quick as the axis alone, and no motion need take
+    longer than a period of each mode more.
+    """
+    return alone_time + motions * followed.settles
+
+
+def in_time(followed: Followed, alone_time: float, motions: int = 1) -> float:
+    """Tell in s what so many motions may take any block, its reaction included."""
+    return followed.reaction + LATENESS * bounded(followed, alone_time, motions)
+
+
+def to_speeds(followed: Followed, before: Array, wanted: Sequence[float] | None = None) -> float:
+    """Tell the least time in s in which axes come from velocities, (axes,), to others, or to rest."""
+    return max(
+        abs(v - w) / own.acceleration + own.acceleration / own.jerk
+        for v, w, own in zip(map(float, before), wanted or [0.0] * len(before), followed.limits, strict=True)
+    )

@@ -22,9 +22,9 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.dynamics.problem.sampling import latin_hypercube
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
-from gen_profile.planner.design import target_range
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.stated import target_range
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
 
@@ -36,6 +36,7 @@ SHIFT, PAUSE = 8.0 * 3600.0, 30.0  # s; and periods between two commands of it
 MOST_COMMANDS = 16
 MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
 MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
+CORNERS_OF_ERRORS, SHAPES = 8, 5  # to which what is left is followed; machines on the way to each
 SLOWEST = 0.3  # override, and velocity limit as a share of the machine's
 OUTSIDE = 0.03  # share of the histories that begin before the travel, or behind it, by as much of it at most
 ROUGH_SHARE = 0.35  # share of the histories in which the load may be left swinging
@@ -43,6 +44,8 @@ ALONE = 0.1  # half the share of stick commands that leave one of several axes a
 LEGS = 8  # of one speed each, in which a live parameter changes on the way
 HOISTED_AFTER, RESTS = 0.4, 8.0  # share of the rhythms after which ropes change; and periods after the stop
 HOISTED_ON = 2.0  # periods after the last command in which it still may
+
+Machine = tuple[dict[str, float], list[float]]  # parameters, and places of the axes
 
 _PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
 _PER_HABIT = 2  # choices: which, and how
@@ -203,13 +206,27 @@ class Histories:
         period = 2.0 * np.pi / slowest
         return cls(spec=spec, axes=planned_axes(spec), uncertain=ranges, period=period, fastest=fastest)
 
-    def slowest(self, history: History) -> float:
-        """Find the longest period in s of the machine that a block is given in a history."""
+    def periods(self, history: History) -> Array:
+        """Find the longest period in s of each mode of the machine that a block is given in a history."""
         live, plant = dict(history.live), self.spec.machine()
         ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
         hoisted_to = [{name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes]
         machines = [_machine(self.spec, live | ends, {}) for ends in ({}, *hoisted_to)]
-        return 2.0 * np.pi / float(min(linearize(plant, *one).frequencies.min() for one in machines))
+        slowest = np.min([linearize(plant, *one).distinct_frequencies for one in machines], axis=0)
+        return np.asarray(2.0 * np.pi / slowest)
+
+    def machines_of_errors(self, live: Mapping[str, float]) -> list[list[Machine]]:
+        """Give machines from the one of some live parameters, evenly, to corners of the stated errors."""
+        none = [1.0 if name in live else self.spec.plant.parameters[name] for name in self.uncertain]
+        every = [*islice(product(*self.uncertain.values()), 2**MOST_CORNERS)]
+        corners = every[:: -(-len(every) // CORNERS_OF_ERRORS)]
+        return [
+            [
+                _machine(self.spec, live, dict(zip(self.uncertain, errors, strict=True)))
+                for errors in np.linspace(none, corner, SHAPES).tolist()
+            ]
+            for corner in corners
+        ]
 
     @property
     def hoisted_names(self) -> tuple[str, ...]:
@@ -471,9 +488,7 @@ def _bouncing(
     return tuple(corners)
 
 
-def _machine(
-    spec: Spec, live: Mapping[str, float], errors: Mapping[str, float]
-) -> tuple[dict[str, float], list[float]]:
+def _machine(spec: Spec, live: Mapping[str, float], errors: Mapping[str, float]) -> Machine:
     """Parameters of a machine and places of its axes: as the block is given, but for the errors."""
     plant, parameters = spec.machine(), dict(spec.plant.parameters)
     for known in plant.parameters:

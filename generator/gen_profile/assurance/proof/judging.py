@@ -1,14 +1,15 @@
 """Judging one history: which limits the block kept, and what sways on."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import attrs
 
 from gen_profile.assurance.proof.histories import History
 from gen_profile.assurance.proof.numbering import LONG, RHYTHMS, Numbering
+from gen_profile.assurance.proof.promptness import Obeyed
 from gen_profile.assurance.proof.verdict import TAKEN_BACK, JudgedHistory
-from gen_profile.planner.design import quick_limits
 from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.stated import quick_limits
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.st_to_c import FAULTS
 from gen_profile_fmu.running.block_run import NO_NUMBER, AxisExtremes, BlockRun
@@ -30,14 +31,14 @@ class WatchedRun:
         What the block did other than commanded, in words that end a sentence.
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
-    later : mapping of str to sequence of float
-        Slow periods more than limits take, in which commands of a kind are carried out.
+    obeyed : sequence of Obeyed
+        How soon its commands were carried out.
     """
 
     run: BlockRun
     faults: tuple[str, ...] = ()
     left: float = 0.0
-    later: Mapping[str, Sequence[float]] = attrs.field(factory=dict)
+    obeyed: Sequence[Obeyed] = ()
 
 
 def judge_run(
@@ -71,7 +72,7 @@ def judge_run(
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
         left=watched.left,
-        later=watched.later,
+        obeyed=tuple(watched.obeyed),
         faults=(*_faults(history, run, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
     )
 

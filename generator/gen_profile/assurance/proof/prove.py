@@ -5,11 +5,14 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack
 from functools import partial
 
+import attrs
 import numpy as np
 
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.judging import Judge
+from gen_profile.assurance.proof.lateness import chosen
 from gen_profile.assurance.proof.numbering import KEPT, LONG, RHYTHMS, Numbering
 from gen_profile.assurance.proof.verdict import HISTORIES, JudgedHistory, Proof
 from gen_profile.assurance.verification.cosimulation import ERROR_FLOOR
@@ -70,8 +73,7 @@ def prove(
         for numbers in numbering.rounds:
             climbs = numbering.group(numbers[0]) == RHYTHMS
             among = [one for one in judged if (one.group == RHYTHMS) == climbs]
-            worst = sorted(among, key=lambda one: _height(spec, one), reverse=True)[:KEPT]
-            numbering = numbering.after_round([one.number for one in worst])
+            numbering = numbering.after_round([one.number for one in _worst(spec, among)])
             judged += judge(numbering, numbers)
         return _verdict(spec, loop, numbering, judged, progress)
 
@@ -125,6 +127,30 @@ def _height(spec: Spec, judged: JudgedHistory) -> float:
     return max(_fraction(spec, judged), by_errors * (judged.group == RHYTHMS))
 
 
+def _worst(spec: Spec, among: Sequence[JudgedHistory]) -> list[JudgedHistory]:
+    """Choose those that a round climbs from: by sway, and the last one by what is possible sooner."""
+    by_sway = sorted(among, key=lambda one: _height(spec, one), reverse=True)
+    latest = sorted(among, key=_overdue, reverse=True)[:KEPT]
+    slowest = max((one.compared() for one in latest), key=_overdue, default=None)
+    kept = [one for one in by_sway if slowest is None or one.number != slowest.number][: KEPT - 1]
+    return [*kept, *([] if slowest is None else [slowest])]
+
+
+def _overdue(judged: JudgedHistory) -> float:
+    """Tell by how many of its slowest periods the latest command of a history is late."""
+    return max((one.overdue(LATENESS) / one.period for one in judged.obeyed), default=-np.inf)
+
+
+def _compared(judged: Sequence[JudgedHistory], seed: int) -> tuple[JudgedHistory, ...]:
+    """Ask the linear programme for the quickest of some commands of each kind."""
+    places = [(k, j) for k, one in enumerate(judged) for j in range(len(one.obeyed))]
+    found = {k: list(one.obeyed) for k, one in enumerate(judged)}
+    for place in chosen([judged[k].obeyed[j] for k, j in places], seed):
+        k, j = places[place]
+        found[k][j] = found[k][j].compared()
+    return tuple(attrs.evolve(one, obeyed=tuple(found[k])) for k, one in enumerate(judged))
+
+
 def _verdict(
     spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory], progress: Progress
 ) -> Proof:
@@ -142,7 +168,8 @@ def _verdict(
     chosen = np.random.default_rng(numbering.seed).permutation(len(short))
     some = [short[k] for k in chosen[: max(FEWEST_BY_FMPY, len(sound) // BY_FMPY)]]
     by_fmpy = {one.number: one for one in (*short[:1], *some)}
-    apart = [0.0]
+    progress("comparing some with the quickest motions")
+    judged, apart = _compared(judged, numbering.seed), [0.0]
     for done, one in enumerate(by_fmpy.values()):
         progress("co-simulating some by FMPy", done, len(by_fmpy))
         apart.append(loop.distance_from_fmpy(one.history, one.cycles))
@@ -156,4 +183,5 @@ def _verdict(
         by_fmpy=tuple(by_fmpy),
         apart=float(np.max(apart)),
         sway_limit=spec.limits.sway,
+        demanded=spec.planner.lateness,
     )

@@ -7,18 +7,17 @@ from math import inf
 import numpy as np
 
 from gen_profile.assurance.proof.followed import (
-    ENABLED,
     EXACT,
     IN_VELOCITY,
-    TO_SLOW,
-    TO_STOP,
+    SLOT,
     Allowance,
     Followed,
     Zone,
     greatest,
+    in_time,
     never,
     runs_of,
-    slowing,
+    to_speeds,
 )
 from gen_profile.assurance.proof.orders import (
     BLOCKED,
@@ -33,19 +32,18 @@ from gen_profile.assurance.proof.orders import (
 )
 from gen_profile.motion.profile import Array
 from gen_profile.planner.events import KEPT
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
-from gen_profile_exporters.planner.error_constants import SPREAD
 
 BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
-TAKES_OVER = 0.1  # periods beyond the stated reaction, at which a plan that was found then takes over (0.04)
-USED_UP = 0.66  # of the allowed sway: plans are refused from 0.68 on, as an epoch ends (left.st)
+USED_UP = 0.66  # of the allowed sway: from two thirds on a plan may have to wait for a swing that suits it
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
+TURNED = 4.0  # rad, by the stated error: later a block may add up the sizes of what it no longer follows
 OVERSTATED = 1.12  # fSwayLeft by what errors leave, at most
 BESIDE, MOST_BESIDE = 1e-4, 500.0  # of the allowed sway, likewise; and how often that may be after long
+NOTHING = 0.01  # of the allowed sway, which nobody sees: what errors leave may be so much more than is stated
 EXACTLY = 4.0  # periods in which no more is left by rounding
 LEFT = "left by errors"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
@@ -111,7 +109,7 @@ def numbers(run: Followed) -> Iterator[Allowance]:
         rests = order.begin + int(moving[-1]) + 1
         if rests + 1 >= order.end or not _is_end(run, order, rests):  # another may begin in that cycle
             continue
-        takes = run.reaction + TAKES_OVER * run.period
+        takes = run.reaction + 2.0 * SLOT * run.period  # a plan takes over with a slot
         planned = order.begin + run.after(takes)  # before, it tells of the former motion
         first = min(rests, max(planned, rests - run.after(0.5 * run.period)))
         error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * run.cycle)
@@ -146,7 +144,7 @@ def promises(run: Followed) -> Iterator[Allowance]:
     promise, why = run.issued["bPromise"] != 0.0, run.issued["nPromise"]
     yield from never("promise", promise != (why == 0.0))
     yield from never("lost", (why == 4.0) != ~run.guided)
-    ready, after = np.ones(run.cycles, dtype=bool), run.after(ENABLED + run.reaction)
+    ready, after = np.ones(run.cycles, dtype=bool), run.after(run.settles + run.reaction)
     for begin in run.enabled:
         ready[begin : begin + after] = False
     yield from never("lost", (why == 3.0) & ready)
@@ -284,7 +282,7 @@ def stops(run: Followed) -> Iterator[Allowance]:
             margin = max(limits.margin for limits in run.limits)
             yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
-        takes = run.reaction + slowing(run, run.velocity[:, begin], TO_STOP)
+        takes = in_time(run, to_speeds(run, run.velocity[:, begin]))
         rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
         for k, limits in enumerate(run.limits):
             leads = known[k] + limits.velocity * takes  # a stop that is not planned yet may end there
@@ -302,7 +300,7 @@ def _just_taken_over(run: Followed, cycle: int) -> bool:
 
 def _asked(run: Followed, order: TimedOrder, own: slice) -> Array:
     """Tell how far a stick that is let go of may lead on, by what it asked for last, (axes, cycles)."""
-    lasts = ACTS * run.period / SLOTS_PER_PERIOD
+    lasts = ACTS * SLOT * run.period
     since, until = (order.begin + sign * run.after(lasts) for sign in (-1, 1))
     asked = np.zeros((len(run.axes), own.stop - own.start))
     for last in run.orders:
@@ -354,7 +352,7 @@ def _fenced(run: Followed) -> Flags:
 def blocked(run: Followed) -> Iterator[Allowance]:
     """Judge that no axis goes into a blocked interval, nor says that a stop may lead there."""
     low, high = run.of("fStopLow"), run.of("fStopHigh")
-    for zone, stopped in _in_force(run, TO_STOP):
+    for zone, stopped in _in_force(run, slow=False):
         before = max(zone.begin - 1, 0)
         led = low[zone.axis, before] < zone.high and high[zone.axis, before] > zone.low
         begin = stopped if led else zone.begin
@@ -386,7 +384,7 @@ def blocked(run: Followed) -> Iterator[Allowance]:
 
 def slowed(run: Followed) -> Iterator[Allowance]:
     """Judge the velocity within slow intervals."""
-    for zone, begin in _in_force(run, TO_SLOW):
+    for zone, begin in _in_force(run, slow=True):
         own = slice(begin, zone.end)
         place = run.position[zone.axis, own]
         within = (place > zone.low) & (place < zone.high) & run.guided[own]
@@ -396,11 +394,11 @@ def slowed(run: Followed) -> Iterator[Allowance]:
             yield from greatest("fast", speed, zone.limit + slack, begin)
 
 
-def _in_force(run: Followed, periods: float) -> Iterator[tuple[Zone, int]]:
+def _in_force(run: Followed, *, slow: bool) -> Iterator[tuple[Zone, int]]:
     """Give zones of both kinds with the cycle from which they must be kept."""
     for zone in run.zones:
-        if bool(zone.limit) == (periods == TO_SLOW) and zone.begin < run.cycles:
-            takes = run.reaction + slowing(run, run.velocity[:, zone.begin], periods)
+        if bool(zone.limit) == slow and zone.begin < run.cycles:
+            takes = in_time(run, to_speeds(run, run.velocity[:, zone.begin]))
             begin = zone.begin + run.after(takes) * (zone.begin > 0)
             if begin < min(zone.end, run.cycles):
                 yield zone, begin
@@ -433,35 +431,33 @@ def remains(run: Followed) -> Iterator[Allowance]:
     """Judge what is left swinging where axes stand, by integrals of the accelerations that were issued."""
     yield from _remains_at_last(run)
     yield from _swings_on(run)
-    unknown = [order.begin for order in run.orders if order.kind in (QUICK_STOP, DISABLED)]
-    unknown += [*run.rest_reports, *np.flatnonzero(run.retold)[:1].tolist()]
-    until = min(unknown, default=run.cycles)
+    until = run.unknown_from
     rests = [(begin, min(end, until)) for begin, end in runs_of(run.stands) if 0 < begin < until]
     ends = [begin for begin, _ in rests]
     if run.modes is None or not ends:
         return
-    as_given, at_most = run.modes.left(run.acceleration, ends, run.cycle)
+    as_given, at_most, apart = run.modes.left(run.acceleration, ends, run.cycle)
     limit, stated = run.sway_limit, run.issued.get("fSwayLeft")
-    if not run.modes.damped:
+    if not run.modes.modes.damped:
         worst = int(np.argmax(as_given))
         yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
-    if stated is not None and not run.modes.damped:
+    if stated is not None and not run.modes.modes.damped:
         long = np.array(ends) * run.cycle / (EXACTLY * run.period)  # by frequencies that are rounded
         beside = BESIDE * limit * np.clip(long**2, 1.0, MOST_BESIDE)
-        first = np.array(ends) * run.cycle * run.modes.turns < SPREAD  # later sizes add up
-        above = (stated[ends] - OVERSTATED * at_most) * first - beside
+        first = np.array(ends) * run.cycle * run.modes.turns < TURNED  # later sizes add up
+        above = (stated[ends] - OVERSTATED * run.modes.skew * apart) * first - beside
         worst = int(np.argmax(above))
         yield Allowance("sway left", ends[worst], float(above[worst]), 0.0)
         promised = run.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
         below = at_most - [stated[begin:end].min() for begin, end in rests]  # as nothing decays
         worst = int(np.argmax(below))
-        yield Allowance("understated", ends[worst], float(below[worst]), BESIDE * limit)
+        yield Allowance("understated", ends[worst], float(below[worst]), NOTHING * limit)
 
 
 def _remains_at_last(run: Followed) -> Iterator[Allowance]:
     """Judge what motions leave that begin and end at rest after the last live parameters were given."""
-    if run.last_modes is None or run.last_modes.damped:
+    if run.last_modes is None or run.last_modes.modes.damped:
         return
     lost = [order.end for order in run.orders if order.kind in (QUICK_STOP, DISABLED)]
     known = max(run.last_known, *lost, 0)
@@ -476,16 +472,16 @@ def _remains_at_last(run: Followed) -> Iterator[Allowance]:
 def _swings_on(run: Followed) -> Iterator[Allowance]:
     """Judge that what is left keeps its action where live parameters change at rest: it goes with 1/√ω."""
     stated = run.issued.get("fSwayLeft")
-    if stated is None or run.modes is None or run.last_modes is None or run.modes.damped:
+    if stated is None or run.modes is None or run.last_modes is None or run.modes.modes.damped:
         return
-    after = run.last_known + run.after(ENABLED + run.reaction)
+    after = run.last_known + run.after(run.settles + run.reaction)
     starts = {begin for begin, known in run.live_changes if known == run.last_known}
     if not starts or after >= run.cycles or len({*run.live_changes}) > 1:
         return
     own = slice(min(starts) - 1, after + 1)
     if not (run.stands & run.guided)[own].all() or any(own.start < at <= after for at in run.rest_reports):
         return
-    roots = np.sqrt(run.modes.poles[:, 0].imag / run.last_modes.poles[:, 0].imag)
+    roots = np.sqrt(run.modes.modes.poles[0].imag / run.last_modes.modes.poles[0].imag)
     before, now = stated[own.start], stated[after]
     wrong = max(now - roots.max() * before, roots.min() * before - now)
     yield Allowance("sway left", after, float(wrong), RESCALED * float(before))

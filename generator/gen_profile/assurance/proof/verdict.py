@@ -1,17 +1,18 @@
 """What the proof of a planner block found: values only, no work."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
-from gen_profile.assurance.proof.followed import ON_AVERAGE, WAY
+from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.histories import History
+from gen_profile.assurance.proof.lateness import Lateness
 from gen_profile.assurance.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
 from gen_profile.assurance.proof.obedience import LATE, WORDS
-from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
+from gen_profile.assurance.proof.promptness import Obeyed
 from gen_profile.assurance.verification.verdict import Examination
 from gen_profile.support.summary import Summarised
 
@@ -25,14 +26,7 @@ GROUPS = {
 HISTORIES = 200  # that a proof takes; fewer are a trial
 QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
-FEWEST, SURE = 20, 2.0  # commands of a kind; and standard deviations of their mean
 LISTED = 10  # of the worst histories
-NAMED = {
-    POSITION: "Targets from rest are reached",
-    WAY: "Targets on the way are reached",
-    VELOCITY: "A stick's velocities are reached",
-    STOP: "Stops end",
-}
 TAKEN_BACK = "the block takes its promise back"
 
 
@@ -60,8 +54,8 @@ class JudgedHistory:
         What else is wrong, in words that end a sentence.
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
-    later : mapping of str to sequence of float
-        Slow periods more than limits take, in which commands of a kind are carried out.
+    obeyed : tuple of Obeyed
+        How soon its commands were carried out.
     """
 
     number: int
@@ -75,13 +69,20 @@ class JudgedHistory:
     limits: Mapping[str, float]
     faults: tuple[str, ...]
     left: float = 0.0
-    later: Mapping[str, Sequence[float]] = attrs.field(factory=dict)
+    obeyed: tuple[Obeyed, ...] = ()
 
     def fraction(self, limit: Mapping[str, float], error_bound: float) -> float:
         """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""
         if not self.promise:
             return 0.0
         return max((self.residual[load] + error_bound) / most for load, most in limit.items())
+
+    def compared(self) -> "JudgedHistory":
+        """Ask the linear programme how soon the latest of its commands could have been obeyed."""
+        latest = max(self.obeyed, key=lambda one: one.overdue(LATENESS), default=None)
+        return attrs.evolve(
+            self, obeyed=tuple(one.compared() if one is latest else one for one in self.obeyed)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -128,6 +129,8 @@ class Proof(Summarised, Examination):
         m, by which it found another sway at most.
     sway_limit : float or None
         Allowed sway of the end load at any time in m, which no planner block keeps.
+    demanded : float or None
+        Times what is possible that a command may take, as the spec states.
     faults : tuple of str
         What else is wrong with the file, a sentence each.
     """
@@ -141,12 +144,14 @@ class Proof(Summarised, Examination):
     by_fmpy: tuple[int, ...]
     apart: float
     sway_limit: float | None = None
+    demanded: float | None = None
     faults: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
         return {
             self.kind: "passed" if self.passed else "failed",
+            "prompt": self.lateness.words(),
             "histories": self.carried_by,
             "worst": f"history {self.worst.number}, {100.0 * self.fraction(self.worst):.3g} % of the limit",
         }
@@ -176,8 +181,20 @@ class Proof(Summarised, Examination):
         """The history that takes up the greatest share of the limit."""
         return max(self.judged, key=self.fraction)
 
+    @property
+    def lateness(self) -> Lateness:
+        """How prompt the block is."""
+        return Lateness(
+            demanded=self.demanded,
+            commands=[(one.number, command) for one in self.judged for command in one.obeyed],
+        )
+
     def reasons(self) -> tuple[str, ...]:
         """Say why the proof failed, a sentence each; none when it passed."""
+        return (*self.unsafe(), *self.lateness.reasons())
+
+    def unsafe(self) -> tuple[str, ...]:
+        """Say why the block is not safe, a sentence each."""
         sentences = []
         if self.fraction(self.worst) > 1.0:
             load = max(self.limit, key=lambda name: self.worst.residual[name] / self.limit[name])
@@ -195,7 +212,6 @@ class Proof(Summarised, Examination):
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             cure = CURES.get(kind, "")
             sentences.append(f"In history {those[0].number} of {self.count} {first}{others}{cure}.")
-        sentences += late_on_average(self.judged)
         if not sentences and len(self.judged) == self.count and not self.promised:
             sentences.append(
                 f"None of the {self.count} histories ends with a promise, so no sway was judged: try more "
@@ -226,6 +242,8 @@ class Proof(Summarised, Examination):
         return {
             "passed": self.passed,
             "trial": self.kind == "trial",
+            "safe": not self.unsafe(),
+            "prompt": self.lateness.to_dict(),
             "limits_m": dict(self.limit),
             "error_bound_m": self.error_bound,
             "histories": self.count,
@@ -264,22 +282,6 @@ class Proof(Summarised, Examination):
             "worst_share": max(shares),
             "quantiles": {f"{part:g}": float(q) for part, q in zip(QUANTILES, quantiles, strict=True)},
         }
-
-
-def lateness(judged: Sequence[JudgedHistory]) -> dict[str, list[float]]:
-    """Collect by how many slow periods later than their limits allow commands are carried out, by kind."""
-    drawn = [one.later for one in judged if one.group in (CORNERS, DRAWS)]
-    return {kind: [value for later in drawn for value in later.get(kind, ())] for kind in ON_AVERAGE}
-
-
-def late_on_average(judged: Sequence[JudgedHistory]) -> Iterator[str]:
-    """Say which of these are carried out later on average than allowed, beyond doubt."""
-    for kind, late in lateness(judged).items():
-        if len(late) < FEWEST:
-            continue
-        least = np.mean(late) - ON_AVERAGE[kind] - SURE * np.std(late) / len(late) ** 0.5
-        if least > 0.0:
-            yield f"{NAMED[kind]} later than allowed on average, by {least:.2g} slow periods or more."
 
 
 def kind_of(fault: str) -> str:

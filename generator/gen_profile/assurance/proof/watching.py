@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.assurance.proof.followed import (
+    CALMING,
     LEAST_REACTION,
     REACTION,
     Followed,
@@ -23,7 +24,7 @@ from gen_profile.assurance.proof.followed import (
 )
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.judging import WatchedRun
-from gen_profile.assurance.proof.obedience import LATER, faults, measured
+from gen_profile.assurance.proof.obedience import faults, measured
 from gen_profile.assurance.proof.orders import (
     DISABLED,
     QUICK_STOP,
@@ -35,12 +36,12 @@ from gen_profile.assurance.proof.orders import (
     TimedOrder,
     read_orders,
 )
+from gen_profile.assurance.proof.promptness import obeyed
 from gen_profile.assurance.proof.statements import ADDED_UP, LEFT
 from gen_profile.motion.profile import Array
-from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.stated import STEADY, quick_limits, target_range
 from gen_profile.spec.model import Spec
-from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 
 LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block does not know
@@ -156,9 +157,8 @@ class BlockWatch:
         followed, reactions = self.followed(given, script, expected, block, run)
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
-        later = {kind: [one.needed for one in met if one.what == what] for kind, what in LATER.items()}
         wrong = (*faults(met, followed.cycle), *self._understated(run, followed))
-        return WatchedRun(run=run, faults=wrong, left=left, later=later)
+        return WatchedRun(run=run, faults=wrong, left=left, obeyed=obeyed(followed))
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""
@@ -181,7 +181,7 @@ class BlockWatch:
     ) -> tuple[Followed, dict[int, int | None]]:
         """Give what is to be judged."""
         assert run.trace is not None
-        reserve = RESERVE if self.spec.planner.live_rate else 0.0
+        reserve = CALMING if self.spec.planner.live_rate else 0.0
         issued = dict(zip(self.outputs, run.trace.T, strict=False))
         start_cycles, rows = self._changes(script)
         now = np.searchsorted(script.start_cycles, np.arange(run.cycles), side="right") - 1
@@ -202,6 +202,7 @@ class BlockWatch:
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
             settle=self.spec.planner.disturbance.settle if self.spec.planner.disturbance else 0.0,
             sway_limit=min(self.spec.check.residual_sway.values()),
+            share=self.spec.planner.sway_share * min(self.spec.check.residual_sway.values()),
             rest_reports=self._rest_reports(script, run.cycles),
             zones=list(self._zones(start_cycles, rows, run.cycles)),
             drifts=self._drifts(script, now, 1.0, self.known.held // 2),

@@ -7,8 +7,9 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.proof.closed_loop import Trace, trace
-from gen_profile.assurance.proof.followed import runs_of
+from gen_profile.assurance.proof.followed import PLANNING, runs_of
 from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.promptness import KINDS
 from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
 from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array
@@ -52,6 +53,8 @@ def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = n
         figures += damping_figures(spec, proof, trace(spec, text, histories, one.history, progress))
     if len(proof.judged) > 1:
         figures.append(map_figure(spec, proof))
+    if proof.lateness.latest is not None:
+        figures.append(lateness_figure(proof))
     save(figures, path, spec.name, f"{spec.name}: history {proof.worst.number} of {proof.count}")
 
 
@@ -174,6 +177,23 @@ def _remains_figure(spec: Spec, proof: Proof) -> Figure:
     )
     caption = "Every history with a sound sensor and gusts; white: none there."
     return Figure(caption, [panel], columns=1)
+
+
+def lateness_figure(proof: Proof) -> Figure:
+    """Draw how long commands take over what is possible, with what counts as late."""
+    found = proof.lateness
+    lines = []
+    for (kind, words), colour in zip(KINDS.items(), PALETTE, strict=False):
+        own = [one for _, one in found.commands if one.kind == kind and one.possible is not None]
+        possible, takes = np.array([[one.quickest, one.takes] for one in own]).reshape(-1, 2).T
+        lines.append(Line(words, possible, takes, Style(colour=colour, dash="points")))
+    longest = max(one.quickest for _, one in found.commands)
+    ends = np.array([0.0, longest])
+    lines.append(Line("as quick as possible", ends, ends, SETPOINT))
+    lines.append(Line("late above", ends, found.factor * ends + PLANNING, COMMAND))
+    title = "Commands beside the quickest motions"
+    panel = Panel(title, "takes (s)", [one for one in lines if len(one.x)], x_label="possible (s)")
+    return Figure("By linear programmes, of some commands of each kind.", [panel], columns=1)
 
 
 def map_figure(spec: Spec, proof: Proof) -> Figure:

@@ -13,7 +13,13 @@ from gen_profile.assurance.proof.closed_loop import Trace, trace
 from gen_profile.assurance.proof.histories import Histories, History
 from gen_profile.assurance.proof.verdict import LISTED, JudgedHistory, Proof
 from gen_profile.dynamics.evaluation.phrases import MANIFEST_WORDS, UNPROMISED, companions, mm, number
-from gen_profile.presentation.charts.proof import damping_figures, history_figure, map_figure, worst_damped
+from gen_profile.presentation.charts.proof import (
+    damping_figures,
+    history_figure,
+    lateness_figure,
+    map_figure,
+    worst_damped,
+)
 from gen_profile.presentation.report.content import (
     Listing,
     Page,
@@ -166,6 +172,12 @@ def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -
         yield Section(title="Damping by the sensor", words=[words], blocks=figures)
     if len(proof.judged) > 1:
         yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(spec, proof)])
+    if proof.lateness.latest is not None:
+        yield Section(
+            title="How soon commands are obeyed",
+            words=[f"{proof.lateness.words()}."],
+            blocks=[lateness_figure(proof), _lateness(proof)],
+        )
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
     yield Section(title="How it was proved", blocks=[_groups(proof), Terms(rows=[*_proved(proof)])])
     files = [
@@ -238,6 +250,28 @@ def _limits(spec: Spec, proof: Proof) -> Table:
         cells = (f"residual sway of the {load}, error included", mm(worst), mm(limit), Share(worst / limit))
         rows.append(TableRow(cells=cells, mark="passed" if worst <= limit else "failed"))
     return Table(head=("", "takes", "allowed", "share"), rows=rows)
+
+
+def _lateness(proof: Proof) -> Table:
+    """List the kinds of commands, and of each the latest beside what is possible."""
+    rows = []
+    for one in proof.lateness.table():
+        worst, by_quickest = one["worst"], one["by_quickest"]
+        possible = worst["quickest_s"] or worst["closed_form_s"]
+        ratios = (
+            f"{by_quickest['0.5']:.2f}, {by_quickest['1']:.2f} at most" if by_quickest else "not compared"
+        )
+        cells = (
+            one["command"],
+            f"{one['commands']}",
+            f"{one['late']}",
+            ratios,
+            f"{worst['takes_s']:.3g} s for {possible:.3g} s, {worst['state']}",
+            f"{worst['history']} at {worst['time_s']:.2f} s",
+        )
+        rows.append(TableRow(cells=cells, mark="failed" if proof.demanded and one["late"] else ""))
+    head = ("commands", "timed", "late", "time by the quickest, median", "the latest", "history")
+    return Table(head=head, rows=rows, words=1)
 
 
 def _groups(proof: Proof) -> Table:

@@ -19,10 +19,10 @@ from gen_profile.delivery.deployment.block_state import (
 from gen_profile.delivery.deployment.table import BlockTable
 from gen_profile.delivery.deployment.watching.judge import QUANTITIES, Judge
 from gen_profile.motion.profile import Array
-from gen_profile.planner.design import quick_limits
 from gen_profile.planner.events import WORDS
 from gen_profile.planner.interface import LOST
 from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.stated import quick_limits
 from gen_profile.support.errors import CheckFailed
 
 LONGEST_GAP = 1.0  # s between two looks, beyond which the axis may have braked and gone on in between

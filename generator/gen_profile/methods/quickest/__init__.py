@@ -1,0 +1,1 @@
+"""The quickest motions that a machine and a promise allow, whatever controller makes them."""
