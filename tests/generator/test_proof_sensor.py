@@ -129,7 +129,7 @@ def test_what_is_damped_too_late_and_false_alarms_are_faults(spec):
 @pytest.mark.parametrize("settle", [0.0, 12.0])
 def test_damping_on_the_way_may_put_off_an_arrival_for_so_long_and_no_longer(settle):
     orders = REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS  # to where it never comes
-    way = attrs.evolve(with_orders(*orders), period=0.5, settle=settle)
+    way = attrs.evolve(with_orders(*orders), periods=(0.1,), reaction=0.1, settle=settle)
     assert kind_of(WORDS[POSITION]) in kinds(way)
     way.issued["bDamping"] = np.ones(CYCLES)
     assert (kind_of(WORDS[POSITION]) in kinds(way)) == (settle == 0.0)

@@ -33,7 +33,7 @@ def proof():
         faults=(),
     )
     limit = dict.fromkeys(SWAY, 0.05)
-    few = {"seed": 0, "count": 1, "parents": (), "by_fmpy": (), "apart": 0.0}
+    few = {"seed": 0, "count": 200, "parents": (), "by_fmpy": (), "apart": 0.0}
     return Proof(limit=limit, error_bound=1e-6, judged=(one,), **few)
 
 

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import attrs
 import numpy as np
 import pytest
 from generator.test_proof_obedience import (
@@ -16,7 +17,7 @@ from generator.test_proof_obedience import (
     with_orders,
 )
 
-from gen_profile.assurance.proof.numbering import SEARCH
+from gen_profile.assurance.proof.numbering import DRAWS, SEARCH
 from gen_profile.assurance.proof.obedience import WORDS
 from gen_profile.assurance.proof.orders import STOP, VELOCITY
 from gen_profile.assurance.proof.verdict import Proof, kind_of
@@ -27,7 +28,13 @@ ONE_LOAD = {"payload": 0.05}
 def test_of_what_comes_late_the_key_that_helps_is_named():
     faults = (f"{kind_of(WORDS[STOP])} by 0.02 s, at 8.6 s", "a target is left again by 0.1 m, at 9 s")
     one = SimpleNamespace(
-        number=3, group=SEARCH, faults=faults, fraction=lambda *_: 0.0, residual={"payload": 0.0}, obeyed=()
+        number=3,
+        group=SEARCH,
+        faults=faults,
+        fraction=lambda *_: 0.0,
+        residual={"payload": 0.0},
+        obeyed=(),
+        exercised={},
     )
     few = {
         "limit": {"payload": 0.05},
@@ -70,7 +77,7 @@ def test_nothing_is_promised_while_what_was_measured_is_damped():
 
 def proof_of(count, promised):
     """A proof of so many histories without a fault, of which some end with a promise."""
-    one = SimpleNamespace(number=0, group=DRAWS, faults=(), later={}, residual=ONE_LOAD)
+    one = SimpleNamespace(number=0, group=DRAWS, faults=(), obeyed=(), exercised={}, residual=ONE_LOAD)
     judged = [
         SimpleNamespace(**vars(one), promise=k < promised, fraction=lambda *_: 0.5) for k in range(count)
     ]
@@ -89,6 +96,7 @@ def proof_of(count, promised):
 def test_few_histories_are_a_trial_and_all_verdicts_tell_how_many():
     assert proof_of(199, 150).summary() == {
         "trial": "passed",
+        "prompt": "no command held long enough to be timed",
         "histories": "199 histories of the 200 that make a proof, 150 of them promised",
         "worst": "history 0, 50 % of the limit",
     }

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import attrs
 
+from gen_profile.assurance.proof.exercised import Pairs
 from gen_profile.assurance.proof.histories import History
 from gen_profile.assurance.proof.numbering import LONG, RHYTHMS, Numbering
 from gen_profile.assurance.proof.promptness import Obeyed
@@ -33,12 +34,15 @@ class WatchedRun:
         m, that stated errors leave at most on the linear machine, as long as the block promises.
     obeyed : sequence of Obeyed
         How soon its commands were carried out.
+    exercised : mapping
+        How often inputs changed, and outputs came, in which state.
     """
 
     run: BlockRun
     faults: tuple[str, ...] = ()
     left: float = 0.0
     obeyed: Sequence[Obeyed] = ()
+    exercised: Pairs = attrs.field(factory=dict)
 
 
 def judge_run(
@@ -73,6 +77,7 @@ def judge_run(
         limits=limits,
         left=watched.left,
         obeyed=tuple(watched.obeyed),
+        exercised=watched.exercised,
         faults=(*_faults(history, run, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
     )
 

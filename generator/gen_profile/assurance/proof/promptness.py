@@ -165,9 +165,9 @@ def lost(run: Followed) -> Iterator[Allowance]:
         since, first = _fulfilled(run, order)
         if since < 0:
             continue
-        motions = 1 + int(_moves(run, since))
-        allowed = NEVER * in_time(run, axes_alone(run, order, since), motions)
-        if order.kind == POSITION:
+        since = order.begin if order.kind == POSITION else since
+        allowed = NEVER * in_time(run, axes_alone(run, order, since), 1 + int(_moves(run, since)))
+        if order.kind == POSITION and run.sensed("bDamping")[order.begin : order.end].any():
             allowed += run.settle
         lasts = (order.end if first is None else first) - since
         yield Allowance(order.kind, order.begin, lasts * run.cycle, allowed)

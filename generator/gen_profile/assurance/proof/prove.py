@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
+from gen_profile.assurance.proof.exercised import required
 from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.judging import Judge
@@ -151,6 +152,11 @@ def _compared(judged: Sequence[JudgedHistory], seed: int) -> tuple[JudgedHistory
     return tuple(attrs.evolve(one, obeyed=tuple(found[k])) for k, one in enumerate(judged))
 
 
+def _required(spec: Spec) -> list[tuple[str, str]]:
+    """List what a proof of a spec's block must have tried; hoisting changes ropes in every cycle."""
+    return required([name for name in spec.planner.live if name not in spec.planner.live_rate])
+
+
 def _verdict(
     spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory], progress: Progress
 ) -> Proof:
@@ -184,4 +190,5 @@ def _verdict(
         apart=float(np.max(apart)),
         sway_limit=spec.limits.sway,
         demanded=spec.planner.lateness,
+        required=_required(spec) if len(judged) == numbering.count >= HISTORIES else (),
     )

@@ -1,12 +1,14 @@
 """What the proof of a planner block found: values only, no work."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
+from gen_profile.assurance.proof.exercised import Pairs, never, table
 from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.histories import History
 from gen_profile.assurance.proof.lateness import Lateness
@@ -25,6 +27,7 @@ GROUPS = {
 }
 HISTORIES = 200  # that a proof takes; fewer are a trial
 QUANTILES = (0.5, 0.9, 0.99)
+RULE_OF_THREE = 3.0
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 LISTED = 10  # of the worst histories
 TAKEN_BACK = "the block takes its promise back"
@@ -56,6 +59,8 @@ class JudgedHistory:
         m, that stated errors leave at most on the linear machine, as long as the block promises.
     obeyed : tuple of Obeyed
         How soon its commands were carried out.
+    exercised : mapping
+        How often inputs changed, and outputs came, in which state.
     """
 
     number: int
@@ -70,6 +75,7 @@ class JudgedHistory:
     faults: tuple[str, ...]
     left: float = 0.0
     obeyed: tuple[Obeyed, ...] = ()
+    exercised: Pairs = attrs.field(factory=dict)
 
     def fraction(self, limit: Mapping[str, float], error_bound: float) -> float:
         """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""
@@ -131,6 +137,8 @@ class Proof(Summarised, Examination):
         Allowed sway of the end load at any time in m, which no planner block keeps.
     demanded : float or None
         Times what is possible that a command may take, as the spec states.
+    required : sequence of (str, str)
+        Inputs or outputs, and states, that must have been tried together.
     faults : tuple of str
         What else is wrong with the file, a sentence each.
     """
@@ -145,6 +153,7 @@ class Proof(Summarised, Examination):
     apart: float
     sway_limit: float | None = None
     demanded: float | None = None
+    required: Sequence[tuple[str, str]] = ()
     faults: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
@@ -193,6 +202,30 @@ class Proof(Summarised, Examination):
         """Say why the proof failed, a sentence each; none when it passed."""
         return (*self.unsafe(), *self.lateness.reasons())
 
+    @property
+    def exercised(self) -> Counter[tuple[str, str]]:
+        """How often inputs changed, and outputs came, in which state, in all histories."""
+        return sum((Counter(one.exercised) for one in self.judged), Counter())
+
+    @property
+    def bound(self) -> tuple[int, float]:
+        """Count the histories that were drawn by chance, and bound the share of such that would fail.
+
+        Where none of n fails, less than 3/n would, at 95 % (the rule of three).
+        """
+        drawn = len(self._of(DRAWS))
+        return drawn, min(1.0, RULE_OF_THREE / max(drawn, 1))
+
+    def sureness(self) -> str:
+        """Say what the histories that were drawn by chance bound."""
+        drawn, share = self.bound
+        failed = sum(bool(one.faults) for one in self._of(DRAWS))
+        if failed or not drawn:
+            return f"{failed} of {drawn} drawn by chance fail, with the seed {self.seed}"
+        return (
+            f"none of {drawn} drawn by chance fails: fewer than {100.0 * share:.2g} % of such would (at 95 %)"
+        )
+
     def unsafe(self) -> tuple[str, ...]:
         """Say why the block is not safe, a sentence each."""
         sentences = []
@@ -216,6 +249,11 @@ class Proof(Summarised, Examination):
             sentences.append(
                 f"None of the {self.count} histories ends with a promise, so no sway was judged: try more "
                 f"(--histories; {HISTORIES} make a proof)."
+            )
+        if missing := never(self.exercised, self.required):
+            sentences.append(
+                f"No history tried {', '.join(missing)}: prove it on more (--histories), or draw others "
+                "(check.seed)."
             )
         if not self.apart <= AGREEMENT:
             sentences.append(
@@ -261,6 +299,8 @@ class Proof(Summarised, Examination):
             "groups": [self._group(name) for name in GROUPS if self._of(name)],
             "limits": {name: max(one.limits[name] for one in self.judged) for name in self.judged[0].limits},
             "longest_rest_s": max((one.rests_after or 0.0 for one in self.judged), default=0.0),
+            "bound": dict(zip(("drawn", "fewer_than"), self.bound, strict=True)),
+            "exercised": table(self.exercised),
             "fmpy": {"histories": list(self.by_fmpy), "apart_m": self.apart},
             "reasons": list(self.reasons()),
         }

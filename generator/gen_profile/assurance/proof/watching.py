@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.assurance.proof.exercised import exercised
 from gen_profile.assurance.proof.followed import (
     CALMING,
     LEAST_REACTION,
@@ -158,7 +159,8 @@ class BlockWatch:
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
         wrong = (*faults(met, followed.cycle), *self._understated(run, followed))
-        return WatchedRun(run=run, faults=wrong, left=left, obeyed=obeyed(followed))
+        tried = exercised(followed, *self._changes(script), self.inputs)
+        return WatchedRun(run=run, faults=wrong, left=left, obeyed=obeyed(followed), exercised=tried)
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""
