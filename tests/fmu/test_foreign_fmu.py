@@ -5,11 +5,10 @@ import json
 import stat
 import zipfile
 from contextlib import suppress
-from functools import cache
 
-import attrs
 import numpy as np
 import pytest
+from fmu.foreign import CRANE, run_of, spec_with, with_description, write_fmu
 from fmu.kinds import machine_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,56 +19,17 @@ from gen_profile.assurance.verification.check import check_artefact
 from gen_profile.assurance.verification.external_fmu import _axis_inputs
 from gen_profile.delivery.designs.design import design
 from gen_profile.delivery.streaming.stream import verified
-from gen_profile.plants.registry import find_plant
 from gen_profile.spec.reading import preset_spec, spec_from_dict
 from gen_profile.support.artefacts.manifest import FILENAME
 from gen_profile.support.errors import CosimulationError, SpecError
-from gen_profile_fmu.building.build import build_fmu
-from gen_profile_fmu.building.platforms import host_platform
 from gen_profile_fmu.description.fmu_files import Version, sources
 from gen_profile_fmu.model.contents import plant_model
 from gen_profile_fmu.model.plant_variables import InputKind
 from gen_profile_fmu.running import external_child as foreign_child
 from gen_profile_fmu.running import safe_archive
-from gen_profile_fmu.running.external_fmu import ForeignRun, run_foreign, write_job
+from gen_profile_fmu.running.external_fmu import run_foreign, write_job
 
 pytestmark = pytest.mark.slow
-
-CRANE = find_plant("double-pendulum-crane")
-NAMES = {
-    "acceleration": "cart.setpoint_acceleration",
-    "velocity": "cart.setpoint_velocity",
-    "setpoint": "cart.setpoint",
-}
-
-
-def write_fmu(path, *variant, **replacements):
-    """A customer's FMU; `replacements` change the text of plant_model.c."""
-    path.write_bytes(built_fmu(*variant, **replacements))
-    return path
-
-
-@cache
-def built_fmu(kind="acceleration", version=Version.FMI2, **replacements):
-    model = plant_model(machine_of(CRANE), InputKind(kind), "customer")
-    code = dict(model.code)
-    for old, new in replacements.items():
-        text = code["plant_model.c"]
-        assert old in text
-        code["plant_model.c"] = "#include <stdlib.h>\n" + text.replace(old, new)
-    return build_fmu(attrs.evolve(model, code=code), version, (host_platform(),))
-
-
-def spec_with(folder, kind="acceleration", **check):
-    document = preset_spec("paper", ("export.cycle_time=0.01",)).to_dict()
-    document["check"] |= {
-        "fmu": "customer.fmu",
-        "input": {kind: NAMES[kind]},
-        "output": {"sway": {"hook": "sway.hook", "payload": "sway.payload"}},
-        "parameters": {"L1": "L1"},
-        **check,
-    }
-    return spec_from_dict(document, folder)
 
 
 @pytest.mark.parametrize(("kind", "version"), [("acceleration", Version.FMI2), ("setpoint", Version.FMI3)])
@@ -140,6 +100,9 @@ def test_a_plant_that_takes_velocities(tmp_path):
         ({"parameters": {"L3": "a", "L1": "b"}}, "check.parameters.L3: unknown parameter"),
         ({"parameters": 1}, "check.parameters: must be a table"),
         ({"parameters": {}}, "check.parameters.L1: required, as it is uncertain"),
+        ({"units": {"rope": "mm"}}, r"check.units.rope: unknown variable"),
+        ({"units": {"L1": "mm/s"}}, r"check.units.L1: unknown value, found text 'mm/s'"),
+        ({"units": {"L1": 3}}, r"check.units.L1: unknown value"),
         ({"time_limit": -1}, "check.time_limit: must be a positive time"),
         ({"fnu": 1}, r"check.fnu: unknown key"),
     ],
@@ -154,19 +117,6 @@ def test_one_output_is_the_end_loads(tmp_path):
     (tmp_path / "customer.fmu").write_bytes(b"")
     foreign = spec_with(tmp_path, output={"sway": "load.dx"}).check.foreign
     assert dict(foreign.sway) == {"payload": "load.dx"}
-
-
-def run_of(path, **changes):
-    given = {
-        "archive": path,
-        "times": np.linspace(0.0, 0.1, 11),
-        "inputs": np.full((10, 1), 0.1),
-        "input_names": ["cart.setpoint_acceleration"],
-        "output_names": ["sway.payload"],
-        "machines": [{"L1": 0.5}],
-        "time_limit": 60.0,
-    }
-    return ForeignRun(**{**given, **changes})
 
 
 ADVANCE = "    double reference[N_A][N_ORDERS];\n    reference_velocity(model, step, reference);"
@@ -225,16 +175,6 @@ def test_a_binary_for_this_computer_is_required(tmp_path, version, folders, has)
     message = done_here(run_of(path), tmp_path / "work")
     assert message.startswith("customer.fmu: the FMU has no binary for this computer")
     assert f"(it has {has})" in message
-
-
-def with_description(path, change):
-    """Rewrite an FMU's model description."""
-    packed = io.BytesIO()
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(packed, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            new.writestr(name, change(content) if name == "modelDescription.xml" else content)
-    path.write_bytes(packed.getvalue())
 
 
 @pytest.mark.parametrize(
@@ -359,10 +299,14 @@ def test_damaged_descriptions_are_read_or_refused(tmp_path_factory, changes):
         "machines": [{"L1": 0.5}],
         "input_names": ["cart.setpoint_acceleration"],
         "output_names": ["sway.hook"],
+        "si_units": {"cart.setpoint_acceleration": "m/s^2", "sway.hook": "m", "L1": "m"},
+        "stated_units": {},
+        "parameters": {"L1": (0.5, "m", "L1"), "m2": (0.5, "kg", None)},
     }
     with suppress(CosimulationError):
         description = foreign_child._description("a.fmu", folder)
-        foreign_child._references("a.fmu", description, job)
+        reals = foreign_child._reals("a.fmu", description, job)
+        foreign_child._conversions("a.fmu", description, job, reals)
 
 
 TEXTS = st.text(max_size=5)
@@ -406,7 +350,9 @@ def done_here(run, folder):
 def test_the_childs_work_in_this_process(tmp_path, version):
     path = write_fmu(tmp_path / "customer.fmu", version=version)
     assert done_here(run_of(path), tmp_path / "work") is None
-    np.testing.assert_array_equal(np.load(tmp_path / "work" / "result.npy"), run_foreign(run_of(path)))
+    np.testing.assert_array_equal(
+        np.load(tmp_path / "work" / "result.npy"), run_foreign(run_of(path)).outputs
+    )
     unknown, negative = run_of(path, output_names=["sway.boom"]), run_of(path, machines=[{"L1": -1.0}])
     assert "no real scalar variable 'sway.boom'" in done_here(unknown, tmp_path / "unknown")
     assert f"refused fmi{version.value}Set" in done_here(negative, tmp_path / "negative")

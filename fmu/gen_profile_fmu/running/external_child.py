@@ -1,6 +1,7 @@
 """The child process that runs an external FMU: ``python -m`` this module, then a folder.
 
-Reads job.json and motion.npz from the folder, writes result.npy, or refusal.txt with a sentence.
+Reads job.json and motion.npz from the folder, writes result.npy and remarks.json, or
+refusal.txt with a sentence.
 """
 
 import json
@@ -17,6 +18,7 @@ from fmpy.fmi2 import fmi2OK
 
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import CosimulationError
+from gen_profile_fmu.running.foreign_units import Conversion, ForeignUnits
 from gen_profile_fmu.running.safe_archive import unpack
 
 LONGEST_MESSAGE = 300  # characters, of what an external FMU says
@@ -27,32 +29,39 @@ def main(folder: Path) -> None:
     job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
     motion = np.load(folder / "motion.npz", allow_pickle=False)
     try:
-        result = _simulate(job, motion["times"], motion["inputs"], folder / "fmu")
+        result, remarks = _simulate(job, motion["times"], motion["inputs"], folder / "fmu")
     except CosimulationError as error:
         (folder / "refusal.txt").write_text(str(error), encoding="utf-8")
     else:
+        (folder / "remarks.json").write_text(json.dumps(remarks), encoding="utf-8")
         # under another name first: what ends in the middle of writing must not look done
         with (folder / "result.part").open("wb") as file:
             np.save(file, result)
         (folder / "result.part").replace(folder / "result.npy")
 
 
-def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Path) -> Array:
+def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Path) -> tuple[Array, list[str]]:
     archive = Path(job["archive"])
     unpacked.mkdir()
     unpack(archive, unpacked)
     description = _description(archive.name, unpacked)
     second = description.fmiVersion.startswith("2")
     _require_binary(archive.name, unpacked, platform if second else platform_tuple)
-    references = _references(archive.name, description, job)
+    reals = _reals(archive.name, description, job)
+    references = {key: variable.valueReference for key, variable in reals.items()}
+    conversions, remarks = _conversions(archive.name, description, job, reals)
+    fed = np.column_stack(
+        [conversions[name].from_si(column) for name, column in zip(job["input_names"], inputs.T, strict=True)]
+    )
     said: list[str] = []
 
     def follow(machine: Any) -> Array:
         instance = _instance(description, unpacked, said)
-        return _run(instance, second, references, job, machine, times, inputs)
+        set_to = {name: conversions[name].from_si(value) for name, value in machine.items()}
+        return _run(instance, second, references, job, set_to, times, fed)
 
     try:
-        return np.array([follow(machine) for machine in job["machines"]])
+        found = np.array([follow(machine) for machine in job["machines"]])
     except FMICallException as error:
         reason = f", saying: {said[-1][:LONGEST_MESSAGE]}" if said else "."
         raise CosimulationError(
@@ -60,6 +69,9 @@ def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Pat
         ) from error
     except Exception as error:  # FMPy raises nothing more special
         raise CosimulationError(f"{archive.name}: the FMU cannot be run: {error}") from error
+    for column, name in enumerate(job["output_names"]):
+        found[:, :, column] = conversions[name].to_si(found[:, :, column])
+    return found, remarks
 
 
 def _description(name: str, unpacked: Path) -> Any:
@@ -76,8 +88,8 @@ def _description(name: str, unpacked: Path) -> Any:
     return description
 
 
-def _references(name: str, description: Any, job: Mapping[str, Any]) -> dict[str, int]:
-    """Find the value references of all variables that a job names."""
+def _reals(name: str, description: Any, job: Mapping[str, Any]) -> dict[str, Any]:
+    """Find the real scalars of an FMU, among them all variables that a job names."""
     parameters = {parameter for machine in job["machines"] for parameter in machine}
     reals = {
         variable.name: variable
@@ -89,7 +101,18 @@ def _references(name: str, description: Any, job: Mapping[str, Any]) -> dict[str
             raise CosimulationError(f"{name}: there is no real scalar variable {variable!r} in the FMU.")
     _require_settable(name, "input", [reals[key] for key in job["input_names"]], {"input"})
     _require_settable(name, "parameter", [reals[key] for key in sorted(parameters)], {"input", "parameter"})
-    return {key: variable.valueReference for key, variable in reals.items()}
+    return reals
+
+
+def _conversions(
+    name: str, description: Any, job: Mapping[str, Any], reals: Mapping[str, Any]
+) -> tuple[dict[str, Conversion], list[str]]:
+    """Convert between SI and each variable that a job names; what is to be said of units and start values."""
+    units = ForeignUnits(name, description, job["stated_units"])
+    asked = [(reals[variable], si) for variable, si in job["si_units"].items()]
+    conversions = {variable.name: units.conversion(variable, si) for variable, si in asked}
+    remarks = [*units.undeclared(asked), *units.differences(list(reals.values()), job["parameters"])]
+    return conversions, remarks
 
 
 def _require_settable(name: str, role: str, variables: Sequence[Any], causalities: Set[str]) -> None:

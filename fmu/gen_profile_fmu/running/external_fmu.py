@@ -30,6 +30,13 @@ class ForeignRun:
         Variables of the FMU.
     machines : sequence of mapping of str to float
         Start values of the FMU's parameters, for each run.
+    si_units : mapping of str to str
+        What each of these variables is meant in; the FMU's own units are converted.
+    stated_units : mapping of str to float
+        By variable, how many SI units one of the FMU's makes, in place of what the FMU declares.
+    parameters : mapping of str to tuple of float, str, str or None
+        Value, SI unit and the FMU's variable, if one is named, of each parameter of the spec, which the FMU's
+        start values are compared with.
     time_limit : float
         For all runs together, in s.
     """
@@ -40,20 +47,36 @@ class ForeignRun:
     input_names: Sequence[str]
     output_names: Sequence[str]
     machines: Sequence[Mapping[str, float]]
+    si_units: Mapping[str, str]
+    stated_units: Mapping[str, float]
+    parameters: Mapping[str, tuple[float, str, str | None]]
     time_limit: float
 
 
-def run_foreign(run: ForeignRun) -> Array:
-    """Co-simulate.
+@attrs.frozen(kw_only=True, eq=False)
+class ForeignResult:
+    """What an FMU gave.
 
-    Returns
-    -------
-    (machines, samples, outputs) array
+    Attributes
+    ----------
+    outputs : (machines, samples, outputs) array
+        In SI units.
+    remarks : tuple of str
+        What is to be known of its units and start values, a sentence each.
+    """
+
+    outputs: Array
+    remarks: tuple[str, ...]
+
+
+def run_foreign(run: ForeignRun) -> ForeignResult:
+    """Co-simulate.
 
     Raises
     ------
     CosimulationError
-        The FMU is damaged, lacks a variable, refuses a step, crashes, hangs, or ends its process.
+        The FMU is damaged, lacks a variable or measures it in a unit of something else, refuses a step,
+        crashes, hangs, or ends its process.
     """
     with tempfile.TemporaryDirectory(prefix="gen-profile-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -65,7 +88,10 @@ def run_foreign(run: ForeignRun) -> Array:
 def write_job(run: ForeignRun, folder: Path) -> None:
     """Tell the child what to do."""
     names = {"input_names": list(run.input_names), "output_names": list(run.output_names)}
-    job = {"archive": str(run.archive.absolute()), "machines": [dict(m) for m in run.machines], **names}
+    kept = ("si_units", "stated_units", "parameters")
+    mappings = {name: dict(getattr(run, name)) for name in kept}
+    machines = [dict(machine) for machine in run.machines]
+    job = {"archive": str(run.archive.absolute()), "machines": machines, **names, **mappings}
     (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
     np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
 
@@ -86,7 +112,7 @@ def _run_child(run: ForeignRun, folder: Path) -> None:
         )
 
 
-def _result(run: ForeignRun, folder: Path) -> Array:
+def _result(run: ForeignRun, folder: Path) -> ForeignResult:
     refusal, result = folder / "refusal.txt", folder / "result.npy"
     if refusal.exists():
         raise CosimulationError(refusal.read_text(encoding="utf-8"))
@@ -95,4 +121,5 @@ def _result(run: ForeignRun, folder: Path) -> Array:
     outputs: Array = np.load(result, allow_pickle=False)
     if not np.isfinite(outputs).all():
         raise CosimulationError(f"{run.archive.name}: the FMU's outputs are not finite numbers.")
-    return outputs
+    remarks = json.loads((folder / "remarks.json").read_text(encoding="utf-8"))
+    return ForeignResult(outputs=outputs, remarks=tuple(remarks))

@@ -3,17 +3,20 @@
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
+
+import attrs
 
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.model import ExternalFmu
+from gen_profile.spec.model import FED_RATES, ExternalFmu
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
-from gen_profile.spec.values import Pattern, Words
+from gen_profile.spec.values import NONE, Pattern, Words
 from gen_profile.support.bounded_file import read_bounded
 from gen_profile.support.private_folder import agree
+from gen_profile.support.units import units_of
 
-KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "time_limit")
-INPUTS = ("acceleration", "velocity", "setpoint")
+KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "units", "time_limit")
+INPUTS = tuple(FED_RATES)
 TIME_LIMIT = 60.0  # s
 FILE = Annotated[
     str,
@@ -44,7 +47,7 @@ def external_fmu(
         return None
     input_, inputs = _inputs(given.get("input"), plant, structurer)
     kinds, limit = kinds_of(ExternalFmu), given.get("time_limit", TIME_LIMIT)
-    return ExternalFmu(
+    foreign = ExternalFmu(
         name=Path(name).name,
         path=folder / name,
         sha256=_sha256(folder / name, given.get("fmu_sha256"), structurer.faults),
@@ -54,6 +57,16 @@ def external_fmu(
         parameters=structurer.fit(given.get("parameters", {}), kinds["parameters"], "check.parameters", {}),
         time_limit=structurer.fit(limit, kinds["time_limit"], "check.time_limit", TIME_LIMIT),
     )
+    return attrs.evolve(foreign, units=_units(given.get("units", {}), foreign, plant, structurer))
+
+
+def _units(table: Any, foreign: ExternalFmu, plant: Plant, structurer: Structurer) -> Mapping[str, str]:
+    """Read the units of variables, each one that measures what the variable is meant to."""
+    fitting = {name: (si, *units_of(si)) for name, si in foreign.si_units(plant).items()}
+    choices = {name: Literal.__getitem__(tuple(dict.fromkeys(units))) for name, units in fitting.items()}
+    of_variables = attrs.evolve(structurer, names={"variable": choices})
+    units: Mapping[str, str] = of_variables.fit(table, kinds_of(ExternalFmu)["units"], "check.units", NONE)
+    return units
 
 
 def _sha256(path: Path, stated: Any, faults: Faults) -> str:

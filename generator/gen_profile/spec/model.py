@@ -51,6 +51,7 @@ RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longe
 
 ParameterSpan = Annotated[str, Named("parameter", of="span")]
 Span = Annotated[tuple[float, float], Rising()]
+VariableName = Annotated[str, Named("variable")]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("NAME = 0.2")]
 Sway = Annotated[float, Bounds(above=0.0), Words("must be a finite number greater than 0, found {found}")]
@@ -222,6 +223,9 @@ class LimitsSpec(Checked, table="limits"):
         }
 
 
+FED_RATES = {"acceleration": "/s^2", "velocity": "/s", "setpoint": ""}  # of an axis, behind its SI unit
+
+
 @attrs.frozen(kw_only=True)
 class ExternalFmu(Checked, table="check"):
     """An external FMU that judges in place of ours.
@@ -241,6 +245,8 @@ class ExternalFmu(Checked, table="check"):
         Its variables by load, of those loads that it has.
     parameters : mapping of str to str
         Its variables by the plant's parameters.
+    units : mapping of str to str
+        What its variables are in, where that differs from what the FMU declares, if it does.
     time_limit : float
         s, for all scenarios together.
     """
@@ -252,7 +258,15 @@ class ExternalFmu(Checked, table="check"):
     inputs: tuple[str, ...]
     sway: Mapping[LoadName, str]
     parameters: Annotated[Mapping[ParameterName, str], example('L1 = "rope"')]
+    units: Annotated[Mapping[VariableName, str], example('rope = "mm"')] = NONE
     time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found {found}")]
+
+    def si_units(self, plant: Plant) -> dict[str, str]:
+        """Name the SI unit of each of its variables."""
+        per = FED_RATES[self.input]
+        fed = {name: f"{axis.unit}{per}" for name, axis in zip(self.inputs, plant.actuated, strict=False)}
+        set_to = {variable: plant.units[name] for name, variable in self.parameters.items()}
+        return {**fed, **dict.fromkeys(self.sway.values(), "m"), **set_to}
 
     def to_dict(self) -> dict[str, Any]:
         """Write the keys of ``[check]``."""
@@ -262,6 +276,7 @@ class ExternalFmu(Checked, table="check"):
             "input": {self.input: list(self.inputs)},
             "output": {"sway": dict(self.sway)},
             "parameters": dict(self.parameters),
+            **({"units": dict(self.units)} if self.units else {}),
             "time_limit": self.time_limit,
         }
 

@@ -19,8 +19,8 @@ AXIS_UNITS = (*UNITS, COUNTS)
 
 def units_of(si: str) -> dict[str, float]:
     """List the units that measure what an SI unit does, or its rate, and how many of them make one."""
-    measured, per_second, _ = si.partition("/s")
-    return {f"{unit}{per_second}": per for unit, (of, per) in UNITS.items() if of == measured}
+    measured, per, time = si.partition("/s")
+    return {f"{unit}{per}{time}": many for unit, (of, many) in UNITS.items() if of == measured}
 
 
 @attrs.frozen(kw_only=True)

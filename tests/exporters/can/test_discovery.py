@@ -7,11 +7,11 @@ import pytest
 from command_line import run_here
 from exporters.can.bench import Bench
 from exporters.motions import quintic
+from gen_profile_exporters.can.streaming.link import Link
 
 from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.host import clock, detection
 from gen_profile_exporters.can.streaming.discovery import discover
-from gen_profile_exporters.can.streaming.link import Link
 
 LINKS = [
     {"ifname": "lo", "link_type": "loopback", "flags": ["UP"]},

@@ -17,7 +17,8 @@ from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec.model import ExternalFmu, Spec
 from gen_profile.spec.plausibility import plausibility_warnings
-from gen_profile_fmu.running.external_fmu import ForeignRun, run_foreign
+from gen_profile.support.units import units_of
+from gen_profile_fmu.running.external_fmu import ForeignResult, ForeignRun, run_foreign
 
 STEPS_PER_LAG = 4  # at least, of drives that lag
 SPACING = 0.01  # s, at most, of samples while the axes stand
@@ -49,13 +50,14 @@ def judge_external(
     """
     together = [list(rows) for _, rows in groupby(machines, _driven_alike)]
     judged = [_judged(spec, foreign, setpoints, rows) for rows in together]
+    remarks = dict.fromkeys(remark for _, _, said in judged for remark in said)
     return Check(
         limit={load: spec.check.residual_sway[load] for load in foreign.sway},
-        error_bound=max(apart for _, apart in judged) + ERROR_FLOOR,
+        error_bound=max(apart for _, apart, _ in judged) + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
-        findings=tuple(finding for findings, _ in judged for finding in findings),
+        findings=tuple(finding for findings, _, _ in judged for finding in findings),
         faults=implausibilities(spec, setpoints),
-        plausibility_warnings=plausibility_warnings(spec),
+        plausibility_warnings=(*plausibility_warnings(spec), *remarks),
     )
 
 
@@ -66,8 +68,8 @@ def _driven_alike(scenario: Scenario) -> tuple[object, ...]:
 
 def _judged(
     spec: Spec, foreign: ExternalFmu, setpoints: SampledProfile, rows: Sequence[Scenario]
-) -> tuple[list[Finding], float]:
-    """Run scenarios that share setpoints and drives; their findings, and what these err by at most in m."""
+) -> tuple[list[Finding], float, tuple[str, ...]]:
+    """Run scenarios that share setpoints and drives; their findings, error in m at most, and remarks."""
     first = rows[0]
     exact = follows_exactly(first)
     since = arrival(spec, setpoints) if exact else standstill(spec, setpoints)
@@ -81,12 +83,13 @@ def _judged(
     rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
     times = np.concatenate([times, times[-1] + held])
     inputs = np.concatenate([inputs, np.repeat(rest, len(held), axis=0)])
-    responses = _sways(foreign, times, inputs, rows)
-    finer = _sways(foreign, *_halved(foreign, times, inputs), rows)[:, ::2]
+    result = _run(spec, foreign, times, inputs, rows)
+    finer = _run(spec, foreign, *_halved(foreign, times, inputs), rows).outputs[:, ::2]
     after = times >= since * (1.0 - 1e-12)
-    responses, finer = responses[:, after], finer[:, after]
+    responses, finer = result.outputs[:, after], finer[:, after]
     error = float(np.abs(responses - finer).max()) + max(above_samples(sways) for sways in responses)
-    return [_finding(foreign, row, sways) for row, sways in zip(rows, responses, strict=True)], error
+    findings = [_finding(foreign, row, sways) for row, sways in zip(rows, responses, strict=True)]
+    return findings, error, result.remarks
 
 
 def _finding(foreign: ExternalFmu, machine: Scenario, sways: Array) -> Finding:
@@ -95,9 +98,19 @@ def _finding(foreign: ExternalFmu, machine: Scenario, sways: Array) -> Finding:
     return Finding(scenario=machine, residual=residual, modal=residual)
 
 
-def _sways(foreign: ExternalFmu, times: Array, inputs: Array, machines: Sequence[Scenario]) -> Array:
-    """Sway of the loads that the FMU has, shape (machines, samples, loads)."""
-    names = foreign.parameters
+def _run(
+    spec: Spec, foreign: ExternalFmu, times: Array, inputs: Array, rows: Sequence[Scenario]
+) -> ForeignResult:
+    """Have the FMU give the sway of the loads that it has."""
+    names, plant = foreign.parameters, spec.machine()
+    si_units = foreign.si_units(plant)
+    stated = {
+        name: 1.0 / {si_units[name]: 1.0, **units_of(si_units[name])}[unit]
+        for name, unit in foreign.units.items()
+    }
+    parameters = {
+        name: (value, plant.units[name], names.get(name)) for name, value in spec.plant.parameters.items()
+    }
     return run_foreign(
         ForeignRun(
             archive=foreign.path,
@@ -105,7 +118,10 @@ def _sways(foreign: ExternalFmu, times: Array, inputs: Array, machines: Sequence
             inputs=inputs,
             input_names=foreign.inputs,
             output_names=tuple(foreign.sway.values()),
-            machines=[{names[name]: machine.parameters[name] for name in names} for machine in machines],
+            machines=[{names[name]: row.parameters[name] for name in names} for row in rows],
+            si_units=si_units,
+            stated_units=stated,
+            parameters=parameters,
             time_limit=foreign.time_limit,
         )
     )

@@ -147,9 +147,10 @@ def actual_positions(source: Source, port: Port, tell: Progress) -> tuple[float,
         Another master is in command, or a drive does not tell.
     """
     from gen_profile_exporters.can.streaming.configuration import positions  # noqa: PLC0415  # canopen
+    from gen_profile_exporters.can.streaming.link import Link  # noqa: PLC0415
+
     from gen_profile_exporters.can.streaming.discovery import listen  # noqa: PLC0415  # is an extra
     from gen_profile_exporters.can.streaming.joint_bus import opened  # noqa: PLC0415
-    from gen_profile_exporters.can.streaming.link import Link  # noqa: PLC0415
 
     target = source.plan.target
     tell("asking where the axes stand")

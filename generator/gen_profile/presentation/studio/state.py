@@ -28,7 +28,9 @@ MOST_SPEC = 262_144  # bytes of a spec that is dropped on a page
 MOST_ADDRESS, MOST_STATE = 16_384, 262_144  # bytes, as it is written and unpacked
 KEY = re.compile(r"[a-z]+(\.[A-Za-z0-9_-]+){0,4}")
 # which program runs is for the studio's user to say, not for an address
-FIXED = re.compile(r"(plant\.(type|file|file_sha256)|check\.(fmu|fmu_sha256|input|output|parameters))(\..*)?")
+FIXED = re.compile(
+    r"(plant\.(type|file|file_sha256)|check\.(fmu|fmu_sha256|input|output|parameters|units))(\..*)?"
+)
 
 
 @lru_cache(maxsize=8)  # asked for at every turn of a knob; it is never changed

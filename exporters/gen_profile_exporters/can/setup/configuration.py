@@ -14,14 +14,6 @@ import attrs
 import can
 from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
-
-from gen_profile.support.errors import StreamAborted
-from gen_profile.support.units import AxisScale
-from gen_profile_exporters.can import frames, startup
-from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
-from gen_profile_exporters.can.following_window import useful
-from gen_profile_exporters.can.host.clock import NANOSECONDS
-from gen_profile_exporters.can.scaling import Demand, magnitude_counts
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
     HEARTBEAT_WATCHED,
@@ -32,6 +24,14 @@ from gen_profile_exporters.can.streaming.restoration import (
     time_of_ours,
 )
 from gen_profile_exporters.can.streaming.standing import trembling
+
+from gen_profile.support.errors import StreamAborted
+from gen_profile.support.units import AxisScale
+from gen_profile_exporters.can import frames, startup
+from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
+from gen_profile_exporters.can.following_window import useful
+from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.scaling import Demand, magnitude_counts
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h
