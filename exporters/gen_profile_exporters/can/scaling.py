@@ -4,7 +4,6 @@ A position is multiplied by the exact ratio that the spec's decimal number state
 even. Nothing is added up from cycle to cycle, so nothing drifts.
 """
 
-from decimal import Decimal
 from fractions import Fraction
 
 import attrs
@@ -15,6 +14,7 @@ from gen_profile.spec.can import CanSpec
 from gen_profile.support.errors import ExportError
 from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import pdos
+from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, exact, per_count
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.exporter import Target
@@ -35,9 +35,9 @@ class Setpoints:
         s.
     position : (samples, axes) integer array
     offsets : (samples, axes, offsets) integer array
-        Feed-forward, as many as are sent: velocity 60B1h in counts/s, torque 60B2h in ‰.
+        Feed-forward, as many as are sent: velocity 60B1h in the drive's unit, torque 60B2h in ‰.
     velocity : (samples, axes) integer array or None
-        60FFh in counts/s, each kept for one period: what is sent instead of positions in csv.
+        60FFh in the drive's unit, each kept for one period: what is sent instead of positions in csv.
     """
 
     period: float
@@ -98,11 +98,6 @@ def demand_of(motion: Setpoints, target: Target) -> Demand:
     )
 
 
-def exact(value: float) -> Fraction:
-    """Read a double as the shortest decimal number that means it, as a spec states it."""
-    return Fraction(Decimal(repr(float(value))))
-
-
 def exact_counts(values: Array, ratio: Fraction) -> Integers:
     """Multiply doubles by a ratio and round to whole numbers, half to even, without any other error.
 
@@ -145,9 +140,10 @@ def setpoints(motion: SampledProfile, target: Target) -> Setpoints:
     )
 
 
-def travelled(velocity: Integers, period: float) -> Array:
-    """Distance in counts by the instant of each SYNC, if each velocity in counts/s is kept for a period."""
-    return np.asarray(np.cumsum(np.pad(velocity[:-1], ((1, 0), (0, 0))), axis=0) * period)
+def travelled(velocity: Integers, period: float, target: Target) -> Array:
+    """Distance in counts by the instant of each SYNC, if each velocity is kept for a period."""
+    counts = [period / float(per_count(VELOCITY_UNIT, target.can, axis)) for axis in target.axes]
+    return np.asarray(np.cumsum(np.pad(velocity[:-1], ((1, 0), (0, 0))), axis=0) * counts)
 
 
 def travel_counts(axis: AxisScale, can: CanSpec) -> tuple[int, int] | None:
@@ -210,9 +206,9 @@ def _velocities(motion: SampledProfile, target: Target) -> Integers:
     columns = []
     for column, axis in enumerate(target.axes):
         distance = motion.position[:, column] - motion.position[0, column]
-        least = exact(axis.counts_per_si) / exact(motion.cycle_time)
-        velocity = np.append(np.diff(exact_counts(distance, least)), 0)
-        cure = "lower axis.counts_per_metre"
+        per_period = per_count(VELOCITY_UNIT, target.can, axis) / exact(motion.cycle_time)
+        velocity = np.append(np.diff(exact_counts(distance, exact(axis.counts_per_si) * per_period)), 0)
+        cure = "lower axis.counts_per_metre, or set a greater can.velocity_unit in the drive"
         require_within(INT32, velocity, f"axis {axis.name}, velocity", cure, motion.cycle_time)
         columns.append(velocity)
     return np.column_stack(columns)
@@ -230,6 +226,7 @@ def _offset(field: Field, motion: SampledProfile, target: Target) -> Integers:
         ratio = exact(axis.counts_per_si)
         if field == pdos.VELOCITY_OFFSET:
             values, limits, what = motion.velocity, INT32, "velocity"
+            ratio *= per_count(VELOCITY_UNIT, target.can, axis)
             cure = "lower axis.counts_per_metre"
         else:
             values, limits, what = motion.acceleration, INT16, "torque"

@@ -19,6 +19,14 @@ from gen_profile.spec.can import CanSpec
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MODES
+from gen_profile_exporters.can.drive_units import (
+    ACCELERATION_UNIT,
+    KEYS,
+    VELOCITY_UNIT,
+    per_count,
+    stated_unit,
+    unit_code,
+)
 from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.scaling import Demand, travel_counts
@@ -135,7 +143,7 @@ def concise_dcf(entries: Sequence[Entry]) -> bytes:
 
 
 def _number(entry: Entry) -> str:
-    large = entry.index < 0x6000 and entry.bits == 32
+    large = entry.bits == 32 and (entry.index < 0x6000 or entry.index in KEYS)
     return f"0x{entry.value:08X}" if large else str(entry.value)
 
 
@@ -151,7 +159,10 @@ def _entries(
     yield Entry(0x6060, 0, 8, MODES[can.mode], f"mode of operation: {can.mode}")
     yield Entry(0x6007, 0, 16, QUICK_STOP_ON_LOST_CONNECTION, "connection lost: quick stop")
     yield Entry(0x605A, 0, 16, RAMP_THEN_DISABLE, "quick stop: brake on its ramp and disable")
-    yield Entry(0x6085, 0, 32, demand.quick_stop[column], "deceleration of a quick stop (counts/s²)")
+    yield from _units(can)
+    per = per_count(ACCELERATION_UNIT, can, axis)
+    ramp, unit = ceil(demand.quick_stop[column] * per), stated_unit(ACCELERATION_UNIT, can).words
+    yield Entry(0x6085, 0, 32, ramp, f"deceleration of a quick stop ({unit})")
     if can.following_error is not None:
         window = windows(demand, target)[column]
         watches = can.mode != "csv"  # there, the streamer does
@@ -167,6 +178,14 @@ def _entries(
     ):
         for sub, value in enumerate(pair or (), start=1):
             yield Entry(index, sub, 32, value, meaning)
+
+
+def _units(can: CanSpec) -> Iterator[Entry]:
+    """Set the units that the spec states, which a drive may know otherwise, or not at all."""
+    for index, stated in ((VELOCITY_UNIT, can.velocity_unit), (ACCELERATION_UNIT, can.acceleration_unit)):
+        if stated is not None:
+            unit, what = stated_unit(index, can), KEYS[index].removeprefix("can.").replace("_", " ")
+            yield Entry(index, 0, 32, unit_code(index, unit), f"{what}: {unit.words}", optional=True)
 
 
 def _monitoring(can: CanSpec) -> Iterator[Entry]:

@@ -65,6 +65,7 @@ def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:
     from gen_profile_exporters.can.streaming.link import Link
 
     from gen_profile_exporters.can.host.clock import SystemClock
+    from gen_profile_exporters.can.host.link import Link
     from gen_profile_exporters.can.streaming.discovery import discover
 
     with port.open(bitrate) as bus:

@@ -81,6 +81,22 @@ class FixedPdosSpec(Checked, table="can.fixed_pdos"):
         return any((*self.received, *self.sent))
 
 
+_POWER = r"(?:(?:1|10+|0\.0*1) )?"
+VelocityUnit = Annotated[
+    str,
+    Pattern(
+        rf"{_POWER}(?:counts/s|rpm|rev/s|m/s|rad/s|deg/s)",
+        "counts/s, rpm, rev/s, m/s, rad/s or deg/s, behind a power of ten if it is not 1: '0.001 rpm'",
+    ),
+]
+AccelerationUnit = Annotated[
+    str,
+    Pattern(
+        rf"{_POWER}(?:counts/s\^2|rpm/s|rev/s\^2|m/s\^2|rad/s\^2|deg/s\^2)",
+        "counts/s^2, rpm/s, rev/s^2, m/s^2, rad/s^2 or deg/s^2, behind a power of ten if it is not 1: "
+        "'0.001 m/s^2'",
+    ),
+]
 SENSOR_BYTES = {"int16": 2, "int32": 4, "float32": 4}
 
 
@@ -151,6 +167,11 @@ class CanSpec(Checked, table="can"):
     encoder, gear, feed : (int, int) or None
         Numerator and denominator of 608Fh (increments per motor revolutions), 6091h (motor per shaft
         revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
+    velocity_unit, acceleration_unit : str or None
+        In what the drive counts 60FFh and 60B1h, and 6085h, such as ``"0.001 rpm"``; None for counts of its
+        positions per second, and per second squared.
+    counts_per_revolution : float or None
+        Counts of positions to one of the revolutions that these units count.
     vendor, product : int or None
         Identity 1018h:01 and :02 that a drive must have.
     serial : mapping of str to int
@@ -179,6 +200,9 @@ class CanSpec(Checked, table="can"):
     encoder: tuple[Unsigned32, Unsigned32] | None = None
     gear: tuple[Unsigned32, Unsigned32] | None = None
     feed: tuple[Unsigned32, Unsigned32] | None = None
+    velocity_unit: VelocityUnit | None = None
+    acceleration_unit: AccelerationUnit | None = None
+    counts_per_revolution: Positive | None = None
     vendor: Unsigned32 | None = None
     product: Unsigned32 | None = None
     serial: Annotated[Mapping[AxisName, Unsigned32], example("cart = 0x12345678")] = NONE

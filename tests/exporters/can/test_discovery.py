@@ -11,6 +11,7 @@ from gen_profile_exporters.can.streaming.link import Link
 
 from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.host import clock, detection
+from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.streaming.discovery import discover
 
 LINKS = [

@@ -1,12 +1,14 @@
 """DBC of the bus: what the frames mean, for analysers and loggers."""
 
 import re
+from collections.abc import Sequence
 from fractions import Fraction
 
+from gen_profile.spec.can import CanSpec
 from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import frames, pdos
+from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, exact, per_count
 from gen_profile_exporters.can.pdos import Field
-from gen_profile_exporters.can.scaling import exact
 from gen_profile_exporters.exporter import Target
 
 MASTER_NAME = "Controller"
@@ -23,8 +25,9 @@ def dbc(target: Target) -> bytes:
     for name, axis, own in zip(names, target.axes, frames.cob_ids(target), strict=True):
         for pdo, fields in {**layout.received, **layout.transmitted}.items():
             role = layout.role(pdo).title().replace("_", "")
+            measured = [(field, *_physical(field, axis, target.can)) for field in fields]
             way = (MASTER_NAME, name) if pdo in layout.received else (name, MASTER_NAME)
-            blocks.append(_message(own[pdo], f"{name}_{role}", fields, axis, way))
+            blocks.append(_message(own[pdo], f"{name}_{role}", measured, way))
     return ("\n\n".join(blocks) + "\n").encode("ascii")
 
 
@@ -34,13 +37,12 @@ def identifier(name: str) -> str:
     return plain if plain[:1].isalpha() else f"axis_{plain}"
 
 
-def _message(cob_id: int, name: str, fields: tuple[Field, ...], axis: AxisScale, way: tuple[str, str]) -> str:
+def _message(cob_id: int, name: str, fields: Sequence[tuple[Field, str, str]], way: tuple[str, str]) -> str:
     sender, receiver = way
-    lines = [f"BO_ {cob_id} {name}: {pdos.packing(fields).size} {sender}"]
+    lines = [f"BO_ {cob_id} {name}: {pdos.packing([field for field, *_ in fields]).size} {sender}"]
     start = 0
-    for field in fields:
+    for field, factor, unit in fields:
         sign = "-" if field.code.islower() else "+"
-        factor, unit = _physical(field, axis)
         if field.used:
             lines.append(
                 f' SG_ {field.name} : {start}|{field.bits}@1{sign} ({factor},0) [0|0] "{unit}" {receiver}'
@@ -49,12 +51,12 @@ def _message(cob_id: int, name: str, fields: tuple[Field, ...], axis: AxisScale,
     return "\n".join(lines)
 
 
-def _physical(field: Field, axis: AxisScale) -> tuple[str, str]:
+def _physical(field: Field, axis: AxisScale, can: CanSpec) -> tuple[str, str]:
     """Factor and unit of a signal: what one count means."""
-    metre = repr(float(Fraction(1) / exact(axis.counts_per_si)))
+    metre = Fraction(1) / exact(axis.counts_per_si)
     length = "rad" if axis.unit in {"rad", "deg"} else "m"
     if field in {pdos.TARGET_POSITION, pdos.INTERPOLATION_DATA, pdos.ACTUAL_POSITION}:
-        return metre, length
+        return repr(float(metre)), length
     if field in {pdos.VELOCITY_OFFSET, pdos.TARGET_VELOCITY}:
-        return metre, f"{length}/s"
+        return repr(float(metre / per_count(VELOCITY_UNIT, can, axis))), f"{length}/s"
     return ("0.1", "%") if field == pdos.TORQUE_OFFSET else ("1", "")

@@ -14,6 +14,7 @@ import numpy as np
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can import frames, pdos, startup
+from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, per_count
 from gen_profile_exporters.can.export import candump, database, traces
 from gen_profile_exporters.can.export.candump import Frame, altered
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
@@ -61,19 +62,20 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 def played(taken: frames.Integers, stamps: Sequence[Frame], target: Target) -> SampledProfile:
     """Tell where setpoints of all cycles lead the axes, by the stamps of their SYNCs."""
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
-    period, least, velocity = _cycle_time(stamps), 1.0, None
+    rates = np.array([float(per_count(VELOCITY_UNIT, target.can, axis)) for axis in target.axes])
+    period, least, velocity = _cycle_time(stamps), np.ones(len(target.axes)), None
     if target.can.mode == "csv":  # velocities, which are kept from each SYNC to the next one
-        position = np.array(target.start) + in_si(travelled(taken[:, :, 0], period), counts_per_si)
-        least = period
+        position = np.array(target.start) + in_si(travelled(taken[:, :, 0], period, target), counts_per_si)
+        least = period / rates
     else:
         position = in_si(taken[:, :, 0].astype(np.float64), counts_per_si)
     if pdos.VELOCITY_OFFSET in pdos.setpoint_fields(target.can):
-        velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
+        velocity = in_si(taken[:, :, 1] / rates, counts_per_si)
     return SampledProfile(
         cycle_time=period,
         position=position,
         velocity=velocity,
-        resolution=in_si(np.full(len(target.axes), least), np.abs(counts_per_si)),
+        resolution=in_si(least, np.abs(counts_per_si)),
     )
 
 

@@ -10,12 +10,21 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
 
-import attrs
 import can
-from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
+
+from gen_profile.support.errors import StreamAborted
+from gen_profile.support.units import AxisScale
+from gen_profile_exporters.can import drive_units, frames, startup
+from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
+from gen_profile_exporters.can.following_window import useful
+from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.host.link import Link
+from gen_profile_exporters.can.scaling import Demand, magnitude_counts
+from gen_profile_exporters.can.setup.node import Node
+from gen_profile_exporters.can.setup.restoration import (
     HEARTBEAT_WATCHED,
     Place,
     Restoration,
@@ -32,12 +41,11 @@ from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword,
 from gen_profile_exporters.can.following_window import useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Demand, magnitude_counts
+from gen_profile_exporters.can.setup.standing import trembling
+from gen_profile_exporters.can.setup.units import require_position_unit, require_units
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h
-NOT_THERE = {0x0602_0000, 0x0609_0011}  # SDO abort codes: no such object, no such subindex
-# what drives say as well of an object that they need not have: general error, not available, no data
-NOT_GIVEN = NOT_THERE | {0x0800_0000, 0x060A_0023, 0x0800_0024}
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
@@ -46,55 +54,6 @@ STOP_PATIENCE = 2 * NANOSECONDS  # for one that lost its streamer to brake
 LOOK_AGAIN = NANOSECONDS // 50  # at its state
 SCALING = {0x608F, 0x6091, 0x6092}  # of positions, in the drive
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
-
-
-@attrs.frozen(eq=False)
-class Node:
-    """One drive as the configuration sees it: its place on the bus and among the axes, and its objects."""
-
-    link: Link
-    number: int
-    column: int
-    name: str
-
-    def read(self, index: int, sub: int = 0, bits: int = 32) -> int:
-        """Read a number that it must have."""
-        data = self.upload(index, sub, bits)
-        if data is None:
-            raise self.unfit(f"the drive has no object {index:04X}h:{sub:02X}.")
-        return int.from_bytes(data, "little")
-
-    def upload(self, index: int, sub: int, bits: int = 32, *, optional: bool = False) -> bytes | None:
-        """Read an object of some bits, whose answer may have room for more; None where it has none."""
-        try:
-            data: bytes = self.link.sdo(self.number).upload(index, sub)
-        except SdoAbortedError as error:
-            if error.code in (NOT_GIVEN if optional else NOT_THERE):
-                return None
-            raise self.unfit(f"the drive refuses to tell {index:04X}h:{sub:02X} ({error}).") from error
-        except (SdoError, struct.error) as error:
-            raise self.silent(error) from error
-        return data[: bits // 8]
-
-    def download(self, index: int, sub: int, data: bytes) -> None:
-        """Write an object; a drive may refuse it, for what counts is what is read back."""
-        try:
-            self.link.sdo(self.number).download(index, sub, data)
-        except SdoAbortedError:
-            return
-        except (SdoError, struct.error) as error:
-            raise self.silent(error) from error
-
-    def unfit(self, words: str) -> StreamAborted:
-        """Say why its axis cannot be moved."""
-        return StreamAborted(f"axis {self.name}: {words}")
-
-    def silent(self, error: Exception) -> StreamAborted:
-        """Say that it gives no answer that means anything."""
-        return self.unfit(
-            f"node {self.number} does not answer properly ({error}); check power, cabling, bit rate and node "
-            "id."
-        )
 
 
 def configure(
@@ -137,6 +96,8 @@ def configure(
     for node in (nodes := _nodes(link, target)):
         link.send(nmt(PRE_OPERATIONAL, node.number))
         _require_identity(node, target)
+        require_position_unit(node, target.axes[node.column])
+        require_units(node, target)
         if reset_fault:
             _reset_fault(node)
         watched = node.upload(*HEARTBEAT_WATCHED, optional=True)
@@ -162,6 +123,7 @@ def positions(link: Link, target: Target, demand: Demand) -> tuple[int, ...]:
     lists = startup.startup_lists(demand, target)
     for node in (nodes := _nodes(link, target)):
         _require_identity(node, target)
+        require_position_unit(node, target.axes[node.column])
         for entry in lists[node.number]:
             held = node.upload(entry.index, entry.sub) if entry.index in SCALING else entry.data
             if held != entry.data:
@@ -343,6 +305,9 @@ def _same(entry: startup.Entry, data: bytes | None) -> bool:
         return not apart & COB_ID_BITS
     if entry.index in startup.PDO_PARAMETERS and entry.sub == 2 and entry.value in startup.AT_ONCE:
         return data[0] in startup.AT_ONCE
+    if entry.index in drive_units.KEYS:  # a code that is not known here may mean what is stated
+        held = drive_units.unit_of(entry.index, int.from_bytes(data, "little"))
+        return held is None or held == drive_units.unit_of(entry.index, entry.value)
     return data == entry.data
 
 

@@ -5,14 +5,16 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 
 from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
-from gen_profile_exporters.can.streaming.link import Link
-from gen_profile_exporters.can.streaming.standing import Standing
 
 from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MOVING, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.host.link import Link
+from gen_profile_exporters.can.setup.standing import Standing
 from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
+from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.streaming.standing import Standing
 
 MAPPING = 0x200  # from a PDO's parameters to its mapping
 MOST_MAPPED = 64  # entries of a mapping (CiA 301); greater counts are of another kind of PDO

@@ -13,8 +13,8 @@ from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import MOVING
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.host.link import FRAMES_AT_ONCE
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
-from gen_profile_exporters.can.streaming.link import FRAMES_AT_ONCE
 
 FAREWELL = NANOSECONDS // 2  # without SYNC, after which a stream is over
 WAIT = 0.001  # s, for a frame, before the drives look at their clocks

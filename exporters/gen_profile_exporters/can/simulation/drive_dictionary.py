@@ -24,6 +24,7 @@ NOT_MAPPABLE, PDO_TOO_LONG = 0x0604_0041, 0x0604_0042
 OUT_OF_RANGE, WRONG_STATE = 0x0609_0030, 0x0800_0022
 TRANSMISSION_TYPES = {*range(241), *AT_ONCE}  # the others are reserved, or wait for remote requests
 PERIOD = 0x60C2
+RATE_UNITS = {0x60A9, 0x60AA}  # of velocity and acceleration
 WINDOW = 50_000  # counts; a drive's own following error window
 
 
@@ -50,6 +51,13 @@ class DriveVariant:
         6065h, in counts.
     modes : int
         6502h.
+    units : (int, int, int)
+        60A8h to 60AAh, of which the last two may have another power of ten, unless `fixed_units`.
+    fixed_units : bool
+    encoder : (int, int)
+        608Fh, increments to revolutions of the motor.
+    counts_per_si : float
+        Of its axis, for units of 60A9h and 60AAh that measure that in m, rad or degrees.
     remote_requests : bool
         Whether its TPDOs can be asked for by remote frames; where not, it takes no COB-ID that allows them.
     """
@@ -64,6 +72,10 @@ class DriveVariant:
     fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
     following_error: int = WINDOW
     modes: int = 1 << 8 | 1 << 7 | 1 << 6  # csv, csp and ip
+    units: tuple[int, int, int] = (0x00B5_0000, 0x00B5_0300, 0x00B5_5700)  # increments, and of s and s²
+    fixed_units: bool = False
+    encoder: tuple[int, int] = (1, 1)
+    counts_per_si: float = 1.0
     remote_requests: bool = True
 
 
@@ -80,6 +92,8 @@ def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
         variable.default_raw = None  # what an EDS says of it is written anew
         if variable.index == PERIOD and variable.subindex and make.fixed_period is not None:
             variable.access_type = "ro"
+        if variable.index in RATE_UNITS and make.fixed_units:
+            variable.access_type = "ro"
         if variable.index - 0x200 in PDO_PARAMETERS and make.fixed_pdos.stated:
             variable.access_type = "const"
     return objects
@@ -94,6 +108,8 @@ def _usual() -> bytes:
 def _own_values(node: int, make: DriveVariant) -> dict[tuple[int, int], int]:
     """Give what depends on the maker, by index and subindex."""
     values = {(0x1018, 1): make.vendor, (0x1018, 2): make.product, (0x1018, 4): make.serial}
+    values |= {(0x60A8 + place, 0): unit for place, unit in enumerate(make.units)}
+    values |= {(0x608F, sub): number for sub, number in enumerate(make.encoder, start=1)}
     values |= {(0x6065, 0): make.following_error, (0x6502, 0): make.modes}
     if make.fixed_period is not None:
         values |= dict(zip(((PERIOD, 1), (PERIOD, 2)), make.fixed_period, strict=True))
@@ -155,6 +171,8 @@ def refusal(
     index, sub = place
     if index == 0x6060:
         return None if value == 0 or supports(held(0x6502, 0), value) else OUT_OF_RANGE
+    if index in RATE_UNITS:
+        return None if (value ^ held(index, 0)) & 0xFF_FFFF == 0 else OUT_OF_RANGE
     asked_for = sub == 1 and not value & NO_REMOTE_REQUEST
     if asked_for and index in PDO_PARAMETERS and index >= 0x1800 and not make.remote_requests:
         return OUT_OF_RANGE

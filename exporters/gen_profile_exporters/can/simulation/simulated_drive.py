@@ -5,6 +5,7 @@ drives in csp and ip do; a velocity, in csv, is kept for that period. Without SY
 clock.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -265,11 +266,19 @@ class SimulatedDrive:
         """Where the axis is to be one period later, in counts."""
         mode = self.value(0x6061)
         if mode == MODES["csv"]:
-            return self.command + self.value(0x60FF) * self.period
+            return self.command + self.value(0x60FF) * self._counts(0x60A9) * self.period
         return float(self.value(0x60C1, 1) if mode == MODES["ip"] else self.value(0x607A))
 
+    def _counts(self, unit: int) -> float:
+        """Tell how many counts/s (or counts/s²) make one unit of 60A9h (or 60AAh)."""
+        held = self.value(unit)
+        turn, metre = self.make.encoder[0] / self.make.encoder[1], self.make.counts_per_si
+        of_one = {0xB4: turn, 0xC0: turn / 60, 0x01: metre, 0x10: metre, 0x41: math.radians(metre)}
+        per_minute = 60.0 if held >> 8 & 0xFF == 0x47 else 1.0
+        return 10.0 ** _signed_byte(held >> 24) * of_one.get(held >> 16 & 0xFF, 1.0) / per_minute
+
     def _brake(self) -> None:
-        change = self.value(0x6085) * self.period
+        change = self.value(0x6085) * self._counts(0x60AA) * self.period
         speed = max(0.0, abs(self.velocity) - change)
         self.velocity = speed if self.velocity > 0 else -speed
         self.command += self.velocity * self.period
@@ -364,6 +373,10 @@ def _unpacked(mapping: list[int], data: bytes) -> list[tuple[int, int, int]]:
         parts.append((entry >> 16, entry >> 8 & 0xFF, value))
         start += length
     return parts
+
+
+def _signed_byte(value: int) -> int:
+    return (value + 128) % 256 - 128
 
 
 def _over(now: int, since: int, milliseconds: int) -> bool:

@@ -12,6 +12,7 @@ from math import ceil
 import numpy as np
 
 from gen_profile_exporters.can import pdos
+from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, per_count
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.scaling import Demand, Setpoints, magnitude_counts
 from gen_profile_exporters.exporter import Target
@@ -48,7 +49,8 @@ def approach(rest_counts: Sequence[int], demand: Demand, target: Target) -> Setp
     rest = np.zeros((cycles, len(rest_counts), offsets), dtype=np.int64)
     if target.can.mode != "csv":
         return Setpoints(period=period, position=position[1:], offsets=rest)
-    velocity = np.diff(np.rint(position / period), axis=0).astype(np.int64)  # rounding adds nothing up
+    rates = [float(per_count(VELOCITY_UNIT, target.can, axis)) / period for axis in target.axes]
+    velocity = np.diff(np.rint(position * rates), axis=0).astype(np.int64)  # rounding adds nothing up
     return Setpoints(period=period, position=position[:-1], offsets=rest, velocity=velocity)
 
 

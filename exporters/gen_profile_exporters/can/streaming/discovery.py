@@ -13,7 +13,7 @@ from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import MODES
 from gen_profile_exporters.can.host.clock import NANOSECONDS
-from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.host.link import Link
 
 LISTEN = NANOSECONDS // 2  # before anything is asked; several heartbeats of ours, and of most drives
 APART = NANOSECONDS // 500  # from one question to the next, so that no queue fills

@@ -7,8 +7,8 @@ import attrs
 import can
 
 from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.host.link import Launching
 from gen_profile_exporters.can.host.port import Port
-from gen_profile_exporters.can.streaming.link import Launching
 from gen_profile_exporters.exporter import Target
 
 OF_NODE = (frames.EMCY, frames.SDO_ANSWER, frames.SDO_REQUEST, frames.HEARTBEAT)  # and a node id

@@ -19,7 +19,7 @@ import can
 
 from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.host.clock import NANOSECONDS
-from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.streaming.plan import Cycle
 from gen_profile_exporters.exporter import Target
 

@@ -18,16 +18,16 @@ from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
 from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.scaling import magnitude_counts
-from gen_profile_exporters.can.streaming import configuration
+from gen_profile_exporters.can.setup import configuration
+from gen_profile_exporters.can.setup.restoration import Restoration
+from gen_profile_exporters.can.setup.standing import STILL
 from gen_profile_exporters.can.streaming.approach import approach
 from gen_profile_exporters.can.streaming.following import Following
-from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.plan import Cycle, SetpointSource, Step, cycles_of, preload
 from gen_profile_exporters.can.streaming.record import Book, Phase, Record
-from gen_profile_exporters.can.streaming.restoration import Restoration
-from gen_profile_exporters.can.streaming.standing import STILL
 from gen_profile_exporters.can.streaming.stopping import quick_stop
 from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch
 

@@ -12,7 +12,7 @@ from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.pdos import Field
-from gen_profile_exporters.can.streaming.standing import Standing, trembling
+from gen_profile_exporters.can.setup.standing import Standing, trembling
 from gen_profile_exporters.exporter import Target
 
 OPERATIONAL = 5

@@ -24,6 +24,7 @@ from gen_profile.support.errors import GenProfileError, SpecError, StreamAborted
 from gen_profile.support.suggestion import suggestion
 from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import frames, scaling
+from gen_profile_exporters.can.drive_units import exact
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.sensor_frame import values_in
 from gen_profile_exporters.can.streaming.plan import Step, cycle_of
@@ -329,7 +330,7 @@ def _counted(limits: Sequence[float | None], target: Target) -> tuple[float, ...
 
 def _ends(travel: tuple[float, float], axis: AxisScale, can: CanSpec) -> tuple[int, int]:
     """Scale an axis's travel, which its drive's must hold."""
-    ends = scaling.exact_counts(np.array(travel), scaling.exact(axis.counts_per_si))
+    ends = scaling.exact_counts(np.array(travel), exact(axis.counts_per_si))
     require_within(INT32, ends, f"axis {axis.name}", TOO_FAR, can.sync_period)
     least, greatest = int(ends.min()), int(ends.max())
     drive = scaling.travel_counts(axis, can)

@@ -19,7 +19,7 @@ from gen_profile.support.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.support.artefacts.reading import manifest_beside, read_motion, require_companions
 from gen_profile.support.errors import CheckFailed, SpecError, StreamAborted
 from gen_profile.support.progress import Progress, no_progress
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import drive_units, frames
 from gen_profile_exporters.can.following_window import LEAST_USEFUL, useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock, SharedClock, SystemClock
 from gen_profile_exporters.can.host.console import stopped_by_signals, told_aside
@@ -149,6 +149,8 @@ def actual_positions(source: Source, port: Port, tell: Progress) -> tuple[float,
     from gen_profile_exporters.can.streaming.configuration import positions  # noqa: PLC0415  # canopen
     from gen_profile_exporters.can.streaming.link import Link  # noqa: PLC0415
 
+    from gen_profile_exporters.can.host.link import Link  # noqa: PLC0415
+    from gen_profile_exporters.can.setup.configuration import positions  # noqa: PLC0415  # canopen
     from gen_profile_exporters.can.streaming.discovery import listen  # noqa: PLC0415  # is an extra
     from gen_profile_exporters.can.streaming.joint_bus import opened  # noqa: PLC0415
 
@@ -292,8 +294,9 @@ def drive_bank(
 ) -> DriveBank:
     """Put a simulated drive on the bus for every axis, at rest at the start of the move.
 
-    They are those that the spec asks for, by vendor, product, serial number and fixed mapping. Their
-    following error windows in counts are those given by axis, or so narrow that every motion may have them.
+    They are those that the spec asks for, by vendor, product, serial number, fixed mapping and units.
+    Their following error windows in counts are those given by axis, or so narrow that every motion may have
+    them.
     """
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
     from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive  # noqa: PLC0415
@@ -312,6 +315,9 @@ def drive_bank(
                 serial=stated.serial.get(axis.name, make.serial),
                 fixed_pdos=stated.fixed_pdos,
                 following_error=own[axis.name],
+                units=drive_units.codes(stated),
+                encoder=drive_units.encoder(stated),
+                counts_per_si=abs(axis.counts_per_si),
             ),
             round(at * axis.counts_per_si),
         )

@@ -16,6 +16,7 @@ from gen_profile_exporters.can.streaming.link import Link
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import OutputError
 from gen_profile_exporters.can.host.clock import SystemClock
+from gen_profile_exporters.can.host.link import Link
 
 if TYPE_CHECKING:
     from gen_profile_exporters.can.host.port import Port
