@@ -41,6 +41,7 @@ CHANNEL = "can0"  # of drives that are all on one bus
 
 MOST_LOAD = Decimal("0.7")  # of the bus, at worst; the rest is for SDOs, heartbeats and repeated frames
 MICROSECONDS = 1_000_000
+MOST_DIGITS, USUAL_EXPONENT = 255, -3  # of 60C2h
 
 Integers = NDArray[np.int64]
 
@@ -197,6 +198,8 @@ def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
 def period_digits(can: CanSpec) -> tuple[int, int]:
     """SYNC period as object 60C2h tells it to a drive: 1 to 255 times a power of ten of seconds.
 
+    In milliseconds where it can be: many drives hold the power at -3, or take no greater one.
+
     Raises
     ------
     ExportError
@@ -205,11 +208,13 @@ def period_digits(can: CanSpec) -> tuple[int, int]:
     period = Decimal(repr(can.sync_period)).normalize()
     _, digits, exponent = period.as_tuple()
     value = int("".join(map(str, digits)))
-    if value > 255 or not isinstance(exponent, int) or exponent < -6:
+    if value > MOST_DIGITS or not isinstance(exponent, int) or exponent < -6:
         raise ExportError(
             f"can.sync_period: drives cannot be set to an interpolation period of {period:f} s (60C2h holds "
             "1 to 255 times a power of ten, here of at least 1 µs); choose a rounder one, such as 0.004."
         )
+    while exponent > USUAL_EXPONENT and value * 10 <= MOST_DIGITS:
+        value, exponent = value * 10, exponent - 1
     return value, exponent
 
 

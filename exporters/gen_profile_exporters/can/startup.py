@@ -86,6 +86,11 @@ class Entry:
     fixed: bool = False
 
     @property
+    def is_code(self) -> bool:
+        """Whether its bits mean something each, so that people read it in hexadecimal."""
+        return self.bits == 32 and (self.index < 0x6000 or self.index in KEYS)
+
+    @property
     def data(self) -> bytes:
         """The value as SDOs carry it."""
         return (self.value & (1 << self.bits) - 1).to_bytes(self.bits // 8, "little")
@@ -143,8 +148,7 @@ def concise_dcf(entries: Sequence[Entry]) -> bytes:
 
 
 def _number(entry: Entry) -> str:
-    large = entry.bits == 32 and (entry.index < 0x6000 or entry.index in KEYS)
-    return f"0x{entry.value:08X}" if large else str(entry.value)
+    return f"0x{entry.value:08X}" if entry.is_code else str(entry.value)
 
 
 def _entries(
@@ -193,6 +197,9 @@ def _monitoring(can: CanSpec) -> Iterator[Entry]:
     yield Entry(
         0x1016, 1, 32, frames.MASTER << 16 | timeout_ms(can), "watch the controller's heartbeat (node, ms)"
     )
+    # CiA 301: a counter changes only while no period is set; no SYNC of ours has one
+    yield Entry(0x1006, 0, 32, 0, "period of SYNC: none while its counter changes", optional=True)
+    yield Entry(0x1019, 0, 8, 0, "SYNC without a counter", optional=True)
     microseconds = frames.period_microseconds(can)
     yield Entry(0x1006, 0, 32, microseconds, "period of SYNC (µs)", optional=True)
 

@@ -62,7 +62,6 @@ def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:
     from gen_profile.support.plugins import require_installed
 
     require_installed("Streaming needs canopen", "can", "canopen")
-    from gen_profile_exporters.can.streaming.link import Link
 
     from gen_profile_exporters.can.host.clock import SystemClock
     from gen_profile_exporters.can.host.link import Link

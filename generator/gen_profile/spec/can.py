@@ -155,6 +155,10 @@ class CanSpec(Checked, table="can"):
     timeout : float or None
         How long a drive waits for the next setpoint before it stops by itself, and the streamer for an
         answer, in s; None takes 20 ms or three cycles, whichever is longer.
+    sdo_timeout : float
+        How long an answer to an SDO is awaited, in s.
+    state_timeout : float
+        How long a drive may take to change its state or mode of operation, and an axis to settle, in s.
     start_tolerance : float
         How far the axis may stand from the first setpoint, in m (or rad).
     following_error : float or None
@@ -193,6 +197,8 @@ class CanSpec(Checked, table="can"):
     feed_forward: Literal["none", "velocity", "torque", "both"] = "none"
     torque_per_acceleration: Positive | None = None
     timeout: Annotated[float, Bounds(least=0.001, most=30.0)] | None = None
+    sdo_timeout: Annotated[float, Bounds(least=0.01, most=60.0)] = 2.0
+    state_timeout: Annotated[float, Bounds(least=0.01, most=600.0)] = 5.0
     start_tolerance: Positive = 0.001
     following_error: Positive | None = None
     quick_stop: Positive | None = None

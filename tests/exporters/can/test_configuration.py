@@ -34,12 +34,13 @@ def refused(bench, reason):
         ),
         (
             {"make": DriveVariant(following_error=0xFFFF_FFFF)},
-            r"does not watch its following error \(6065h is FFFFFFFFh",
+            r"does not watch its following error \(6065h is 4294967295 \(FFFFFFFFh\)",
         ),
         ({"make": DriveVariant(following_error=0)}, r"does not watch its following error"),
         (
             {"make": DriveVariant(following_error=0x7FFF_FFFF)},
-            r"window of 2\.15e\+03 \(6065h is 7FFFFFFFh\) is wider than .* set 0\.132 \(132\d{3} counts\)",
+            r"window of 2\.15e\+03 \(6065h is 2147483647 \(7FFFFFFFh\)\) is wider than .* "
+            r"set 0\.132 \(132\d{3} counts\)",
         ),
         (
             {"vendor": 1},
@@ -49,7 +50,7 @@ def refused(bench, reason):
         ({"make": DriveVariant(modes=1)}, r"does not know the mode csp \(6502h\)"),
         (
             {"make": DriveVariant(fixed_period=(2, -3))},
-            r"60C2h:01 \(interpolation period: digits\) must hold 4h, .* keeps 2h",
+            r"60C2h:01 \(interpolation period: digits\) must hold 4 \(4h\), .* keeps 2 \(2h\)",
         ),
     ],
     ids=[
@@ -180,7 +181,8 @@ def test_a_missing_object_that_safety_needs():
     with Bench() as bench:
         drop(bench, 0x6007)
         refused(
-            bench, r"6007h:00 \(connection lost: quick stop\) must hold 3h, but the drive keeps nothing there"
+            bench,
+            r"6007h:00 \(connection lost: quick stop\) must hold 3 \(3h\), but the drive keeps nothing there",
         )
 
 
@@ -221,7 +223,10 @@ def test_the_transmission_type_of_a_controlword_may_be_either_that_is_event_driv
         if fits:
             assert bench.run().phase is Phase.DONE
         else:
-            refused(bench, r"1400h:02 \(controlword: at once\) must hold FFh, but the drive keeps 1h there")
+            refused(
+                bench,
+                r"1400h:02 \(controlword: at once\) must hold 255 \(FFh\), but the drive keeps 1 \(1h\)",
+            )
 
 
 def test_an_object_that_may_not_be_read():

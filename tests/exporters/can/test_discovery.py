@@ -7,7 +7,6 @@ import pytest
 from command_line import run_here
 from exporters.can.bench import Bench
 from exporters.motions import quintic
-from gen_profile_exporters.can.streaming.link import Link
 
 from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.host import clock, detection

@@ -371,7 +371,8 @@ def test_a_drive_that_does_not_switch_on():
         tamper_feedback(lambda word: 0x0250)(bench)
         record = bench.run()
     assert re.search(
-        r"do not reach 'ready to switch on' within 5 s \(cart: switch on disabled\)", record.reason
+        r"do not reach 'ready to switch on' within 5 s \(can.state_timeout\) \(cart: switch on disabled\)",
+        record.reason,
     )
     assert len(bench.of(0x301)) > 1000
     assert_quick_stop_is_last(bench)

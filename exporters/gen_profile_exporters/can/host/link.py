@@ -18,7 +18,11 @@ from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 POLL = NANOSECONDS // 5000  # between two looks for an awaited answer
-ANSWER_TIMEOUT = NANOSECONDS // 2
+ANSWER_TIMEOUT = 0.5  # s, unless it is said
+SEGMENT_ANSWERS, ABORT = (
+    {0: 1, 3: 0},
+    4,
+)  # command specifiers (CiA 301): of segments asked for, of their answers
 FRAMES_AT_ONCE = 64  # a flooded bus must not keep a loop from looking at the clock
 
 
@@ -41,6 +45,8 @@ class Link:
     bus : can.BusABC
         Opened; it stays the caller's.
     clock : Clock
+    answer_timeout : float
+        For which an answer to an SDO is awaited, in s.
 
     Attributes
     ----------
@@ -50,9 +56,10 @@ class Link:
         What must go on while an SDO is awaited: heartbeats, for instance.
     """
 
-    def __init__(self, bus: can.BusABC, clock: Clock) -> None:
+    def __init__(self, bus: can.BusABC, clock: Clock, answer_timeout: float = ANSWER_TIMEOUT) -> None:
         self.bus = bus
         self.clock = clock
+        self.answer_timeout = round(answer_timeout * NANOSECONDS)
         self.launching: Launching | None = None
         self.meanwhile: Callable[[], None] = lambda: None
         self._takers: list[Callable[[can.Message], None]] = []
@@ -133,16 +140,27 @@ class _Sdo(SdoClient):
 
     def send_request(self, request: bytes) -> None:
         """Send as everything is sent, so that a bus that fails is reported as everywhere."""
-        self._link.send(frames.message(self.rx_cobid, bytes(request)))
+        self._request = bytes(request)
+        self._link.send(frames.message(self.rx_cobid, self._request))
 
     def read_response(self) -> bytes:
-        """Wait for the answer, and fail as canopen does when none comes."""
-        deadline = self._link.clock.now() + ANSWER_TIMEOUT
-        while self.responses.empty() and self._link.clock.now() < deadline:
-            if not self._link.receive():
+        """Wait for the answer, and fail as canopen does when none comes; late ones to others do not count."""
+        deadline = self._link.clock.now() + self._link.answer_timeout
+        while self._link.clock.now() < deadline:
+            if not self.responses.empty():
+                if _answers(self.responses.queue[0], self._request):
+                    answer: bytes = super().read_response()
+                    return answer
+                self.responses.get()
+            elif not self._link.receive():
                 self._link.clock.sleep_until(self._link.clock.now() + POLL)
             self._link.meanwhile()
-        if self.responses.empty():
-            raise canopen.SdoCommunicationError("no answer")
-        answer: bytes = super().read_response()
-        return answer
+        raise canopen.SdoCommunicationError(f"no answer within {self._link.answer_timeout / NANOSECONDS:g} s")
+
+
+def _answers(answer: bytes, request: bytes) -> bool:
+    """Whether an answer is to a request, by the object that both name; segments name none."""
+    asked, kind = request[0] >> 5, answer[0] >> 5
+    if asked in SEGMENT_ANSWERS:
+        return kind in {SEGMENT_ANSWERS[asked], ABORT}
+    return answer[1:4] == request[1:4] or (kind == ABORT and not any(answer[1:4]))

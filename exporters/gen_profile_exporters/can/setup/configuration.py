@@ -10,10 +10,9 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
 
+import attrs
 import can
 from canopen.sdo.exceptions import SdoError
-from gen_profile_exporters.can.streaming.link import Link
-from gen_profile_exporters.can.streaming.restoration import (
 
 from gen_profile.support.errors import StreamAborted
 from gen_profile.support.units import AxisScale
@@ -32,15 +31,6 @@ from gen_profile_exporters.can.setup.restoration import (
     settings_of,
     time_of_ours,
 )
-from gen_profile_exporters.can.streaming.standing import trembling
-
-from gen_profile.support.errors import StreamAborted
-from gen_profile.support.units import AxisScale
-from gen_profile_exporters.can import frames, startup
-from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
-from gen_profile_exporters.can.following_window import useful
-from gen_profile_exporters.can.host.clock import NANOSECONDS
-from gen_profile_exporters.can.scaling import Demand, magnitude_counts
 from gen_profile_exporters.can.setup.standing import trembling
 from gen_profile_exporters.can.setup.units import require_position_unit, require_units
 from gen_profile_exporters.exporter import Target
@@ -49,7 +39,6 @@ CIA_402 = 402  # low word of 1000h
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
-RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
 STOP_PATIENCE = 2 * NANOSECONDS  # for one that lost its streamer to brake
 LOOK_AGAIN = NANOSECONDS // 50  # at its state
 SCALING = {0x608F, 0x6091, 0x6092}  # of positions, in the drive
@@ -96,10 +85,8 @@ def configure(
     for node in (nodes := _nodes(link, target)):
         link.send(nmt(PRE_OPERATIONAL, node.number))
         _require_identity(node, target)
-        require_position_unit(node, target.axes[node.column])
-        require_units(node, target)
         if reset_fault:
-            _reset_fault(node)
+            _reset_fault(node, target)
         watched = node.upload(*HEARTBEAT_WATCHED, optional=True)
         if patience := time_of_ours(watched):  # its streamer was killed just now, and it stops by itself
             _wait_while(node, MOVING, patience + STOP_PATIENCE)
@@ -108,6 +95,8 @@ def configure(
         node.download(*HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
     link.meanwhile = meanwhile
     for node in nodes:
+        require_position_unit(node, target.axes[node.column])
+        require_units(node, target)
         _set(node, lists[node.number], restoration)
     return tuple(_require_fit(node, target, demand) for node in nodes)
 
@@ -174,14 +163,30 @@ def _nodes(link: Link, target: Target) -> list[Node]:
 
 def _require_fit(node: Node, target: Target, demand: Demand) -> int:
     """Find a drive that was set up fit to follow; return where its axis stands."""
-    mode = MODES[target.can.mode]
-    if (shown := node.read(0x6061, bits=8)) != mode:
-        raise node.unfit(f"the drive shows mode {shown} (6061h) instead of {mode}.")
+    _require_mode(node, target)
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
         _require_window(node, target, demand)
     _require_travel(node, demand)
     _require_homed(node, target)
     return _require_start(node, target, demand)
+
+
+def _require_mode(node: Node, target: Target) -> None:
+    """Require the mode that was set, which drives may take seconds to change to."""
+    mode, clock = MODES[target.can.mode], node.link.clock
+    deadline = clock.now() + state_patience(target)
+    while (shown := _signed(node.read(0x6061, bits=8), 8)) != mode:
+        if clock.now() > deadline:
+            raise node.unfit(
+                f"the drive shows mode {shown} (6061h) instead of {mode}, still {target.can.state_timeout:g} "
+                "s after it was set (can.state_timeout)."
+            )
+        node.link.wait_until(clock.now() + LOOK_AGAIN)
+
+
+def state_patience(target: Target) -> int:
+    """Tell how long a drive may take to change its state, in ns."""
+    return round(target.can.state_timeout * NANOSECONDS)
 
 
 def _require_identity(node: Node, target: Target) -> None:
@@ -202,7 +207,7 @@ def _require_identity(node: Node, target: Target) -> None:
         )
 
 
-def _reset_fault(node: Node) -> None:
+def _reset_fault(node: Node, target: Target) -> None:
     """Reset a fault, by a rising edge, and give the drive time for it."""
     if state_of(node.read(0x6041, bits=16)) is not State.FAULT:
         return
@@ -212,7 +217,7 @@ def _reset_fault(node: Node) -> None:
             channel.download(0x6040, 0, word.to_bytes(2, "little"))
     except (SdoError, struct.error) as error:
         raise node.silent(error) from error
-    _wait_while(node, FAULTS, RESET_PATIENCE)
+    _wait_while(node, FAULTS, state_patience(target))
 
 
 def _wait_while(node: Node, states: Container[State], patience: int) -> None:
@@ -246,6 +251,8 @@ def _set(node: Node, entries: Sequence[startup.Entry], restoration: Restoration)
     """Write the list in its order where something differs, and require what the drive then holds."""
     final = {(entry.index, entry.sub): entry for entry in entries}
     held = _held(node, final)
+    entries = _with_its_exponent(entries, held)
+    final = {(entry.index, entry.sub): entry for entry in entries}
     changed = [(entry.index, entry.sub) for entry, _ in _differing(held, final)]
     if not changed:
         return
@@ -260,11 +267,12 @@ def _set(node: Node, entries: Sequence[startup.Entry], restoration: Restoration)
             node.download(entry.index, entry.sub, _written(entry, held))
     if differing := _differing(_held(node, final), final):
         entry, kept = differing[0]
-        holds = "nothing" if kept is None else f"{int.from_bytes(kept, 'little'):X}h"
+        show = "{:X}h".format if entry.is_code else _shown
+        holds = "nothing" if kept is None else show(int.from_bytes(kept, "little"))
         raise node.unfit(
             f"{entry.index:04X}h:{entry.sub:02X} ({entry.meaning}) must hold "
-            f"{int.from_bytes(entry.data, 'little'):X}h, but the drive keeps {holds} there; set the drive, "
-            "or adapt the spec to it."
+            f"{show(int.from_bytes(entry.data, 'little'))}, but the drive keeps {holds} there; set the "
+            "drive, or adapt the spec to it."
         )
 
 
@@ -318,17 +326,36 @@ def _interpolation_period(objects: Mapping[Place, bytes | None]) -> Decimal | No
     return Decimal(int.from_bytes(digits, "little")).scaleb(int.from_bytes(exponent, "little", signed=True))
 
 
+def _with_its_exponent(
+    entries: Sequence[startup.Entry], held: Mapping[Place, bytes | None]
+) -> tuple[startup.Entry, ...]:
+    """State the interpolation period by the power of ten that the drive holds, if it can be: some keep it."""
+    period = _interpolation_period({(entry.index, entry.sub): entry.data for entry in entries})
+    kept = held[PERIOD_EXPONENT]
+    if period is None or kept is None:
+        return tuple(entries)
+    exponent = int.from_bytes(kept, "little", signed=True)
+    digits = period.scaleb(-exponent)
+    if not (1 <= digits <= frames.MOST_DIGITS and digits == int(digits)):
+        return tuple(entries)
+    own = {PERIOD_DIGITS: int(digits), PERIOD_EXPONENT: exponent}
+    places = [(entry.index, entry.sub) for entry in entries]
+    return tuple(
+        attrs.evolve(entry, value=own.get(at, entry.value)) for entry, at in zip(entries, places, strict=True)
+    )
+
+
 def _require_window(node: Node, target: Target, demand: Demand) -> None:
     """Require a window that stops the axis soon; ours is beside it, but the drive's works without the bus."""
     window, widest = node.read(0x6065), useful(demand, target)[node.column]
     scale = abs(target.axes[node.column].counts_per_si)
     cure = f"set {widest / scale:.3g} ({widest} counts) or less there, or state can.following_error"
     if window in {0, WINDOW_OFF}:
-        raise node.unfit(f"the drive does not watch its following error (6065h is {window:X}h); {cure}.")
+        raise node.unfit(f"the drive does not watch its following error (6065h is {_shown(window)}); {cure}.")
     if window > widest:
         raise node.unfit(
             f"the drive's following error window of {window / scale:.3g} (6065h is "
-            f"{window:X}h) is wider than is useful for this motion; {cure}."
+            f"{_shown(window)}) is wider than is useful for this motion; {cure}."
         )
 
 
@@ -382,5 +409,10 @@ def _require_inside(actual: int, node: Node, axis: AxisScale, demand: Demand) ->
         )
 
 
-def _signed(value: int) -> int:
-    return value - (1 << 32) if value >> 31 else value
+def _signed(value: int, bits: int = 32) -> int:
+    return value - (1 << bits) if value >> (bits - 1) else value
+
+
+def _shown(value: int) -> str:
+    """Spell a number as people and as manuals do."""
+    return f"{value} ({value:X}h)"

@@ -13,12 +13,10 @@ from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.setup.standing import Standing
 from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
-from gen_profile_exporters.can.streaming.link import Link
-from gen_profile_exporters.can.streaming.standing import Standing
 
 MAPPING = 0x200  # from a PDO's parameters to its mapping
 MOST_MAPPED = 64  # entries of a mapping (CiA 301); greater counts are of another kind of PDO
-HEARTBEAT_WATCHED = (0x1016, 1)
+HEARTBEAT_WATCHED, SYNC_PERIOD, SYNC_COUNTER = (0x1016, 1), (0x1006, 0), (0x1019, 0)
 PATIENCE = 2 * NANOSECONDS  # for a drive to come to rest
 SILENCE = (StreamAborted, SdoError, struct.error)  # no answer, or none that means anything
 
@@ -103,7 +101,9 @@ def time_of_ours(watched: bytes | None) -> int:
 
 
 def pdo_of(index: int) -> int:
-    """Tell whose parameters an object or mapping belongs to; itself where it is of no PDO."""
+    """Tell with what an object changes: a mapping with its PDO, the counter of SYNC with its period."""
+    if index == SYNC_COUNTER[0]:
+        return SYNC_PERIOD[0]
     return index - MAPPING if index - MAPPING in PDO_PARAMETERS else index
 
 
@@ -122,6 +122,9 @@ def settings_of(
         Reads another object of the drive.
     """
     changed = [place for place in changed if place != HEARTBEAT_WATCHED]
+    if SYNC_COUNTER in changed and held[SYNC_PERIOD] is not None:  # which changes only while no period is set
+        yield *SYNC_PERIOD, bytes(4)
+        changed = [place for place in changed if place != SYNC_PERIOD] + [SYNC_PERIOD]
     pdos = {pdo_of(index) for index, _ in changed} & PDO_PARAMETERS
     pdos = {index for index in pdos if held.get((index + MAPPING, 0)) is not None}
     for index in sorted(pdos):

@@ -130,7 +130,7 @@ class DriveBank:
             return
         if message.arbitration_id == frames.SYNC:
             self._synced = self._clock.now()
-            self._synchronise(str(message.channel))
+            self._synchronise(str(message.channel), len(message.data))
             return
         data = bytearray(message.data)
         for drive in self.drives:
@@ -139,14 +139,14 @@ class DriveBank:
             with suppress(struct.error):  # canopen cannot refuse a request that goes on with none
                 self._network.notify(message.arbitration_id, data, message.timestamp)
 
-    def _synchronise(self, channel: str) -> None:
+    def _synchronise(self, channel: str, length: int) -> None:
         """Have drives tell where they are now, and then set out for the next SYNC, once all had theirs."""
         if self._channels and channel not in self._waiting:  # another bus had none
             self._set_out()
         for number, drive in enumerate(self.drives):
             if not self._channels or self._channels[number] == channel:
                 self._tell(drive.feedback())
-                drive.synchronise()
+                drive.synchronise(length)
         self._waiting.discard(channel)
         if not self._waiting:
             self._set_out()

@@ -23,7 +23,7 @@ PDO_BITS = 64  # what a frame carries
 NOT_MAPPABLE, PDO_TOO_LONG = 0x0604_0041, 0x0604_0042
 OUT_OF_RANGE, WRONG_STATE = 0x0609_0030, 0x0800_0022
 TRANSMISSION_TYPES = {*range(241), *AT_ONCE}  # the others are reserved, or wait for remote requests
-PERIOD = 0x60C2
+PERIOD, SYNC_COUNTER = 0x60C2, 0x1019
 RATE_UNITS = {0x60A9, 0x60AA}  # of velocity and acceleration
 WINDOW = 50_000  # counts; a drive's own following error window
 
@@ -43,6 +43,12 @@ class DriveVariant:
         Periods in a row.
     fixed_period : (int, int) or None
         60C2h cannot be changed: digits and power of ten.
+    period_exponent : int or None
+        The only power of ten that 60C2h takes.
+    sync_counter : int
+        1019h; where it is not 0, a SYNC must carry a counter.
+    mode_delay : float
+        Time in s until 6061h shows a mode that 6060h asked for.
     own_mapping : bool
         Its PDOs come with another content and other COB-IDs than CiA 402 proposes.
     fixed_pdos : FixedPdosSpec
@@ -68,6 +74,9 @@ class DriveVariant:
     miss: str = "extrapolate"
     misses: int = 3
     fixed_period: tuple[int, int] | None = None
+    period_exponent: int | None = None
+    sync_counter: int = 0
+    mode_delay: float = 0.0
     own_mapping: bool = False
     fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
     following_error: int = WINDOW
@@ -111,6 +120,9 @@ def _own_values(node: int, make: DriveVariant) -> dict[tuple[int, int], int]:
     values |= {(0x60A8 + place, 0): unit for place, unit in enumerate(make.units)}
     values |= {(0x608F, sub): number for sub, number in enumerate(make.encoder, start=1)}
     values |= {(0x6065, 0): make.following_error, (0x6502, 0): make.modes}
+    values[SYNC_COUNTER, 0] = make.sync_counter
+    if make.period_exponent is not None:
+        values[PERIOD, 2] = make.period_exponent
     if make.fixed_period is not None:
         values |= dict(zip(((PERIOD, 1), (PERIOD, 2)), make.fixed_period, strict=True))
     asked_for = 0 if make.remote_requests else NO_REMOTE_REQUEST
@@ -171,6 +183,10 @@ def refusal(
     index, sub = place
     if index == 0x6060:
         return None if value == 0 or supports(held(0x6502, 0), value) else OUT_OF_RANGE
+    if index == SYNC_COUNTER:
+        return WRONG_STATE if held(0x1006, 0) else None
+    if place == (PERIOD, 2) and make.period_exponent is not None:
+        return None if value == make.period_exponent & 0xFF else OUT_OF_RANGE
     if index in RATE_UNITS:
         return None if (value ^ held(index, 0)) & 0xFF_FFFF == 0 else OUT_OF_RANGE
     asked_for = sub == 1 and not value & NO_REMOTE_REQUEST

@@ -34,7 +34,7 @@ from gen_profile_exporters.can.simulation.drive_dictionary import (
 )
 from gen_profile_exporters.can.startup import AT_ONCE, OFF
 
-HEARTBEAT_LOST, SETPOINT_LOST = 0x8130, 0x8250  # EMCY codes of CiA 301
+HEARTBEAT_LOST, SYNC_LENGTH, SETPOINT_LOST = 0x8130, 0x8240, 0x8250  # EMCY codes of CiA 301
 FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
 MOST_SYNCS = 240  # a transmission type up to this is the number of SYNCs from one TPDO to the next
 INHIBIT_UNIT = NANOSECONDS // 10_000
@@ -73,6 +73,7 @@ class SimulatedDrive:
         self._heard: dict[int, int] = {}  # by RPDO, when
         self._master_heard: int | None = None
         self._syncs = 0
+        self._mode_asked: tuple[int, int | None] | None = None  # and since when
         self._last_sent: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
         self.local: Any = _Node(node, make, self.value)
         self.local.add_write_callback(self._written)
@@ -129,8 +130,11 @@ class SimulatedDrive:
                 else:
                     self._waiting[pdo] = data
 
-    def synchronise(self) -> None:
-        """Take what was sent for this SYNC."""
+    def synchronise(self, length: int) -> None:
+        """Take what was sent for this SYNC, which has a byte of data where it counts."""
+        if length != bool(self.value(0x1019)):
+            self.local.emcy.send(SYNC_LENGTH, 1)
+            return
         waiting, self._waiting = self._waiting, {}
         for pdo, data in waiting.items():
             self._take(pdo, data)
@@ -143,7 +147,14 @@ class SimulatedDrive:
             self._fresh |= index in SETPOINTS
 
     def watch(self, now: int) -> None:
-        """Look for a master that fell silent."""
+        """Look for a master that fell silent, and change to the mode that was asked for."""
+        if self._mode_asked is not None:
+            mode, since = self._mode_asked
+            since = now if since is None else since
+            self._mode_asked = mode, since
+            if now - since >= self.make.mode_delay * NANOSECONDS:
+                self.store(0x6061, 0, mode)
+                self._mode_asked = None
         if self.state is not State.ENABLED:
             return
         wait = self.value(0x1016, 1) & 0xFFFF
@@ -212,8 +223,10 @@ class SimulatedDrive:
             self._obey(int.from_bytes(data, "little"))
         elif index == 0x6060:
             mode = int.from_bytes(data, "little", signed=True)
-            if mode == 0 or supports(self.value(0x6502), mode):
+            if not self.make.mode_delay and (mode == 0 or supports(self.value(0x6502), mode)):
                 self.store(0x6061, 0, mode)
+            elif self.make.mode_delay:
+                self._mode_asked = mode, None
 
     def _obey(self, word: int) -> None:
         """Change state as a controlword commands (CiA 402-2, table of transitions)."""

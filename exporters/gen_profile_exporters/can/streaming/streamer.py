@@ -33,7 +33,6 @@ from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
-PATIENCE = 5 * NANOSECONDS  # for a change of state (brakes take their time), and for settling
 LISTEN = NANOSECONDS // 10  # for someone else in command, before anything is sent; two cycles at least
 STOP_MARGIN = NANOSECONDS // 2  # beyond the ramp, for the answer that the axes stand
 
@@ -73,7 +72,8 @@ class Streamer:
         self._source, self._clock, self._tell = source, clock, tell
         self._target = target = source.target
         self._reset_fault = reset_fault
-        self._link = Link(bus, clock)
+        self._link = Link(bus, clock, target.can.sdo_timeout)
+        self._patience = configuration.state_patience(target)  # brakes take their time, and settling does
         self._pacer = Pacer(self._link, target)
         self._watch = Watch(target, clock)
         self._link.subscribe(self._watch.take)
@@ -215,7 +215,7 @@ class Streamer:
         """Repeat the last setpoint until the axes stand at it."""
         self._begin(Phase.HOLD)
         allowed = [magnitude_counts(self._target.can.start_tolerance, axis) for axis in self._target.axes]
-        settled, heard, deadline = 0, 0, self._clock.now() + PATIENCE
+        settled, heard, deadline = 0, 0, self._clock.now() + self._patience
         while settled < SETTLED_CYCLES:
             self._cycle(last.messages, last.position)
             apart = [
@@ -263,15 +263,24 @@ class Streamer:
 
     def _command(self, word: int, state: State, setpoints: Cycle, *, bits: int = 0) -> None:
         """Send a controlword every cycle until all drives are in a state."""
-        cycle, deadline = self._pacer.commanding(word, setpoints), self._clock.now() + PATIENCE
+        cycle, deadline = self._pacer.commanding(word, setpoints), self._clock.now() + self._patience
         while not all(axis.state is state and axis.statusword & bits == bits for axis in self._watch.axes):
             if self._clock.now() > deadline:
-                words = ", ".join(f"{axis.name}: {axis.state.words}" for axis in self._watch.axes)
-                raise StreamAborted(
-                    f"The drives do not reach {state.words!r} within {PATIENCE // NANOSECONDS} s ({words}); "
-                    "check power, brakes and enabling inputs."
-                )
+                raise StreamAborted(self._not_reached(state))
             self._cycle(cycle)
+
+    def _not_reached(self, state: State) -> str:
+        """Say what is missing of a state: the state itself, or that the drives follow in it."""
+        words = ", ".join(f"{axis.name}: {axis.state.words}" for axis in self._watch.axes)
+        waited = f"within {self._target.can.state_timeout:g} s (can.state_timeout)"
+        if any(axis.state is not state for axis in self._watch.axes):
+            cure = "check power, brakes and enabling inputs"
+            return f"The drives do not reach {state.words!r} {waited} ({words}); {cure}."
+        idle = ", ".join(axis.name for axis in self._watch.axes if not axis.statusword & FOLLOWS)
+        return (
+            f"axis {idle}: the drive is enabled, but says that it follows no setpoints {waited}: bit 12 of "
+            "its statusword is not set; check the mode of operation, and whether it takes SYNC and setpoints."
+        )
 
     def _cycle(self, messages: Cycle, led: Integers | None = None) -> None:
         """Send frames and SYNC at the next instant, by which the axes are led to a place; judged before."""

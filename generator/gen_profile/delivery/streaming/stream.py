@@ -146,9 +146,6 @@ def actual_positions(source: Source, port: Port, tell: Progress) -> tuple[float,
     StreamAborted
         Another master is in command, or a drive does not tell.
     """
-    from gen_profile_exporters.can.streaming.configuration import positions  # noqa: PLC0415  # canopen
-    from gen_profile_exporters.can.streaming.link import Link  # noqa: PLC0415
-
     from gen_profile_exporters.can.host.link import Link  # noqa: PLC0415
     from gen_profile_exporters.can.setup.configuration import positions  # noqa: PLC0415  # canopen
     from gen_profile_exporters.can.streaming.discovery import listen  # noqa: PLC0415  # is an extra
@@ -157,7 +154,7 @@ def actual_positions(source: Source, port: Port, tell: Progress) -> tuple[float,
     target = source.plan.target
     tell("asking where the axes stand")
     with opened(port, target) as bus:
-        link = Link(bus, SystemClock())
+        link = Link(bus, SystemClock(), target.can.sdo_timeout)
         listen(link)
         counts = positions(link, target, source.plan.demand)
     return tuple(at / axis.counts_per_si for at, axis in zip(counts, target.axes, strict=True))

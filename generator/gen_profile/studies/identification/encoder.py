@@ -11,7 +11,6 @@ import attrs
 import numpy as np
 from can import BusABC, CanError, Message
 from canopen.sdo.exceptions import SdoError
-from gen_profile_exporters.can.streaming.link import Link
 
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import OutputError
