@@ -168,7 +168,7 @@ def test_a_companion_that_only_an_earlier_export_wrote_is_noted(tmp_path):
 def planned(tmp_path_factory):
     """A planner block in all forms that take it, as if it were proved."""
     folder = tmp_path_factory.mktemp("planned")
-    names = [*(name for name in containers() if name != "siemens-scl"), *PROGRAMS]
+    names = [*containers(), *PROGRAMS]
     files = block_files(planner_block(PLANNED), PLANNED, names)
     deliver_planner(folder, PLANNED, files, passed=True, histories=1)
     return folder, [file.filename for file in files]

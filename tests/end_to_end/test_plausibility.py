@@ -111,8 +111,6 @@ def played(spec, command, form):
 def test_no_format_of_ours_is_ever_in_doubt(move, form, cycle_time, counts):
     spec, command = planned(*move)
     spec = for_controller(held_to_its_peaks(spec, command), form, cycle_time, counts)
-    if form == "siemens-scl":  # whose data block holds no more
-        spec = attrs.evolve(spec, export=attrs.evolve(spec.export, plc_layout="segments"))
     try:
         setpoints = played(spec, command, form)
     except ExportError:  # too many points for its cams

@@ -65,6 +65,7 @@ def run_of(path, **changes):
         "si_units": {"cart.setpoint_acceleration": "m/s^2", "sway.payload": "m", "L1": "m"},
         "stated_units": {},
         "parameters": {},
+        "step": None,
         "time_limit": 60.0,
     }
     return ForeignRun(**{**given, **changes})

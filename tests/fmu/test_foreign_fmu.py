@@ -301,6 +301,7 @@ def test_damaged_descriptions_are_read_or_refused(tmp_path_factory, changes):
         "output_names": ["sway.hook"],
         "si_units": {"cart.setpoint_acceleration": "m/s^2", "sway.hook": "m", "L1": "m"},
         "stated_units": {},
+        "step": None,
         "parameters": {"L1": (0.5, "m", "L1"), "m2": (0.5, "kg", None)},
     }
     with suppress(CosimulationError):

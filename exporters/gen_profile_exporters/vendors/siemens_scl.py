@@ -30,7 +30,9 @@ from gen_profile_exporters.playback.structured_text import block_text, literal, 
 from gen_profile_exporters.setpoints import axis_table
 from gen_profile_exporters.vendors.cam_points import spline_cycles, spline_error
 
-MOST_BYTES = 64_000  # of a data block that is not optimised
+# of an optimised block in an S7-1500; a standard block holds 64 kB (Siemens, Programming Guideline for
+# S7-1200/1500, entry 81318674, section 2.6)
+MOST_BYTES = 16_000_000
 MOST_POINTS = 10_000  # TO_Cam_10k
 POINT_ERROR = 1e-6  # m (or rad)
 BYTES = {"LREAL": 8, "DINT": 4}
@@ -77,8 +79,8 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
         elif is_buffered(source):
             cure = 'export.plc_tables = "constants"'
         raise ExportError(
-            f"siemens-scl: the block's numbers take {size / 1000:.1f} kB, a data block holds "
-            f"{MOST_BYTES / 1000:g} kB; take {cure}."
+            f"siemens-scl: the block's numbers take {size / 1e6:.2f} MB, an optimised data block "
+            f"of an S7-1500 holds {MOST_BYTES / 1e6:g} MB; take {cure}."
         )
     wrappers, others = axis_wrappers(source, len(target.axes), SIEMENS), []
     if is_buffered(source):

@@ -64,14 +64,26 @@ def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Pat
         found = np.array([follow(machine) for machine in job["machines"]])
     except FMICallException as error:
         reason = f", saying: {said[-1][:LONGEST_MESSAGE]}" if said else "."
+        cure = _step_cure(description, job) if error.function.endswith("DoStep") else ""
         raise CosimulationError(
-            f"{archive.name}: the FMU refused {error.function} (status {error.status}){reason}"
+            f"{archive.name}: the FMU refused {error.function} (status {error.status}){reason}{cure}"
         ) from error
     except Exception as error:  # FMPy raises nothing more special
         raise CosimulationError(f"{archive.name}: the FMU cannot be run: {error}") from error
     for column, name in enumerate(job["output_names"]):
         found[:, :, column] = conversions[name].to_si(found[:, :, column])
     return found, remarks
+
+
+def _step_cure(description: Any, job: Mapping[str, Any]) -> str:
+    """Name the key for an FMU that declares to take steps of one length only."""
+    if job["step"] is not None or description.coSimulation.canHandleVariableCommunicationStepSize:
+        return ""
+    usual = description.defaultExperiment and description.defaultExperiment.stepSize
+    return (
+        f" It declares to take communication steps of one length only: state it, such as check.step = "
+        f"{float(usual or 0.01):g}."
+    )
 
 
 def _description(name: str, unpacked: Path) -> Any:
@@ -162,7 +174,8 @@ def _run(
     fmu.enterInitializationMode(**({} if second else {"startTime": start, "stopTime": stop}))
     fmu.exitInitializationMode()
     rows = [read(y)]
-    for time, size, held in zip(times[:-1].tolist(), np.diff(times).tolist(), inputs.tolist(), strict=True):
+    steps = np.diff(times) if job["step"] is None else np.full(len(inputs), job["step"])
+    for time, size, held in zip(times[:-1].tolist(), steps.tolist(), inputs.tolist(), strict=True):
         write(u, held)
         fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size)
         rows.append(read(y))

@@ -39,6 +39,8 @@ class ForeignRun:
         start values are compared with.
     time_limit : float
         For all runs together, in s.
+    step : float or None
+        Of all communication steps in s, where the FMU takes no other.
     """
 
     archive: Path
@@ -51,6 +53,7 @@ class ForeignRun:
     stated_units: Mapping[str, float]
     parameters: Mapping[str, tuple[float, str, str | None]]
     time_limit: float
+    step: float | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -91,7 +94,13 @@ def write_job(run: ForeignRun, folder: Path) -> None:
     kept = ("si_units", "stated_units", "parameters")
     mappings = {name: dict(getattr(run, name)) for name in kept}
     machines = [dict(machine) for machine in run.machines]
-    job = {"archive": str(run.archive.absolute()), "machines": machines, **names, **mappings}
+    job = {
+        "archive": str(run.archive.absolute()),
+        "machines": machines,
+        "step": run.step,
+        **names,
+        **mappings,
+    }
     (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
     np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
 

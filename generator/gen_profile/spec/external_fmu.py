@@ -15,7 +15,7 @@ from gen_profile.support.bounded_file import read_bounded
 from gen_profile.support.private_folder import agree
 from gen_profile.support.units import units_of
 
-KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "units", "time_limit")
+KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "units", "time_limit", "step")
 INPUTS = tuple(FED_RATES)
 TIME_LIMIT = 60.0  # s
 FILE = Annotated[
@@ -56,6 +56,7 @@ def external_fmu(
         sway=_sway(given.get("output"), plant, structurer),
         parameters=structurer.fit(given.get("parameters", {}), kinds["parameters"], "check.parameters", {}),
         time_limit=structurer.fit(limit, kinds["time_limit"], "check.time_limit", TIME_LIMIT),
+        step=structurer.fit(given.get("step"), kinds["step"], "check.step", None),
     )
     return attrs.evolve(foreign, units=_units(given.get("units", {}), foreign, plant, structurer))
 

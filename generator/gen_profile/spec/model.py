@@ -249,6 +249,8 @@ class ExternalFmu(Checked, table="check"):
         What its variables are in, where that differs from what the FMU declares, if it does.
     time_limit : float
         s, for all scenarios together.
+    step : float or None
+        s, the only communication step that it takes; None where it takes any.
     """
 
     name: str
@@ -260,6 +262,7 @@ class ExternalFmu(Checked, table="check"):
     parameters: Annotated[Mapping[ParameterName, str], example('L1 = "rope"')]
     units: Annotated[Mapping[VariableName, str], example('rope = "mm"')] = NONE
     time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found {found}")]
+    step: Annotated[float, Bounds(least=1e-6, most=1.0, meaning="s (4 ms are 0.004)")] | None = None
 
     def si_units(self, plant: Plant) -> dict[str, str]:
         """Name the SI unit of each of its variables."""
@@ -278,6 +281,7 @@ class ExternalFmu(Checked, table="check"):
             "parameters": dict(self.parameters),
             **({"units": dict(self.units)} if self.units else {}),
             "time_limit": self.time_limit,
+            **({"step": self.step} if self.step is not None else {}),
         }
 
 

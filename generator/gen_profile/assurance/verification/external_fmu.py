@@ -30,7 +30,8 @@ def judge_external(
     """Let an external FMU judge replayed setpoints.
 
     Its inputs are held over communication steps; the same with steps of half the length tells how much its
-    integration errs.
+    integration errs. Where it takes steps of one length only, the same half a step later tells what comes of
+    holding the inputs, and nothing tells what its integration errs by.
 
     Parameters
     ----------
@@ -83,11 +84,22 @@ def _judged(
     rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
     times = np.concatenate([times, times[-1] + held])
     inputs = np.concatenate([inputs, np.repeat(rest, len(held), axis=0)])
+    if foreign.step is not None:
+        later = _in_steps(foreign.input, times, inputs, foreign.step, 0.5 * foreign.step)
+        times, inputs = _in_steps(foreign.input, times, inputs, foreign.step)
     result = _run(spec, foreign, times, inputs, rows)
-    finer = _run(spec, foreign, *_halved(foreign, times, inputs), rows).outputs[:, ::2]
     after = times >= since * (1.0 - 1e-12)
-    responses, finer = result.outputs[:, after], finer[:, after]
-    error = float(np.abs(responses - finer).max()) + max(above_samples(sways) for sways in responses)
+    responses = result.outputs[:, after]
+    if foreign.step is None:
+        finer = _run(spec, foreign, *_halved(foreign, times, inputs), rows).outputs[:, ::2]
+        error = float(np.abs(responses - finer[:, after]).max())
+    else:  # by a sampling of the same motion between those of this one
+        after = later[0] >= since + 0.5 * foreign.step
+        others = _run(spec, foreign, *later, rows).outputs[:, after]
+        error = max(
+            float(np.abs(peak(one) - peak(other)).max()) for one, other in zip(responses, others, strict=True)
+        )
+    error += max(above_samples(sways) for sways in responses)
     findings = [_finding(foreign, row, sways) for row, sways in zip(rows, responses, strict=True)]
     return findings, error, result.remarks
 
@@ -123,8 +135,22 @@ def _run(
             stated_units=stated,
             parameters=parameters,
             time_limit=foreign.time_limit,
+            step=foreign.step,
         )
     )
+
+
+def _in_steps(kind: str, times: Array, inputs: Array, step: float, delay: float = 0.0) -> tuple[Array, Array]:
+    """Feed the same in steps of one length, a while later: setpoints at their ends, of others the means."""
+    count = grid_length(times[-1] - times[0] + delay, step)
+    grid = times[0] + grid_times(count, step)
+    if kind == "setpoint":
+        places = (np.interp(grid[1:] - delay, times[1:], column) for column in inputs.T)
+        return grid, np.column_stack(list(places))
+    held = np.diff(times)[:, None] * inputs
+    reached = np.concatenate([np.zeros_like(held[:1]), np.cumsum(held, axis=0)])
+    changes = (np.diff(np.interp(grid - delay, times, column)) for column in reached.T)
+    return grid, np.column_stack(list(changes)) / step
 
 
 def _halved(foreign: ExternalFmu, times: Array, inputs: Array) -> tuple[Array, Array]:

@@ -29,7 +29,7 @@ MOST_ADDRESS, MOST_STATE = 16_384, 262_144  # bytes, as it is written and unpack
 KEY = re.compile(r"[a-z]+(\.[A-Za-z0-9_-]+){0,4}")
 # which program runs is for the studio's user to say, not for an address
 FIXED = re.compile(
-    r"(plant\.(type|file|file_sha256)|check\.(fmu|fmu_sha256|input|output|parameters|units))(\..*)?"
+    r"(plant\.(type|file|file_sha256)|check\.(fmu|fmu_sha256|input|output|parameters|units|step))(\..*)?"
 )
 
 
