@@ -95,13 +95,13 @@ def take_turns(config: pytest.Config, items: list[pytest.Item]) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
     """Take over what a process noted, if it did not die."""
-    if told := getattr(node, "workeroutput", {}).get("turn"):
-        node.config.stash[TURN] = told
+    if line := getattr(node, "workeroutput", {}).get("turn"):
+        node.config.stash[TURN] = line
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    if told := config.stash.get(TURN, ""):
-        terminalreporter.write_line(told)
+    if line := config.stash.get(TURN, ""):
+        terminalreporter.write_line(line)
 
 
 def pytest_collection_finish() -> None:

@@ -67,6 +67,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "code", "sentence"), REFUSED)
 def test_what_cannot_be_is_refused_in_a_sentence(tmp_path, monkeypatch, words, code, sentence):
     monkeypatch.chdir(tmp_path)

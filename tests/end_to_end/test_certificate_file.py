@@ -33,6 +33,7 @@ def copied(certified, tmp_path):
     return artefact, artefact.with_name(f"{artefact.name}.certificate.json")
 
 
+@pytest.mark.slow
 def test_a_certificate_is_made_beside_the_file_and_holds_when_checked_again(certified):
     artefact, made = certified
     beside = artefact.with_name(f"{artefact.name}.certificate.json")

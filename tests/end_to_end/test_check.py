@@ -60,6 +60,7 @@ def assert_sways_as(check, positions):
     return np.array(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper.csv", "paper.st", "paper.log"])
 def test_every_artefact_passes_as_it_was_exported(folder, name):
     outcome = run_here("check", folder / name, "--json")
@@ -194,6 +195,7 @@ def test_without_a_manifest_the_spec_must_be_named(folder):
     assert error.endswith("SPEC.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["preset", "file"])
 def test_with_a_spec_a_lone_artefact_can_be_judged(folder, how):
     (folder / "manifest.json").unlink()
@@ -254,6 +256,7 @@ DAMAGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())
 def test_a_damaged_manifest_is_a_sentence(folder, damage):
     damage(folder)

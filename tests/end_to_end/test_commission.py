@@ -89,6 +89,7 @@ def test_answers_are_kept_where_the_log_is_not_there(site):
     assert "Most like which" not in commissioned(site, answers=[]).stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "reason"),
     [(("--swing", "nun.csv"), "There is no log nun.csv"), (("--export", "plk"), "unknown format 'plk'")],

@@ -57,6 +57,7 @@ def test_all_companions_of_all_formats_are_tried(exported):
     assert {first: others for first, *others in by_format.values() if others} == COMPANIONS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("main", "companion"), PAIRS)
 def test_one_altered_character_of_a_companion_fails_the_check(folder, main, companion):
     due = dict.fromkeys(COMPANIONS[main], "matches")
@@ -174,6 +175,7 @@ def planned(tmp_path_factory):
     return folder, [file.filename for file in files]
 
 
+@pytest.mark.slow
 def test_no_file_of_a_planner_block_may_be_altered(planned):
     folder, (main, *others) = planned
     assert len(others) > 10

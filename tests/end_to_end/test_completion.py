@@ -41,6 +41,7 @@ def test_offers_only_what_begins_so():
     assert offered("--export", "p") == {"plc", "plcopen-xml"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_prints_a_script_to_source(shell):
     outcome = run_process(_GEN_PROFILE_COMPLETE=f"{shell}_source")

@@ -29,6 +29,7 @@ def designs(spec):
     return {contender.method: contender.design for contender in candidates(spec)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("tau", [None, 0.1])
 def test_every_shaper_takes_its_own_shortest_time(base, tau):

@@ -258,6 +258,7 @@ def test_options_that_do_not_go_together_are_refused(options, words, files, acce
     assert found.code == 2 and words in found.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "code", "words"),
     [
@@ -361,6 +362,7 @@ def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
     assert found.code == 6 and "shows no block with aRequest" in found.err
 
 
+@pytest.mark.slow
 def test_broken_connections_are_taken_up(files, plc, access, monkeypatch):
     table = read_table(files / "new" / "paper.st")
     with closing(

@@ -61,6 +61,7 @@ def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     assert watched.document["moving"] == watched.document["exact"] > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "code", "error"),
     [

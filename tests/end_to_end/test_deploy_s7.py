@@ -42,6 +42,7 @@ def plc(tables):
         yield simulated, ("--to", url, "--db", f"{NUMBER}", "--security", "none")
 
 
+@pytest.mark.slow
 def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     old, new = files / "old" / "paper.scl", files / "new" / "paper.scl"
     simulated, where = plc
@@ -59,6 +60,7 @@ def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     assert watched.document["moving"] == watched.document["exact"] > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "code", "error"),
     [

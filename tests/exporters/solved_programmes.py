@@ -106,7 +106,7 @@ class Problem:
         found = linprog(costs, matrix, most + slack, *due, ends, "highs")
         return found.x if found.status == 0 else None
 
-    def missed(self, speeds):
+    def shortfall(self, speeds):
         """By how much speeds miss anything."""
         matrix, most = self.inequalities()
         return max(

@@ -192,6 +192,7 @@ def test_what_stands_beside_the_declarations_is_refused(container, tables, place
             container.replay(altered.encode(), goal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("container", [plcopen_xml, codesys])
 @TABLES
 @pytest.mark.parametrize(

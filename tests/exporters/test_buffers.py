@@ -76,6 +76,7 @@ def started(fb):
     return fb.call(bExecute=True, fActPosition=fb["tStart"], fCycleTime=CYCLE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", [ONE, TWO], ids=["one axis", "two axes"])
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_it_plays_what_the_block_of_constants_plays(layout, profile):
@@ -88,6 +89,7 @@ def test_it_plays_what_the_block_of_constants_plays(layout, profile):
     assert replayed.payload_hash() == table.motion().payload_hash()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", [ONE, TWO], ids=["one axis", "two axes"])
 @pytest.mark.parametrize("form", containers())
 def test_every_format_carries_it(form, profile):
@@ -134,6 +136,7 @@ def test_a_start_waits_until_the_new_table_is_checked():
     assert rows[-1]["bdone"] and column(rows, "position")[-1] == OTHER.target
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start_first", [False, True])
 @pytest.mark.parametrize(
     ("place", "library"),
@@ -157,6 +160,7 @@ def test_a_wrong_table_is_left_again_and_never_played(place, library, start_firs
     assert client.ask(READ)[9] == 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [float("nan"), -1.0, 1e300, 2e9, 2000.0])
 @pytest.mark.parametrize("place", [0, 2, 3, 4, 7])
 def test_sizes_that_lead_out_of_the_buffer_are_never_used(place, value):
@@ -208,7 +212,7 @@ def test_nothing_is_switched_while_it_moves_or_waits():
 
 
 def test_an_aborted_motion_is_not_continued_on_another_table():
-    fb = checked(text_of(ONE))
+    fb = checked(text_of(quintic((0.1, 0.4))))
     client, values = Client(fb), values_of(text_of(OTHER))
     started(fb)
     client.write(values)
@@ -283,6 +287,7 @@ def test_it_is_for_its_own_axes_only(layout, names, other):
         structured_text.read_table(text_of(ONE, layout), elsewhere)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", [(ONE, OTHER), (TWO, TWO)], ids=["one axis", "two axes"])
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_a_library_plays_each_of_its_motions_and_takes_another_one(layout, profile):
@@ -315,6 +320,7 @@ def test_a_library_reads_back_to_what_was_put_in():
         structured_text.read_table(text, goal)
 
 
+@pytest.mark.slow
 def test_a_table_beyond_a_buffer_is_refused():
     long = goal_of(quintic((0.0, 1.0), duration=3000.0), "samples")
     with pytest.raises(ExportError, match="do not fit a buffer"):

@@ -33,8 +33,8 @@ def differences(programmes, seed, numbers):
         found += result == FOUND
         if result != (NONE if due is None else FOUND):
             words.append(f"{number}: {result} after {iterations}, HiGHS {due is not None}")
-        elif due is not None and problem.missed(speeds) > MET:
-            words.append(f"{number}: missed by {problem.missed(speeds)}")
+        elif due is not None and problem.shortfall(speeds) > MET:
+            words.append(f"{number}: missed by {problem.shortfall(speeds)}")
         elif due is not None and problem.costs is not None and problem.costs @ (speeds - due) > LEAST:
             words.append(f"{number}: costs {problem.costs @ speeds}, HiGHS {problem.costs @ due}")
     return words, found

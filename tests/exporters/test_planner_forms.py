@@ -218,6 +218,7 @@ class TestInPython:
         assert planner.hold(20.0, target=0.7).position[-1] == 0.7
         assert planner.step(target=0.7).done
 
+    @pytest.mark.slow
     def test_a_live_parameter_that_comes_with_the_first_command_is_no_change_of_it(self):
         planner = gp.Planner(SPEC)
         assert planner.hold(20.0, target=3.0, live={"L1": 5.5}).promise[-1]

@@ -40,6 +40,7 @@ def text():
     return planner_block(SPEC).text
 
 
+@pytest.mark.slow
 def test_a_decline_that_fills_the_committed_future_is_not_lengthened(text):
     histories = Histories.of(SPEC)
     drawn = Numbering.of(histories, 200, 0)
@@ -72,6 +73,7 @@ def random_rows(inputs, random, cycles):
     return rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_index_leaves_its_array_under_random_commands(text, seed):
     block = BlockInstance(text)  # checked: it raises where one would
@@ -79,6 +81,7 @@ def test_no_index_leaves_its_array_under_random_commands(text, seed):
     assert np.ptp(issued[:, block.outputs.index("fPosition")]) > 1.0
 
 
+@pytest.mark.slow
 def test_events_are_kept_where_they_belong_after_two_thousand_million(text):
     block = BlockInstance(text.replace("nEvents : DINT;", "nEvents : DINT := 1999999995;", 1))
     issued = block.call(random_rows(block.inputs, np.random.default_rng(0), 20_000))

@@ -44,6 +44,7 @@ def require_limits(setpoints):
     assert v[-1] == a[-1] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 @pytest.mark.parametrize("noise", [0.002, 0.005, 0.02, 0.1])
 def test_an_axis_that_stands_stays_where_it_is_however_noisy_its_velocity(text, noise):
@@ -83,6 +84,7 @@ def test_a_position_that_steps_is_taken_over_where_it_is_given(text):
     assert (setpoints[:, 0] == 4.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_converter_s_unfiltered_measurements_move_no_axis_that_stands(seed):
     random, axis = np.random.default_rng(seed), Converter(parse_function_block(TEXTS["followed"]))
@@ -95,6 +97,7 @@ def test_a_converter_s_unfiltered_measurements_move_no_axis_that_stands(seed):
     assert np.abs(np.array(axis.rows)[:, 1] - START).max() < 0.01
 
 
+@pytest.mark.slow
 def test_the_proof_takes_over_with_noise_and_refuses_a_block_that_runs_away_then():
     wrong, count = re.subn(
         r"(aAcceleration\[0\]) := 0\.0;(\s+aPosition\[0\] := aActual\[0\];)",

@@ -29,6 +29,7 @@ def encoded(profile=MOVE, layout="segments", **options):
 
 
 class TestNominal:
+    @pytest.mark.slow
     @pytest.mark.parametrize("layout", LAYOUTS)
     @pytest.mark.parametrize("unit", ["m", "mm", "deg", "counts"])
     @pytest.mark.parametrize("sign", [1, -1])
@@ -204,6 +205,7 @@ class TestRefusals:
         assert (column(rows[:cycles], "velocity") == 0.0).all()
         assert rows[-1]["bdone"]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("layout", "cycle"), [("samples", 0.004), ("counts", 0.002), ("segments", 0.001)]
     )

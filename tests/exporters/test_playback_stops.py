@@ -60,6 +60,7 @@ class Laws:
 
 
 class TestStops:
+    @pytest.mark.slow
     @pytest.mark.parametrize("layout", LAYOUTS)
     @pytest.mark.parametrize("profile", THERE_AND_BACK.values(), ids=THERE_AND_BACK.keys())
     def test_abort_at_every_cycle_stops_on_the_path(self, profile, layout):

@@ -71,6 +71,7 @@ def started(fb, number, **inputs):
     return fb.call(bExecute=True, **given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("axes", [1, 2])
 def test_every_motion_plays_bit_for_bit_as_its_own_block(layout, axes):
@@ -150,6 +151,7 @@ def test_starts_where_the_selected_motion_starts():
     assert started(selected(fb, 1), 1)["fposition"] == -0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("axes", [1, 2])
 @pytest.mark.parametrize("unit", ["mm", "counts"])
@@ -172,6 +174,7 @@ def test_one_motion_is_a_library_too():
 CONTAINERS = [name for name, form in BUILT_IN.items() if form.holds_block]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONTAINERS)
 @pytest.mark.parametrize(("layout", "axes"), [("segments", 2), ("counts", 1)])
 def test_every_container_of_a_block_holds_a_library(name, layout, axes):

@@ -200,6 +200,7 @@ def test_a_scheduler_that_nobody_runs_is_named(spec, text, monkeypatch):
         prove(spec, text, histories=1, scheduler="tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_a_worker_that_fails_is_told(spec, text, monkeypatch):
     def unable(*_):
         raise ModuleNotFoundError("No module 'x'")

@@ -45,6 +45,7 @@ def text(spec):
     return planner_block(spec).text
 
 
+@pytest.mark.slow
 def test_histories_have_sensors_of_every_kind_and_old_ones_stay(spec):
     histories = Histories.of(spec)
     drawn = Numbering.of(histories, 400, 0).drawn

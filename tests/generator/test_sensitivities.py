@@ -63,6 +63,7 @@ def residual(profile, parameters):
     return np.abs(oracle.sway(angles[1:], parameters)[:, 1]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("shares", [{"L1": 1.0}, {"L1": 1.0, "m2": -1.0}])
 def test_residual_sway_grows_with_the_power_above_the_order(shares, order):

@@ -59,6 +59,7 @@ def vibration(impulses, frequencies, ratio=0.0):
 RATIOS = st.floats(0.0, 0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPERS)
 @given(frequency=st.floats(1e-2, 1e4), ratio=RATIOS)
 def test_a_shaper_leaves_its_mode_at_rest_and_the_distance_as_it_was(name, frequency, ratio):
@@ -151,6 +152,7 @@ def test_trains_beyond_reason_are_refused():
         shaped_move("zvd", start=[0.0], target=[1.0], frequencies=np.arange(1.0, 15.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPERS)
 @given(frequencies=LISTS)
 def test_convolution_leaves_every_mode_at_rest(name, frequencies):
@@ -239,6 +241,7 @@ def swing(profile, parameters, times):
     return oracle.sway(angles, parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TABLE)
 def test_the_papers_sway(name):
     _, _, (peak, rms, residual) = TABLE[name]

@@ -89,6 +89,7 @@ def keeps(profile):
     return all(greatest(profile, order) <= limit for order, limit in enumerate(LIMITS, start=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("name", SHAPERS)
 def test_the_shortest_move_keeps_all_limits_and_a_shorter_one_does_not(name, base):

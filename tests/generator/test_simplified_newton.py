@@ -72,6 +72,7 @@ PROBLEMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_both_ways_lead_to_the_same_motion(name):
     quick, sure = indirect.solve(PROBLEMS[name]), solve_surely(PROBLEMS[name])

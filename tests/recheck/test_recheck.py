@@ -67,6 +67,7 @@ CERTIFIED = [  # beside SPEC and QUICK
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_equations_are_those_of_the_program(kind):
     plant, machine, random = find_plant(kind), MACHINES[kind], np.random.default_rng(1)

@@ -54,6 +54,7 @@ def test_setpoints_that_a_drive_leaves_out(many, goal):
     assert re.match(pattern, document["notes"][1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.0, 0.8])
 def test_an_axis_that_follows_or_lags_stands_still_nowhere(lag):
     with Bench(load=RigidLoad([0.1], lag=lag)) as bench:

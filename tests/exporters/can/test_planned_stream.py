@@ -98,6 +98,7 @@ def test_the_bus_carries_what_the_block_issues(calls, can):
     assert not source.columns["error_id"].any()
 
 
+@pytest.mark.slow
 def test_who_interrupts_gets_a_stop_without_sway():
     """The same as a command to stop in that cycle, and the drives are switched off in order."""
     source = source_of(spec_of(), LONG)

@@ -282,6 +282,7 @@ class TestRefusals:
 
 
 class TestRealTime:
+    @pytest.mark.slow
     @pytest.mark.parametrize(("system", "cure"), [("linux", "ulimit -r 80"), ("win32", "on Linux only")])
     def test_what_is_refused_is_said(self, monkeypatch, system, cure):
         def refuse(*_, **__):

@@ -102,6 +102,7 @@ class TestWholeStream:
         assert abs(record.final[0] - 400_000) < 1000
         assert len(bench.of(0x080)) > 251 + 100
 
+    @pytest.mark.slow
     def test_an_axis_that_never_arrives_is_stopped(self):
         class Leaning(RigidLoad):
             def advance(self, position, duration):
@@ -366,6 +367,7 @@ def assert_quick_stop_is_last(bench):
     assert max(frame.at for frame in bench.of(0x301)) <= stops[0]
 
 
+@pytest.mark.slow
 def test_a_drive_that_does_not_switch_on():
     with Bench(step=MS) as bench:
         tamper_feedback(lambda word: 0x0250)(bench)
