@@ -64,6 +64,10 @@ def a_part_of_the_box(document):
     document["parts"][0] = [[3, 5]]
 
 
+def a_part_too_small_to_count(document):
+    document["parts"][0] = [[1 << 40, 0]]
+
+
 def limits_raised(document):
     limits = document["limits_m"]
     limits[next(iter(limits))] *= 2.0
@@ -169,6 +173,7 @@ FORGERIES = (
     bound_left_out,
     met_on_the_way,
     a_part_of_the_box,
+    a_part_too_small_to_count,
     limits_raised,
     narrower,
     knots_moved,

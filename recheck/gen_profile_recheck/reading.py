@@ -29,6 +29,7 @@ NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 COMMENTS = re.compile(r"\(\*.*?\*\)|//[^\n]*|\{.*?\}", re.DOTALL)
 SAME_TIME = 1e-9  # relative, by which a time in a table may be off its cycle
 GREATEST = 1 << 45  # whole number that is a coefficient
+MOST_HALVINGS = 50  # of a range, up to which shares of it are exact
 MOST, MOST_CYCLES = 1 << 27, 1 << 21  # numbers of an array, and cycles of a block
 
 
@@ -208,6 +209,8 @@ class ProofMaterial:
         ]
         self.parts = [[(index(level), index(number)) for level, number in box] for box in document["parts"]]
         self.motions, self.pieces = document["motions"], len(self.knots) - 1
+        halved = (level for box in self.parts for level, _ in box)
+        require(all(0 <= level <= MOST_HALVINGS for level in halved), "boxes of no such kind")
         boxes, pieces, rows, columns, terms = self._scale_shape = document["scales"]["shape"]
         require(sorted(set(self.knots)) == self.knots and self.pieces > 0, "knots that do not rise")
         require(len(self.ends) == axes and all(len(one) == self.pieces for one in self.ends), "other axes")

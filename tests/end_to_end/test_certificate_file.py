@@ -109,6 +109,7 @@ TAMPERED = {
     forgeries.bound_left_out: "is damaged",
     forgeries.met_on_the_way: "is damaged",
     forgeries.a_part_of_the_box: "does not cover all machines",
+    forgeries.a_part_too_small_to_count: "is damaged",
     forgeries.limits_raised: "does not cover all machines",
     forgeries.narrower: "does not cover all machines",
     forgeries.knots_moved: "does not belong to the file's setpoints",

@@ -162,3 +162,18 @@ def test_no_text_is_gone_over_again_and_again(tmp_path, name, text):
     outcome = run_here("check", tmp_path / name, "--preset", "paper")
     assert outcome.code == 5
     the_sentence(outcome)
+
+
+OBEYED = "\x1b]0;mine\x07\x1b[2J\u202e"  # by a terminal: a title, an empty screen, text from right to left
+
+
+def test_control_characters_of_files_do_not_reach_the_terminal(tmp_path):
+    spec, log = tmp_path / "spec.toml", tmp_path / "log.csv"
+    key = "".join(f"\\u{ord(one):04x}" for one in OBEYED)
+    spec.write_text(f'plant.type = "slosh-tank"\n[limits]\n"{key}" = 1\n')
+    rows = "".join(f"{0.1 * k:.1f},{k % 2},{k % 2}\n" for k in range(50))
+    log.write_text(f"time_s,angle,{OBEYED}\n{rows}5.0,{OBEYED},0\n", "utf-8")
+    for words in ((spec,), ("identify", "--preset", "paper", "--swing", log, "--free", "L1")):
+        refused = run_here(*words)
+        assert refused.code == 2 and "\\x1b]0;mine" in refused.err
+        assert not {"\x1b", "\x07", "\u202e"} & {*refused.err, *refused.out}

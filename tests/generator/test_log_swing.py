@@ -6,7 +6,7 @@ import signal
 import subprocess
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import parse_qsl, urlsplit
 
@@ -82,6 +82,26 @@ class Stubborn(Phyphox):
         return {"result": False} if path == "/control" else super().answer(path, query)
 
 
+class Dripping(Phyphox):
+    drips = True
+
+    def answer(self, path, query):
+        return b" " * 1000 + json.dumps(super().answer(path, query)).encode()
+
+
+class Elsewhere(Phyphox):
+    """It leads to another server."""
+
+    def __init__(self, place):
+        super().__init__()
+        self.place = place
+
+
+class Absurd(Phyphox):
+    def buffers(self):
+        return {name: values * 1e300 for name, values in super().buffers().items()}
+
+
 @contextmanager
 def served(app):
     class Handler(BaseHTTPRequestHandler):
@@ -93,10 +113,19 @@ def served(app):
             parts = urlsplit(self.path)
             answer = app.answer(parts.path, parse_qsl(parts.query, keep_blank_values=True))
             content = answer if isinstance(answer, bytes) else json.dumps(answer).encode()
-            self.send_response(200)
+            place = getattr(app, "place", None)
+            self.send_response(200 if place is None else 302)
+            if place is not None:
+                self.send_header("Location", place + self.path)
             self.send_header("Content-Length", str(len(content)))
             self.end_headers()
-            self.wfile.write(content)
+            pieces = (
+                [content[at : at + 1] for at in range(len(content))] if hasattr(app, "drips") else [content]
+            )
+            with suppress(OSError):  # the client has gone
+                for piece in pieces:
+                    self.wfile.write(piece)
+                    time.sleep(0.02 * (len(pieces) > 1))
 
         def log_message(self, *_):
             pass
@@ -143,13 +172,26 @@ def test_a_network_that_is_lost_for_a_moment_loses_nothing(tmp_path):
         (Phyphox(source="accelerometer"), "measures no rates about three axes: open phyphox's experiment"),
         (OtherServer(), "but not as phyphox does"),
         (Stubborn(), "press play in phyphox"),
+        (Dripping(), "but not as phyphox does"),
+        (Absurd(measuring=True), "but not as phyphox does"),
+        (Phyphox(measuring=True, speed=0.0), "no new rates"),
     ],
 )
-def test_what_is_no_gyroscope_is_refused(tmp_path, app, sentence):
+def test_what_is_no_gyroscope_is_refused(tmp_path, app, sentence, monkeypatch):
+    monkeypatch.setattr("gen_profile.studies.identification.phone.WHOLE", 0.5)
+    monkeypatch.setattr("gen_profile.studies.identification.phone.LOST_FOR", 0.5)
     with served(app) as url:
         outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "2")
     assert outcome.code == 2 and sentence in outcome.err
     assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_asked_of_another_server(tmp_path):
+    other = Phyphox(measuring=True)
+    with served(other) as place, served(Elsewhere(place)) as url:
+        outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "2")
+    assert outcome.code == 2 and "but not as phyphox does" in outcome.err
+    assert other.asked == [] and not list(tmp_path.iterdir())
 
 
 def test_addresses_that_are_none(tmp_path):

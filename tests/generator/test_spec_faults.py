@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gen_profile.spec.reading import preset_spec, spec_from_dict
+from gen_profile.spec.reading import parse_spec, preset_spec, spec_from_dict
+from gen_profile.spec.structure import Faults
 from gen_profile.support.errors import SpecError
+from gen_profile.support.suggestion import suggestion
 
 PAPER = preset_spec("paper").to_dict()
 MISSING = object()
@@ -344,3 +346,29 @@ def test_a_value_out_of_bounds_is_told_once_not_its_range_too():
     assert [str(line) for line in str(caught.value).splitlines()] == [
         "plant.L1: must be a number from 0.01 to 200 m, found -1."
     ]
+
+
+def test_thousands_of_unknown_keys_are_told_without_comparing_each_with_all_others(monkeypatch):
+    compared = []
+
+    def counted(key, known):
+        compared.append(key)
+        return suggestion(key, known)
+
+    monkeypatch.setattr("gen_profile.spec.structure.suggestion", counted)
+    keys = "".join(f"unknown_{number} = 1\n" for number in range(10_000))
+    move = "move = { distance = 1.0, duration = 5.0 }"
+    with pytest.raises(SpecError) as caught:
+        parse_spec(f"plant.type = 'slosh-tank'\n{move}\n[limits]\n{keys}")
+    assert len(caught.value.faults) == 10_000 and len(compared) < 200
+    assert caught.value.faults[-1] == "limits.unknown_9999: unknown key."
+
+
+def test_of_places_within_one_another_the_first_fault_stands():
+    faults = Faults()
+    first = "limits.axis.hoist.jerk"
+    for place in (first, "limits", "limits.axis", f"{first}.low", "limitsx", "move"):
+        faults.add(place, "is wrong")
+    with pytest.raises(SpecError) as caught:
+        faults.raise_any()
+    assert [one.partition(":")[0] for one in caught.value.faults] == [first, "limitsx", "move"]

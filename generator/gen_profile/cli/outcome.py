@@ -20,7 +20,14 @@ if TYPE_CHECKING:
     from gen_profile.assurance.proof.verdict import Proof
     from gen_profile.assurance.verification.verdict import Check
 
+# what a terminal obeys, or hides, in place of showing it; files and servers of strangers may hold it
+UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2066-\u2069]|\r(?!\n)")
 INTERRUPTED = 128 + signal.SIGINT  # as shells count it
+
+
+def say(text: str, *, err: bool = True) -> None:
+    """Print a text for people, control characters in it as Python writes them."""
+    click.echo(UNSHOWN.sub(lambda found: found[0].encode("unicode_escape").decode(), text), err=err)
 
 
 def as_json() -> bool:
@@ -37,7 +44,7 @@ def print_outcome(document: dict[str, Any], text: str) -> None:
         stdout does not take it, as on a full disk.
     """
     try:
-        click.echo(_json(document) if as_json() else text)
+        say(_json(document) if as_json() else text, err=False)
     except BrokenPipeError:  # a reader that left early, which click knows
         raise
     except OSError as error:
@@ -68,7 +75,7 @@ def print_warnings(sentences: Iterable[str]) -> None:
     said = click.get_current_context().meta.setdefault(f"{__name__}.said", set())
     for sentence in sentences:
         if sentence not in said:
-            click.echo(f"Warning: {sentence}", err=True)
+            say(f"Warning: {sentence}")
         said.add(sentence)
 
 
@@ -83,16 +90,16 @@ def not_written(folder: Path) -> str:
 def fail(reasons: Sequence[str], consequence: str = "") -> NoReturn:
     """Say why a check failed and what follows from that, and end the program."""
     for sentence in reasons:
-        click.echo(f"Check failed: {sentence}", err=True)
+        say(f"Check failed: {sentence}")
     if consequence:
-        click.echo(consequence, err=True)
+        say(consequence)
     sys.exit(CheckFailed.exit_code)
 
 
 def leave_unproved(reasons: Sequence[str]) -> NoReturn:
     """Say why there is no certificate, though the check passed, and end the program."""
     for sentence in reasons:
-        click.echo(f"Not proved: {sentence}", err=True)
+        say(f"Not proved: {sentence}")
     click.echo("The check by co-simulation passed; what is not proved has no certificate.", err=True)
     sys.exit(CertificateError.exit_code)
 
@@ -121,7 +128,7 @@ def print_error(error: Exception, as_json: bool) -> int:
         error.show()
     else:
         for line in message.splitlines():
-            click.echo(f"Error: {line}", err=True)
+            say(f"Error: {line}")
     return code
 
 

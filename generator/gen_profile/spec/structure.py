@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
+from itertools import accumulate
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
@@ -18,6 +19,7 @@ from gen_profile.support.phrase import Phrase, placed
 from gen_profile.support.suggestion import found, suggestion
 
 Kind = Any  # an annotation
+MOST_HINTS = 100  # what unknown keys of a table may be meant to be; more is no slip of the hand
 MISFIT: Any = object()  # in place of a value that does not fit
 FORMS = {
     float: "a finite number",
@@ -36,6 +38,7 @@ class Faults:
 
     def __init__(self) -> None:
         self._sentences: dict[str, str] = {}
+        self._around: set[str] = set()  # places that hold one of a fault, and those themselves
 
     def add(self, place: str, problem: str, /, *causes: str, **values: Any) -> None:
         """Note a problem, such as ``must be positive``, of a place such as ``plant.m1``.
@@ -45,11 +48,11 @@ class Faults:
         """
         if not any(self._told(one) for one in (place, *causes)):
             self._sentences[place] = placed(place, Phrase(problem, **values) if values else problem)
+            self._around.update(_outwards(place))
 
     def _told(self, place: str) -> bool:
         """Whether something is wrong at a place, around it or inside it."""
-        pairs = ((f"{inner}.", f"{place}.") for inner in self._sentences)
-        return any(one.startswith(other) or other.startswith(one) for one, other in pairs)
+        return place in self._around or any(outer in self._sentences for outer in _outwards(place))
 
     def raise_any(self) -> None:
         """Raise all faults as one error.
@@ -61,6 +64,11 @@ class Faults:
         """
         if self._sentences:
             raise SpecError(*self._sentences.values())
+
+
+def _outwards(place: str) -> Iterable[str]:
+    """List a place and those around it: ``plant.m1`` and ``plant``."""
+    return accumulate(place.split("."), "{}.{}".format)
 
 
 @attrs.frozen
@@ -114,8 +122,8 @@ class Structurer:
     def known(self, table: Mapping[str, Any], names: Iterable[str], where: str, word: str = "key") -> Any:
         """Leave out what has other names than these, and tell."""
         names = list(names)
-        for key in sorted(set(table).difference(names)):
-            hint = suggestion(key, names)
+        for number, key in enumerate(sorted(set(table).difference(names))):
+            hint = suggestion(key, names) if number < MOST_HINTS else "."
             self.faults.add(place(where, key), "unknown {word}{hint}", word=word, hint=hint)
         return {key: value for key, value in table.items() if key in names}
 

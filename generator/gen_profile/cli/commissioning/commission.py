@@ -15,7 +15,7 @@ from gen_profile.cli.commissioning.identify import identify
 from gen_profile.cli.commissioning.log_swing import log_swing
 from gen_profile.cli.deployment.commands import deploy
 from gen_profile.cli.options import Number, PathType, SpecChoice, option
-from gen_profile.cli.outcome import as_json, print_outcome
+from gen_profile.cli.outcome import as_json, print_outcome, say
 from gen_profile.cli.report import report
 from gen_profile.support.errors import GenProfileError, OutputError
 from gen_profile.support.plugins import require_installed
@@ -164,7 +164,7 @@ class _Guide:
                 SpecChoice(None, self._preset, (*given, f"{key}={text}")).spec()
                 return (*given, f"{key}={text}"), (*readings, *read)
             except GenProfileError as error:
-                click.echo(f"Error: {error}", err=True)
+                say(f"Error: {error}")
         return given, readings
 
     def require_log(self, swing: str) -> None:
@@ -181,7 +181,7 @@ class _Guide:
                 self.require_log(swing)
                 break
             except OutputError as error:  # of what was asked: of an option it was looked at first
-                click.echo(f"Error: {error}", err=True)
+                say(f"Error: {error}")
         if not swing.startswith("http:"):
             return (Path(swing) if swing else None), {}
         log = path.with_name("swing.csv")

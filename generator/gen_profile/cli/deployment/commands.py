@@ -21,7 +21,7 @@ from gen_profile.cli.deployment.access import (
     require_protocol,
 )
 from gen_profile.cli.options import Count, Number, OutputFile, PathType, option
-from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.outcome import print_outcome, say
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import require_signature, signed_by_option, signing_key, signing_option
 from gen_profile.support.errors import OutputError, SpecError
@@ -154,13 +154,13 @@ def _watch(artefact: Path, given: dict[str, Any], seconds: float | None, log: Pa
         with progress() as tell:
             table, link = verified(artefact, given, stack, tell)
         if seconds is None:
-            click.echo(f"{link.server['instance']} is watched. Ctrl-C ends it.", err=True)
+            say(f"{link.server['instance']} is watched. Ctrl-C ends it.")
         with reporting(table, log) as report:
             watched = watch(table, link, report, seconds=seconds)
     document = {"action": "watched", "controller": link.server, **table.hashes, **watched.to_dict()}
     print_outcome(document, words(watched, table))
     if watched.fault is not None:
-        click.echo(f"Error: {watched.fault}", err=True)
+        say(f"Error: {watched.fault}")
         raise SystemExit(watched.fault.exit_code)
 
 

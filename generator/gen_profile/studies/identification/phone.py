@@ -6,11 +6,13 @@ their values, those after a time alone where it is asked to, and ``/control`` be
 
 import time
 from collections.abc import Iterator
-from contextlib import suppress
-from http.client import HTTPException
+from contextlib import closing, suppress
+from http import HTTPStatus
+from http.client import HTTPConnection, HTTPException
+from socket import SHUT_RDWR
+from threading import Timer
 from typing import Any
 from urllib.parse import urlsplit
-from urllib.request import ProxyHandler, build_opener
 
 import numpy as np
 
@@ -18,7 +20,9 @@ from gen_profile.motion.profile import Array
 from gen_profile.support.errors import OutputError, SpecError
 from gen_profile.support.strict_json import parse_json
 
-TIMEOUT, LOST_FOR, PAUSE = 3.0, 15.0, 0.3  # s of an answer, of a lost network, and between two questions
+TIMEOUT, WHOLE = 3.0, 30.0  # s without a byte of an answer, and of all of it
+LOST_FOR, PAUSE = 15.0, 0.3  # s of a lost network, and between two questions
+GREATEST = np.array([1e9, 1e3, 1e3, 1e3])  # s and rad/s that a phone may tell of; none turns so fast
 MOST_BYTES = 1 << 25
 COLUMNS = ("Rate (rad/s)", *(f"Gyroscope {axis} (rad/s)" for axis in "xyz"))
 
@@ -46,7 +50,7 @@ class Phone:
                 f"{url}: is no address such as http://192.168.0.42:8080 of a phone, opc.tcp://10.0.0.5:4840 "
                 "or can:socketcan:can0."
             )
-        self._url, self._open = url.rstrip("/"), build_opener(ProxyHandler({})).open
+        self._url, self._at, self._path = url.rstrip("/"), parts.netloc, parts.path.rstrip("/")
         config = self._ask("config")
         try:
             sensors = {one["source"]: one.get("outputs", ()) for one in config["inputs"]}
@@ -68,7 +72,7 @@ class Phone:
         Raises
         ------
         OutputError
-            It does not answer for `LOST_FOR`, or shows another experiment.
+            It does not answer, or has nothing new, for `LOST_FOR`, or shows another experiment.
         """
         clock, *rates = self._buffers
         status, table = self._get("&".join(self._buffers))
@@ -76,8 +80,9 @@ class Phone:
         began = not status.get("measuring")
         if began and self._ask("control?cmd=start").get("result") is not True:
             raise OutputError("The phone does not begin to measure; press play in phyphox.")
+        news = time.monotonic()
         try:
-            while True:
+            while time.monotonic() - news < LOST_FOR:
                 since = "&".join(f"{one}={last!r}|{clock}" for one in rates)
                 status, table = self._get(f"{clock}={last!r}&{since}")
                 if status.get("session") != session:
@@ -85,7 +90,9 @@ class Phone:
                 table = table[np.isfinite(table).all(axis=1) & (table[:, 0] > last)]
                 last = float(table[:, 0].max(initial=last))
                 yield table
+                news = time.monotonic() if len(table) else news
                 time.sleep(PAUSE)
+            raise OutputError(f"The phone has sent no new rates for {LOST_FOR:g} s; press play in phyphox.")
         finally:
             if began:
                 with suppress(OutputError):
@@ -96,7 +103,10 @@ class Phone:
         try:
             columns = [answer["buffer"][name]["buffer"] for name in self._buffers]
             rows = list(zip(*columns, strict=False))
-            return dict(answer["status"]), np.array(rows, dtype=np.float64).reshape(-1, 4)
+            table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+            if (np.abs(table) > GREATEST).any():
+                raise ValueError("no time and rates of a phone")
+            return dict(answer["status"]), table
         except (KeyError, TypeError, ValueError) as error:
             raise self._strange() from error
 
@@ -105,8 +115,7 @@ class Phone:
         until = time.monotonic() + patience
         while True:
             try:
-                with self._open(f"{self._url}/{path}", timeout=TIMEOUT) as reply:
-                    return dict(parse_json(reply.read(MOST_BYTES)))
+                return dict(parse_json(self._answer(path)))
             except (ValueError, TypeError) as error:
                 raise self._strange() from error
             except (OSError, HTTPException) as error:
@@ -117,6 +126,22 @@ class Phone:
                         "and both in one network."
                     ) from error
                 time.sleep(PAUSE)
+
+    def _answer(self, path: str) -> bytes:
+        """Ask once, of this very address: nothing is asked of another that it may name."""
+        with closing(HTTPConnection(self._at, timeout=TIMEOUT)) as connection:
+            connection.connect()
+            late = Timer(WHOLE, connection.sock.shutdown, (SHUT_RDWR,))  # of one that sends a byte at a time
+            late.start()
+            try:
+                connection.request("GET", f"{self._path}/{path}")
+                reply = connection.getresponse()
+                content = reply.read(MOST_BYTES)
+            finally:
+                late.cancel()
+            if reply.status != HTTPStatus.OK:
+                raise ValueError(f"status {reply.status}")
+            return content
 
     def _strange(self) -> OutputError:
         return OutputError(f"{self._url} answers, but not as phyphox does; look at the address and the port.")
