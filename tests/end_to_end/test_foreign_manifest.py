@@ -72,6 +72,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("whose", FOREIGN)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_it_is_told_whose_the_manifest_is(folder, whose, command):
@@ -120,6 +121,7 @@ def test_a_spec_of_something_else_is_refused(folder, changes, words):
     assert re.search(words, refused.err)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", ["many", 0, -5, None, 1.5, True])
 def test_a_number_of_histories_that_means_nothing_is_refused(tmp_path, count):
     (tmp_path / "bay.st").write_text(BLOCK)

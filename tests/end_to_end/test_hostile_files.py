@@ -143,6 +143,7 @@ def test_a_broken_stream_in_an_fmu_is_said_to_be_one(tmp_path, method):
             unpack(path, tmp_path / "out")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "text"),
     [

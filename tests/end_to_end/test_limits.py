@@ -26,6 +26,7 @@ def free(tmp_path_factory):
     return run_here("--no-check", "--out", tmp_path_factory.mktemp("free"), "--json").document["figures"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "limit"), TIGHT.items())
 def test_a_limit_that_can_be_kept_is_kept(tmp_path, free, name, limit):
     outcome = run_here("--set", f"limits.{name}={limit}", "--out", tmp_path, "--json")

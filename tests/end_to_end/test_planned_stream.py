@@ -106,6 +106,7 @@ def test_unproved_blocks_are_refused(tmp_path, check, text, words):
         assert "cart: node 1, from where it stands" in run_here("stream", *options).out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -148,6 +148,7 @@ def test_a_smooth_move_is_in_no_doubt_however_few_its_setpoints_are(distance, cy
     assert implausibilities(spec, attrs.evolve(setpoints, velocity=motion.velocity)) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("cycle_time", [0.002, 0.004, 0.01, 0.02])
 def test_one_setpoint_moved_by_a_millimetre_lies_off_the_others(paper, form, cycle_time):
@@ -166,6 +167,7 @@ def bare(setpoints, position, cycle_time=None):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("factor", [0.98, 1.02])
 @pytest.mark.parametrize("overrides", [(), ("move.final_velocity=0.1",)])

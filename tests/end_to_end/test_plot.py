@@ -109,6 +109,7 @@ def test_a_picture_leaves_what_the_caller_draws_with_as_it_is(tmp_path):
     assert (tmp_path / "picture.png").stat().st_size > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_pictures_of_one_figure_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
     line = Line(name="line", x=np.arange(3.0), y=np.arange(3.0))

@@ -87,6 +87,7 @@ def run(folder, *words):
     return run_process(*words, cwd=folder, PYTHONPATH=os.pathsep.join(paths))
 
 
+@pytest.mark.slow
 def test_they_are_listed(installed):
     assert run(installed, "formats", "--json").document["formats"]["text"]["suffix"] == ".txt"
     assert run(installed, "plants", "--json").document["plants"]["pendulum"]["loads"] == ["load"]
@@ -110,6 +111,7 @@ def test_they_design_export_and_check(installed):
     }
 
 
+@pytest.mark.slow
 def test_without_them_the_spec_names_what_is_known(installed):
     outcome = run_process("plugged.toml", cwd=installed)
     assert outcome.code == 2

@@ -96,6 +96,7 @@ def test_the_robustness_it_states_is_where_the_check_begins_to_fail(paper):
         assert (code == 0) == inside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [

@@ -167,6 +167,7 @@ def test_exported_c_issues_the_same_bits_without_a_warning(block, program, tmp_p
         assert [exported.call(row) for row in rows.tolist()] == oracle.call(rows).tolist()
 
 
+@pytest.mark.slow
 def test_c_plus_plus_takes_the_header(block, tmp_path):
     (_, header) = block_files(block, SPEC, ["c"])
     assert b"then out.fPosition is the setpoint. Names" in header.content

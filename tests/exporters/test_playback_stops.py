@@ -108,6 +108,7 @@ class TestStops:
         play(fb, start(fb))
         assert fb.call(bAbort=True)["bdone"]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("layout", LAYOUTS)
     def test_hold_at_every_cycle_then_on_to_the_target(self, layout):
         laws = Laws(MOVE, layout)

@@ -162,6 +162,7 @@ def test_any_move_comes_back(contract, start, end, duration, cycle, sign):
     np.testing.assert_array_equal(found.times, expected.times)
 
 
+@pytest.mark.slow
 @bounded
 @given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
 def test_any_bytes_are_refused_or_read_never_a_crash(contract, content):

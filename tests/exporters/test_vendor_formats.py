@@ -62,6 +62,7 @@ def goal_of(profile, layout="segments", **options):
 
 
 class TestBlocks:
+    @pytest.mark.slow
     @pytest.mark.parametrize("layout", LAYOUTS)
     @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES, bang_bang()], ids=["one", "two", "rough"])
     @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
@@ -81,6 +82,7 @@ class TestBlocks:
         with pytest.raises(ExportError, match="one was altered"):
             format_.replay(content.replace(literal, b"0.25"), goal)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("layout", LAYOUTS)
     @pytest.mark.parametrize("format_", [*BLOCKS.values(), structured_text], ids=[*BLOCKS, "plc"])
     @pytest.mark.parametrize("mutation", MUTATIONS.values(), ids=MUTATIONS.keys())
@@ -373,6 +375,7 @@ class TestRockwell:
 
 
 class TestTakingApart:
+    @pytest.mark.slow
     @pytest.mark.parametrize("layout", LAYOUTS)
     @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES], ids=["one", "two"])
     def test_the_parts_make_the_same_program(self, profile, layout):

@@ -83,6 +83,7 @@ def test_what_is_hardly_meant_is_told(name, override, place, cure):
     assert any(sentence.startswith(f"{place}: ") and sentence.endswith(cure) for sentence in warnings)
 
 
+@pytest.mark.slow
 def test_a_doubt_is_told_once_and_is_among_the_warnings_of_the_check(tmp_path):
     implausible = ("--set", "can.start_tolerance=1")
     outcome = run_here("--preset", "paper", *implausible, "--out", tmp_path, "--json")

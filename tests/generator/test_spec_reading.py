@@ -313,6 +313,7 @@ def test_whole_numbers_are_the_same_numbers():
     assert preset_spec("paper", ["move.duration=3"]).sha256() == preset_spec("paper").sha256()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", ["0", "1", "4711"])
 def test_the_hash_does_not_hang_on_pythons_hash_seed(seed):
     script = "from gen_profile.spec.reading import preset_spec; print(preset_spec('paper').sha256())"

@@ -112,6 +112,7 @@ def test_page_command_line_and_spec_file_state_the_same(edits):
     assert "# kg, hook mass" in text  # what its author wrote stays
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", presets())
 def test_every_knob_says_what_the_spec_says(preset):
     """Set to the value that it shows, each one by itself leaves the spec as it is."""
@@ -269,6 +270,7 @@ def random_edits(chance, listed):
     return edits
 
 
+@pytest.mark.slow
 def test_whatever_is_turned_is_answered_without_a_traceback():
     chance, listed = random.Random(1), knobs(spec := spec_from_dict(PAPER.document), PAPER.document, spec)
     # limits and ranges can make a search take seconds

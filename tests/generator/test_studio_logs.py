@@ -42,6 +42,7 @@ def swing():
     return "".join(["Uhr;Geber 4\n", *rows]).encode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1.0, 0.09])
 def test_a_swing_tells_parameters_that_can_be_taken(swing, count, tmp_path, monkeypatch):
     if count != 1.0:  # as an encoder tells it

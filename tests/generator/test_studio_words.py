@@ -113,6 +113,7 @@ def test_a_machine_s_summary(preset):
     assert german(summary) != summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["paper", "gantry-crane", "flexible-joint"])
 def test_whatever_rules_say_of_a_knob_s_value(preset):
     start = preset_start(preset)

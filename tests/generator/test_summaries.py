@@ -48,6 +48,7 @@ def test_results_are_a_line_and_a_table(results):
         assert isinstance(result, Drawable) == (name in PICTURED), name
 
 
+@pytest.mark.slow
 def test_a_picture_is_an_image_of_its_own(results):
     before, _, encoded = results["Check"]._repr_html_().partition("data:image/svg+xml;base64,")
     picture = b64decode(encoded.removesuffix('">')).decode()
@@ -63,6 +64,7 @@ def test_where_matplotlib_is_missing_the_table_remains(results, monkeypatch):
         results["Check"].to_pandas()
 
 
+@pytest.mark.slow
 def test_tables_are_frames_of_pandas(results):
     check, curve, samples = (results[name] for name in ("Check", "Robustness", "SampledProfile"))
     frame = check.to_pandas().set_index("machine")

@@ -41,6 +41,7 @@ def test_a_motion_is_the_tables_in_every_cycle(table):
     assert events == ["motion 1 begins", "arrived"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("preset", "layout", "changes", "start"),
     [
@@ -74,6 +75,7 @@ def test_hold_override_and_abort_are_followed_bit_for_bit(preset, layout, change
     ]
 
 
+@pytest.mark.slow
 def test_a_watch_may_begin_on_the_way_and_miss_cycles(table, monkeypatch):
     machine = Machine(table, [START])
     machine.advance(1.0)
