@@ -11,6 +11,8 @@ from command_line import run_here
 import gen_profile as gp
 from gen_profile.support.errors import CertificateError, OutputError, SpecError
 
+pytestmark = pytest.mark.slow
+
 PRESET, CYCLE, ON_THE_WAY = "single-pendulum-crane", "export.cycle_time=0.01", "limits.sway=0.25"
 BARE = ("--preset", PRESET, "--set", CYCLE)
 AXES = "limits.acceleration=0.9"
@@ -33,7 +35,6 @@ def copied(certified, tmp_path):
     return artefact, artefact.with_name(f"{artefact.name}.certificate.json")
 
 
-@pytest.mark.slow
 def test_a_certificate_is_made_beside_the_file_and_holds_when_checked_again(certified):
     artefact, made = certified
     beside = artefact.with_name(f"{artefact.name}.certificate.json")
@@ -74,7 +75,6 @@ def test_setpoints_that_break_a_limit_are_not_certified(copied):
         gp.certify_artefact(copied[0], spec)
 
 
-@pytest.mark.slow
 def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
     artefact, beside = copied
     beside.unlink()
@@ -133,7 +133,6 @@ TAMPERED = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("tamper", "said"), TAMPERED.items(), ids=[one.__name__ for one in TAMPERED])
 def test_a_tampered_certificate_is_refused(copied, tamper, said):
     artefact, beside = copied
@@ -204,7 +203,6 @@ def test_a_file_that_leaves_the_travel_is_not_certified(copied):
     )
 
 
-@pytest.mark.slow
 def test_ranges_that_are_too_wide_for_a_certificate_are_refused(copied):
     spec = gp.preset_spec(PRESET, [CYCLE, "check.uncertain={L0=0.9, m=0.9, g=0.9, c=0.9}"])
     with pytest.raises(CertificateError, match="too wide"):
@@ -220,7 +218,6 @@ def test_options_that_do_not_go_together_are_refused(copied):
     assert issubclass(SpecError, gp.GenProfileError)
 
 
-@pytest.mark.slow
 def test_the_main_job_certifies_the_file_of_each_format_as_the_check_does(tmp_path):
     made = run_here(*BARE, "--export", "csv", "--export", "plc", "--certify", "--out", tmp_path, "--json")
     assert made.code == 0, made.err
@@ -237,7 +234,6 @@ def test_the_main_job_certifies_the_file_of_each_format_as_the_check_does(tmp_pa
     assert text.out.count("certificate.json") == 1 and "payload" in text.out.split("proved", 1)[1]
 
 
-@pytest.mark.slow
 def test_the_main_job_says_what_is_not_proved_and_writes_no_certificate(tmp_path, certified):
     check = certified[1].document["check"]
     limit = max(row["residual_peaks_m"]["payload"] for row in check["scenarios"]) * 1.004
@@ -259,7 +255,6 @@ def test_a_proof_without_a_check_is_refused_before_anything_is_designed(tmp_path
     assert refused.code == 2 and "--no-check" in refused.errors[0] and not (tmp_path / "none").exists()
 
 
-@pytest.mark.slow
 def test_where_counts_are_too_coarse_for_a_bound_that_is_said(tmp_path):
     coarse = ("axis.unit=counts", "axis.counts_per_metre=3000", "robustness.uncertain={L1=0.01}")
     spec = gp.preset_spec("double-pendulum-crane", [*coarse, "export.cycle_time=0.02"])

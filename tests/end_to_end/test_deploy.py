@@ -27,6 +27,8 @@ from gen_profile.delivery.deployment.table import read_table
 from gen_profile.delivery.deployment.watching.judge import Judge
 from gen_profile.support.errors import DeploymentError, OutputError
 
+pytestmark = pytest.mark.slow
+
 FORMS = ("--export", "plc", "--export", "twincat")
 
 
@@ -68,7 +70,6 @@ def recorded(folder):
     return json.loads((folder / "deployments.json").read_text("utf-8"))["deployments"]
 
 
-@pytest.mark.slow
 def test_a_table_gets_into_a_controller_and_back(files, access):
     new, old = files / "new" / "paper.st", files / "old" / "FB_paper.TcPOU"
     assert run_here("deploy", old, *access, "--verify").code == 0
@@ -118,7 +119,6 @@ def test_a_record_that_cannot_be_written_does_not_hide_what_was_done(files, acce
     assert done.errors[-1].startswith("Error: The controller uses ")
 
 
-@pytest.mark.slow
 def test_the_controller_plays_what_was_deployed(files, plc, access):
     assert run_here("deploy", files / "new" / "paper.st", *access).code == 0
     table = read_table(files / "new" / "paper.st")
@@ -146,7 +146,6 @@ def fresh(files):
         yield url
 
 
-@pytest.mark.slow
 def test_what_stands_is_watched(files, fresh, tmp_path):
     old, log, other = files / "old" / "paper.st", tmp_path / "log.csv", tmp_path / "other.csv"
     other.write_text("mine", "utf-8")
@@ -183,7 +182,6 @@ def once_watched(monkeypatch):
     return later
 
 
-@pytest.mark.slow
 def test_a_motion_is_watched_and_another_deployment_ends_it(
     files, fresh, tmp_path, once_watched, monkeypatch
 ):
@@ -225,7 +223,6 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(
     assert f"Error: {found.document['fault']}" in found.err
 
 
-@pytest.mark.slow
 def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch):
     monkeypatch.setattr("gen_profile.delivery.deployment.opcua.STATE", "aNothing")
     where = ("--to", fresh, "--security", "none", "--watch")
@@ -233,7 +230,6 @@ def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch
     assert found.code == 6 and "FB_paper shows no aNothing: let the server show it" in found.err
 
 
-@pytest.mark.slow
 def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, once_watched):
     monkeypatch.setattr("gen_profile.delivery.deployment.watching.watch.LOST_FOR", 1.0)
     ending = ExitStack()
@@ -258,7 +254,6 @@ def test_options_that_do_not_go_together_are_refused(options, words, files, acce
     assert found.code == 2 and words in found.err
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "code", "words"),
     [
@@ -336,7 +331,6 @@ def odd():
         yield f"opc.tcp://127.0.0.1:{port}"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("instance", "words"),
     [
@@ -355,14 +349,12 @@ def test_odd_servers_are_told_apart(instance, words, files, odd, monkeypatch):
     assert found.code == 6 and re.search(words, found.err), found.err
 
 
-@pytest.mark.slow
 def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
     monkeypatch.setattr("gen_profile.delivery.deployment.opcua.REPLY", "aNothing")
     found = run_here("deploy", files / "old" / "paper.st", "--to", odd, "--security", "none")
     assert found.code == 6 and "shows no block with aRequest" in found.err
 
 
-@pytest.mark.slow
 def test_broken_connections_are_taken_up(files, plc, access, monkeypatch):
     table = read_table(files / "new" / "paper.st")
     with closing(

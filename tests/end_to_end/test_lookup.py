@@ -15,6 +15,8 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile.studies.sweep.store import grid_of
 from gen_profile.studies.sweep.table import read_table
 
+pytestmark = pytest.mark.slow
+
 CYCLE = "export.cycle_time=0.01"
 AXES = ("--vary", "solver.method=auto,zv", "--vary", "move.distance=0.3,0.4", "--vary", "plant.L1=0.3,0.35")
 
@@ -43,7 +45,6 @@ def residual(library, case, asked_for, distance):
     return finding.residual[load], check.passed
 
 
-@pytest.mark.slow
 def test_what_was_swept_is_found_itself(library):
     nearest = looked_up(library, "--move.distance", "0.3", "--plant.L1", "0.35", "--solver.method", "auto")
     row = read_table(library, grid_of(library)).to_pylist()[nearest["case"]]
@@ -76,7 +77,6 @@ def test_between_the_values_the_nearest_is_judged_on_the_machine_asked_for(libra
     assert sway != pytest.approx(nearest["sway_residual_worst_designed_m"], rel=1e-3)
 
 
-@pytest.mark.slow
 def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
     words = ("--move.distance", "0.39", "--plant.L1", "0.33", "--solver.method", "auto")
     nearest = looked_up(library, *words)

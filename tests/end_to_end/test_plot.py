@@ -26,6 +26,8 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile.studies.comparison.compare import Comparison, compare
 from gen_profile.support.errors import OutputError
 
+pytestmark = pytest.mark.slow
+
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
 
@@ -40,7 +42,6 @@ def plain():
     return compare(preset_spec("paper", FEW[1::2]))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("comparison", ["paper"], indirect=True)
 def test_a_bitmap_shows_lines_of_many_colours(comparison, tmp_path):
     gp.plot(comparison, tmp_path / "picture.png")
@@ -54,7 +55,6 @@ def test_a_bitmap_shows_lines_of_many_colours(comparison, tmp_path):
     assert rows_with_ink.mean() > 0.8
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("comparison", ["flexible-joint"], indirect=True)
 def test_a_vector_picture_is_well_formed_and_names_what_it_shows(comparison, tmp_path):
     gp.plot(comparison, tmp_path / "picture.svg")
@@ -64,7 +64,6 @@ def test_a_vector_picture_is_well_formed_and_names_what_it_shows(comparison, tmp
     assert sum(len(path.get("d", "")) > 2000 for path in paths) >= 15  # three curves per method
 
 
-@pytest.mark.slow
 def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path):
     picture = tmp_path / "picture.svg"
     assert run_here("compare", "--preset", "gantry-crane", *FEW, "--plot", picture).code == 0
@@ -74,7 +73,6 @@ def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path):
     assert "payload-" not in text
 
 
-@pytest.mark.slow
 def test_a_notebook_shows_what_a_file_holds_whenever_it_is_drawn(tmp_path, monkeypatch):
     plan = gp.plan(preset_spec("paper", FEW[1::2]))
     monkeypatch.setattr("time.time", lambda: 1e9)
@@ -101,7 +99,6 @@ print(matplotlib.get_backend(), pyplot.get_fignums())
 """
 
 
-@pytest.mark.slow
 def test_a_picture_leaves_what_the_caller_draws_with_as_it_is(tmp_path):
     words = [sys.executable, "-c", DRAWING]
     run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
@@ -109,7 +106,6 @@ def test_a_picture_leaves_what_the_caller_draws_with_as_it_is(tmp_path):
     assert (tmp_path / "picture.png").stat().st_size > 1000
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_pictures_of_one_figure_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
     line = Line(name="line", x=np.arange(3.0), y=np.arange(3.0))
@@ -185,7 +181,6 @@ def drawn(comparison):
     return comparison, figure
 
 
-@pytest.mark.slow
 def test_legends_and_panels_do_not_overlap(drawn):
     _, figure = drawn
     boxes = [axis.get_tightbbox() for axis in figure.axes]
@@ -207,7 +202,6 @@ def test_every_bar_is_told_beside_it_and_not_on_it(drawn):
         assert text.get_window_extent().x0 >= ends - 1.0
 
 
-@pytest.mark.slow
 def test_limits_are_drawn_where_curves_come_near():
     limits = {"velocity": 0.5, "acceleration": 90.0, "sway": 0.2}
     figure = comparison_figure(compare(preset_spec("paper", FEW[1::2], limits=limits)))
@@ -239,7 +233,6 @@ def test_figures_and_spectra_are_of_an_axis_that_moves():
     assert min(plan.figures[name] for name in names) > 0.1
 
 
-@pytest.mark.slow
 def test_few_curves_are_drawn_each_in_a_colour_of_its_own_unless_all_are_asked_for(plain):
     def curves(**how):
         axis = draw_side_by_side([comparison_figure(plain, **how)], "title").axes[0]

@@ -164,6 +164,7 @@ def test_people_are_told_what_the_machine_did_without_opening_the_page(tmp_path,
     assert "  measured  On the machine the payload swings by " in run_here("report", *words).out
 
 
+@pytest.mark.slow
 def test_a_log_that_ends_at_the_arrival_is_drawn_and_not_judged(tmp_path, spec, motion):
     log(tmp_path / "log.csv", motion, dict(spec.plant.parameters), until=3.5, columns=("position", "payload"))
     outcome, measured, page = report(tmp_path)
@@ -201,6 +202,7 @@ def test_values_that_stick_out_of_a_log_are_told_with_their_time(spec, motion):
         compare_measured(spec, evaluate(spec, motion), log, motion.duration, start=None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [("position", "payload"), ("payload",), ("angles",)])
 def test_a_sensor_that_counts_the_other_way_is_told(tmp_path, spec, motion, columns):
     log(tmp_path / "log.csv", motion, spec.plant.parameters, columns=columns)

@@ -351,6 +351,7 @@ def test_eds_of_the_simulated_drive(tmp_path):
     assert (outcome.code, "Cannot write" in outcome.err) == (2, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_drives_of_their_own(deployed, monkeypatch, interrupted):
     """drive-sim, and a streamer beside it, on a clock that waits for both, however busy this machine is."""
@@ -419,6 +420,7 @@ class TestSlowMotions:
         assert outcome.code == 2
         assert "jog cart=50: leads to 50, beyond limits.travel (-0.1 to 0.5)" in outcome.errors[-1]
 
+    @pytest.mark.slow
     def test_jogging(self, deployed, drive_away):
         document = self.streamed(deployed, "--jog", "cart=-0.01").document
         assert document["state"] == "done"
@@ -488,6 +490,7 @@ class TestSeveralBuses:
         outcome = run_here("stream", *self.SPEC, *bus)
         assert (outcome.code, "--channel: the spec states every axis's" in outcome.err) == (2, True)
 
+    @pytest.mark.slow
     def test_a_channel_that_is_not_there(self):
         outcome = run_here("drive-sim", *self.SPEC, "--interface", "socketcan")
         assert (outcome.code, "interface socketcan, channel left: cannot be opened" in outcome.err) == (

@@ -16,6 +16,7 @@ def hold(position, cycle, cycles):
     return SampledProfile(cycle_time=cycle, position=np.full((cycles + 1, 1), position))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cycle", "bound"), [(0.001, 0.06e-6), (0.004, 0.9e-6), (0.01, 6e-6)])
 def test_positions_alone_carry_the_motion(cosimulation, crane, quintic, cycle, bound):
     """Linear interpolation between setpoints is all that is lost; it falls with the cycle's square."""

@@ -156,6 +156,7 @@ class TestPlantFmu:
         assert is_intact(paths.pop().parent)
         assert not list(new_cache.glob("build-*"))
 
+    @pytest.mark.slow
     @pytest.mark.usefixtures("compiled_once")
     def test_needs_no_home(self, cache, temporary_folder, builds, crane, monkeypatch):
         """As for a user of a container whom the list of users does not know."""

@@ -52,6 +52,7 @@ def test_writes_an_fmu_that_others_run(tmp_path, kind, version):
         assert abs(result["sway.payload"][result["time"] > ends]).max() < (1e-4 if plans else 1e-6)
 
 
+@pytest.mark.slow
 def test_a_system_begins_with_the_swing_and_goes_on_at_speed(tmp_path):
     path = tmp_path / "a.fmu"
     swung = ("--set", 'move.initial={theta1=0.05, "theta1.rate"=-0.1}', "--set", "move.final_velocity=0.1")

@@ -142,6 +142,7 @@ def test_refuses_setpoints_of_other_axes(cosimulation, crane):
         cosimulation.run(two, crane.nominal(), max_step=1e-3, settle=0.0)
 
 
+@pytest.mark.slow
 def test_says_when_the_motion_cannot_be_simulated():
     """A rope of no length swings infinitely fast."""
     reeled_in = SampledProfile(cycle_time=0.01, position=np.array([[0.0, 0.5], [0.1, 0.0], [0.2, 0.0]]))

@@ -114,6 +114,7 @@ def test_ecos_runs_a_profile_into_a_plant(ecos, version):
     assert found[1] == pytest.approx(rows[-1, 1], abs=3e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["plant-setpoint", "system"])
 def test_ecos_runs_every_version(ecos, kind, version):
     fmu = cached_fmu(model_of(kind, CRANE), version)
@@ -155,6 +156,7 @@ def in_pieces():
     return Profile(knots=knots, coefficients=pieces[:, :, None], target=[0.3], method="test")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 0.3, 1.1])
 @pytest.mark.parametrize("kind", ["plant-setpoint", "profile", "system"])
 def test_events_may_lie_next_to_communication_points(kind, start, version):

@@ -70,6 +70,7 @@ def open_instance(version):
 
 
 class TestModelExchange:
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
     def test_of_a_plant(self, open_instance, kind):
         instance = open_instance(kind, exchange=True)
@@ -80,6 +81,7 @@ class TestModelExchange:
         follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
         np.testing.assert_allclose(rows_out, expected(follow), rtol=0.0, atol=2e-8)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_setpoints_takes_one_each_period(self, open_instance, tau):
         instance = open_instance("plant-setpoint", exchange=True)

@@ -16,6 +16,8 @@ from gen_profile.studies.identification.measurements import SwingLog
 from gen_profile.studies.sweep.run import Sweep
 from gen_profile.support.summary import Drawable, Summarised
 
+pytestmark = pytest.mark.slow
+
 PICTURED = {"Spec", "Design", "Plan", "Profile", "Judgement", "Check", "Robustness"}
 LONGEST = 400  # characters, of a line that is still read
 
@@ -48,7 +50,6 @@ def test_results_are_a_line_and_a_table(results):
         assert isinstance(result, Drawable) == (name in PICTURED), name
 
 
-@pytest.mark.slow
 def test_a_picture_is_an_image_of_its_own(results):
     before, _, encoded = results["Check"]._repr_html_().partition("data:image/svg+xml;base64,")
     picture = b64decode(encoded.removesuffix('">')).decode()
@@ -64,7 +65,6 @@ def test_where_matplotlib_is_missing_the_table_remains(results, monkeypatch):
         results["Check"].to_pandas()
 
 
-@pytest.mark.slow
 def test_tables_are_frames_of_pandas(results):
     check, curve, samples = (results[name] for name in ("Check", "Robustness", "SampledProfile"))
     frame = check.to_pandas().set_index("machine")
@@ -97,7 +97,6 @@ def test_one_that_failed_says_so(results):
     assert "check: failed" in repr(strict)
 
 
-@pytest.mark.slow
 def test_a_comparison_names_its_methods():
     comparison = gp.compare(gp.preset_spec("paper"))
     assert len(repr(comparison)) < LONGEST

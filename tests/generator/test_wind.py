@@ -93,6 +93,7 @@ def test_the_machine_that_is_held_farthest_aside_is_named():
     assert found.machine == "m2 -30 %"
 
 
+@pytest.mark.slow
 def test_the_check_reports_it_beside_the_residual_and_does_not_judge_it(tmp_path):
     arguments = ["--preset", "flexible-joint", "--set", "check.wind={force=5}", "--out", tmp_path]
     shown = run_here(*arguments)

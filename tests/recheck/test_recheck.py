@@ -149,6 +149,7 @@ def _little_work(monkeypatch):
     monkeypatch.setattr("gen_profile_recheck.halving.MOST_PARTS", 200)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_little_work")
 def test_little_work_proves_what_forgeries_are_made_of(quick):
     assert gp.check_certificate(*quick).proved
@@ -333,6 +334,7 @@ def test_quintics_have_the_values_at_their_ends():
     )
 
 
+@pytest.mark.slow
 def test_what_values_are_off_by_counts_once_and_bounds_at_nodes_hold_between_them(quick, monkeypatch):
     """Where it was in every coefficient, growth was bounded too roughly, and no error could be large."""
     pieces = []
