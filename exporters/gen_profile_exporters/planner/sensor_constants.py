@@ -10,6 +10,7 @@ from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.playback.structured_text import literal
 
 LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
+GROWN = 1.5  # of the stated swing, which a load that is damped does not reach: the sensor shows another one
 LARGEST_PULSE = 4.0  # by what the greatest acceleration makes in a slot: a larger one keeps the next ones out
 KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
 NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
@@ -22,7 +23,7 @@ OUTPUTS = {
     "fSwayEstimated": "aSwayEstimated[{}]",
     "fSwayUncertainty": "aSwayUncertainty[{}]",
     "bSensorUsed": "bUsed[{}]",
-    "nSensorFault": "aSensorFault[{}]",
+    "nSensorFault": "aSensorTold[{}]",
     "fSensorScale": "1.0 + aOwnScale[{}]",
 }
 
@@ -111,6 +112,9 @@ def values(sensor: SensorConstants | None, suffixes: Sequence[str]) -> dict[str,
         f"    fSensorAge{of} : LREAL := {age}; (* s, since then *)"
         for of, words in sensed.values()
     ]
+    inputs.append(
+        "    bSensorCheck : BOOL; (* while set nothing is damped: to try the sensor by small motions *)"
+    )
     outputs = [
         f"    fSwayEstimated{of} : LREAL; (* m, of the {sensor.load}, by {words} *)\n"
         f"    fSwayUncertainty{of} : LREAL; (* m, that it may be off by; "
@@ -187,6 +191,7 @@ def real_constants(sensor: SensorConstants | None, cycle: float) -> dict[str, fl
         "cDampOnWay": 2.0 * sensor.roused,
         "cDampTo": sensor.end,
         "cDampRoom": sensor.room,
+        "cDampMost": GROWN * sensor.swing + sensor.estimation_error,
         "cDampLength": KERNEL_PERIODS,
         "cDampPulse": LARGEST_PULSE,
     }

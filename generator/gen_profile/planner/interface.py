@@ -12,8 +12,15 @@ COMMON = ("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "rOverride"
 OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of each axis
 ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
 STATES = ("bBusy", "bPromise", "nErrorId", "bEnabled")
-LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs that the first blocks had not
+LATER = (
+    "bReset",
+    "bLoadAtRest",
+    "fActVelocity",
+    "fFollowingLimit",
+    "bSensorCheck",
+)  # inputs that the first blocks had not
 SENSOR = ("fSensor", "bSensorValid", "fSensorAge")  # of axes with one
+UNPROVEN = 8  # nSensorFault of a sensor that is used, and has not shown a motion of its axis yet
 SENSED = {  # what the block tells of such an axis, by the columns of a table
     "sway_estimated_m": "fSwayEstimated",
     "sway_uncertainty_m": "fSwayUncertainty",

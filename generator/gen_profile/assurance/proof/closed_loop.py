@@ -27,6 +27,7 @@ from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.interface import UNPROVEN
 from gen_profile.planner.sensor import estimation_error
 from gen_profile.spec.model import Spec
 from gen_profile.support.progress import Progress, no_progress
@@ -166,7 +167,14 @@ class ClosedLoop:
             return WatchedRun(run=run)
         judged = self._watch.judged(given, script, orders, block, run)
         faults = (*judged.faults, *self._sensor_faults(history, max(given.periods), run))
-        return attrs.evolve(judged, run=attrs.evolve(run, trace=None, copies=None), faults=faults)
+        bare = attrs.evolve(run, trace=None, copies=None)
+        return attrs.evolve(judged, run=bare, faults=faults, unproven=self._unproven(run))
+
+    def _unproven(self, run: BlockRun) -> bool:
+        """Tell whether a sensor has not shown a motion of its axis until the end."""
+        told = [name for name in self.outputs if name.startswith("nSensorFault")]
+        last = dict(zip(self.outputs, run.trace[-1], strict=False)) if run.trace is not None else {}
+        return any(last.get(name) == UNPROVEN for name in told)
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.

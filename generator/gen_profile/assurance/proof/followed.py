@@ -27,7 +27,7 @@ from gen_profile.methods.quickest.axis_alone import AxisLimits
 from gen_profile.methods.quickest.modes import Complex
 from gen_profile.methods.quickest.motion import AxisState, Goal, alone
 from gen_profile.motion.profile import Array
-from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.interface import UNPROVEN, BlockAxis
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
@@ -245,6 +245,13 @@ class Followed:
         """Tell when an output of a block with sensors is set, of any axis; never of one without."""
         outputs = [name, *(axis.of(name) for axis in self.axes)]
         issued = [self.issued[output] for output in outputs if output in self.issued]
+        return np.asarray(np.any([np.zeros(self.cycles), *issued], axis=0))
+
+    @property
+    def lost_sensors(self) -> Flags:
+        """Tell when a sensor is not used for a fault."""
+        told = [axis.of("nSensorFault") for axis in self.axes]
+        issued = [self.issued[name] % UNPROVEN for name in told if name in self.issued]
         return np.asarray(np.any([np.zeros(self.cycles), *issued], axis=0))
 
     @property

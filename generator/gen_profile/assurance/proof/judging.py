@@ -36,6 +36,8 @@ class WatchedRun:
         How soon its commands were carried out.
     exercised : mapping
         How often inputs changed, and outputs came, in which state.
+    unproven : bool
+        Whether a sensor had at the end not yet shown a motion of its axis, so that nothing may be promised.
     """
 
     run: BlockRun
@@ -43,6 +45,7 @@ class WatchedRun:
     left: float = 0.0
     obeyed: Sequence[Obeyed] = ()
     exercised: Pairs = attrs.field(factory=dict)
+    unproven: bool = False
 
 
 def judge_run(
@@ -78,7 +81,7 @@ def judge_run(
         left=watched.left,
         obeyed=tuple(watched.obeyed),
         exercised=watched.exercised,
-        faults=(*_faults(history, run, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
+        faults=(*_faults(history, watched, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
     )
 
 
@@ -101,8 +104,9 @@ def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
     return shares
 
 
-def _faults(history: History, run: BlockRun, limits: dict[str, float], *, lasts: bool) -> Iterator[str]:
+def _faults(history: History, watched: WatchedRun, limits: dict[str, float], *, lasts: bool) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence; in one that lasts long errors may add up."""
+    run = watched.run
     if run.fault:
         yield "a setpoint is no number" if run.fault == NO_NUMBER else f"the block {FAULTS[run.fault]}"
         return
@@ -110,7 +114,7 @@ def _faults(history: History, run: BlockRun, limits: dict[str, float], *, lasts:
         yield from _axis_faults(history, named, axis, limits)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    if not run.promise and not (history.brakes or history.disturbed or lasts):
+    if not run.promise and not (history.brakes or history.disturbed or lasts or watched.unproven):
         yield TAKEN_BACK
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.motion.profile import Array
-from gen_profile.planner.interface import SENSOR, BlockAxis
+from gen_profile.planner.interface import SENSOR, UNPROVEN, BlockAxis
 from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
 from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.spec.model import Spec
@@ -31,6 +31,8 @@ FAULTS = (
     "drop-outs",
     "away",
 )
+EXCHANGED = "exchanged"  # two sensors, from the start on
+FROM_START = ("sign", "scale", "dead")  # half of these, likewise
 NOTICED = ("silent", "away", "no number", "out of range")  # others are noticed where they do harm
 SHOW_NOTHING = ("frozen",)  # from the first value on, and nothing is promised then
 SHORTEST = 0.5  # s, of a gust
@@ -122,9 +124,11 @@ class SensedHistory:
         random, directions = np.random.default_rng([int(seed * 2**32), 1]), sensed_directions(spec)
         more = random.random((3, len(directions) - 1)).tolist()  # of the second sensor, and so on
         columns = [list(planned_axes(spec)).index(number) for number in directions]
-        fault = ""
+        fault, faults = "", (*FAULTS, *[EXCHANGED] * (len(directions) > 1))
         if kind >= SOUND:
-            fault = FAULTS[min(int((kind - SOUND) / (1.0 - SOUND) * len(FAULTS)), len(FAULTS) - 1)]
+            fault = faults[min(int((kind - SOUND) / (1.0 - SOUND) * len(faults)), len(faults) - 1)]
+        always = fault == EXCHANGED or (fault in FROM_START and seed < 0.5)
+        fails *= not always
         until = last + 0.5 * disturbance.settle
         latest = fails * until if fault else until
         if fault == "silent" and latest <= sensor.drop_out:  # none that no sensor would show
@@ -160,8 +164,8 @@ class SensedHistory:
 
     @property
     def blind(self) -> bool:
-        """Whether its sensor shows a load that hangs still, and nothing tells that it does not."""
-        return self.fault == "dead"
+        """Whether its sensor dies after it was proven, so that nothing tells that the load swings."""
+        return self.fault == "dead" and self.fails > 0.0
 
     @property
     def ends(self) -> float:
@@ -191,10 +195,11 @@ class SensedHistory:
             [list(inputs).index(axes[number].of(name)) for number in directions] for name in SENSOR[:2]
         )
         rows = [self._told(sensor, place, cycle, cycles) for place in range(len(directions))]
+        names = sensor.names[::-1] if self.fault == EXCHANGED else sensor.names
         pushed = np.zeros((cycles, len(axes)))
         pushed += self.pushed(np.arange(1.0, cycles + 1.0) * cycle)
         return Measurement(
-            quantities=[quantity.format(of) for of in sensor.names],
+            quantities=[quantity.format(of) for of in names],
             shows=shows,
             valid=valid,
             cycles=np.stack(rows, axis=1),
@@ -282,7 +287,7 @@ def sensor_faults(
     issued = dict(zip(outputs, run.trace.T, strict=False))
     axes, _, disturbance = planned_axes(spec), *_stated(spec)
     for place, (number, direction) in enumerate(sensed_directions(spec).items()):
-        axis, fault = axes[number], one.fault if place == one.failing else ""
+        axis, fault = axes[number], one.fault if place == one.failing or one.fault == EXCHANGED else ""
         sway = run.trace[:, len(outputs) + direction.end_load]
         if not one.fault:
             yield from _misestimated(axis, issued, sway, estimation_error, cycle)
@@ -298,10 +303,11 @@ def sensor_faults(
                 period=period,
                 resets=resets,
             )
-        noticed = issued[axis.of("nSensorFault")]
+        told = issued[axis.of("nSensorFault")]
+        noticed = np.where(told == UNPROVEN, 0.0, told)
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
-            found = at if noticed.any() else None
+            found = at if noticed.any() else len(told) * cycle if told[-1] == UNPROVEN else None
             yield from _faults_of_a_faulty_one(spec, one, run, sway, noticed=found, cycle=cycle)
             if fault == "away" and noticed[-1]:
                 yield f"a sensor that is back is not used again, from {one.fails:.2f} s"

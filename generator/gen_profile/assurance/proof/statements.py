@@ -229,7 +229,7 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
                 may_be[at:] &= run.issued["bBusy"][at - 1] != 0.0
         if sees[order.begin : order.end].any():
             must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
-    return may_be | (np.cumsum(run.sensed("nSensorFault")) > 0), must_be
+    return may_be | (np.cumsum(run.lost_sensors) > 0), must_be
 
 
 def _moves_as_stated(run: Followed, order: TimedOrder) -> bool:

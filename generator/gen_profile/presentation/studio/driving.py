@@ -17,6 +17,7 @@ from gen_profile.dynamics.evaluation.phrases import machine, place_unit
 from gen_profile.dynamics.evaluation.simulation import equations_of, swing_from
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.profile import Array
+from gen_profile.planner.interface import UNPROVEN
 from gen_profile.planner.machine import planned_axes, sensed_directions
 from gen_profile.planner.planner import Planner
 from gen_profile.plants.drawing import Drawing
@@ -171,7 +172,7 @@ class Drive:
             "wind": gust.acceleration if gust else 0.0,
             "used": bool(used.all()),
             "damping": bool(outputs["bDamping"][-1]),
-            "fault": int(fault.max()),
+            "fault": int((fault * (fault != UNPROVEN)).max()),
         }
 
     def _estimated(self, outputs: Mapping[str, Array]) -> Array:
