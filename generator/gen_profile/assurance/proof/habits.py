@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 
 from gen_profile.assurance.proof.orders import ZONES
-from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
 
 REPEATED = 16  # commands
@@ -25,17 +24,6 @@ NOISY = (1e-3, 0.3)  # of the greatest velocity, by which a measured one is off
 OLD = 0.02  # s, at most, that a measured position is old
 SPIKE = 5.0  # times the greatest velocity, in one cycle
 OFTEN = 3  # so often some habits are taken
-WAITS = (0.15, 1.0)  # periods, from one command of a rhythm to the next
-UNEVEN = 2.0  # by which every other wait may be longer or shorter
-EVEN = 1.0 / 3.0  # share of the rhythms whose waits are all the same
-STEPS = (0.002, 0.5)  # of the travel, between targets
-SPEEDS = (0.2, 1.0)  # of the greatest
-BEATS = (  # what a rhythm commands in turn, and its sign
-    (("velocity", 1.0), ("velocity", -1.0)),
-    (("velocity", 1.0), ("velocity", 0.0), ("velocity", -1.0), ("velocity", 0.0)),
-    (("position", 1.0), ("position", -1.0)),
-    (("position", 1.0), ("stop", 0.0), ("position", -1.0), ("stop", 0.0)),
-)
 
 MORE = 0.6180339887  # turns one choice into others
 
@@ -484,39 +472,3 @@ GENTLE: tuple[Habit, ...] = (
 )
 ROUGH: tuple[Habit, ...] = (_strayed, _braked, _disabled, _respooled)  # the load swings then
 BRAKING = 2  # the first of these
-
-
-def rhythm(choices: Array, around: Surroundings, lasts: float) -> Manner:
-    """Throw the stick over, or send the axes to and fro, in one rhythm for so many seconds; then stop.
-
-    Parameters
-    ----------
-    choices : (5 + axes,) array
-        Kind, wait, how uneven, size and place; and a share of the size for each axis.
-    around : Surroundings
-    lasts : float
-    """
-    kind, wait, uneven, size, place, *shares = choices.tolist()
-    beats = BEATS[min(int(kind * len(BEATS)), len(BEATS) - 1)]
-    first = around.period * WAITS[0] * (WAITS[1] / WAITS[0]) ** wait
-    uneven = 2.0 * uneven - 1.0
-    waits = (first, first * UNEVEN ** (uneven - min(max(uneven, -EVEN), EVEN)))
-    size = min(1.0, 1.1 * size)
-    axes = [*zip(around.targets, around.speeds, shares, strict=True)]
-    fast, far = SPEEDS[0] + size * (SPEEDS[1] - SPEEDS[0]), STEPS[0] * (STEPS[1] / STEPS[0]) ** size
-    speeds = [top * fast * min(1.0, 0.5 + share) for _, (_, top), share in axes]
-    steps = [0.5 * (high - low) * far * min(1.0, 0.5 + share) for (low, high), _, share in axes]
-    middles = [
-        low + step + place * (high - low - 2.0 * step)
-        for ((low, high), *_), step in zip(axes, steps, strict=True)
-    ]
-    commands, time = [Command(time=0.0, command="velocity", values=(0.0,) * len(axes))], 0.5 * around.period
-    while time < lasts:
-        command, sign = beats[(len(commands) - 1) % len(beats)]
-        values = {
-            "velocity": tuple(sign * speed for speed in speeds),
-            "position": tuple(middle + sign * step for middle, step in zip(middles, steps, strict=True)),
-        }
-        commands.append(Command(time=time, command=command, values=values.get(command, ())))
-        time += waits[len(commands) % 2]
-    return *commands, Command(time=time, command="stop")

@@ -15,6 +15,7 @@ import numpy as np
 
 from gen_profile.assurance.proof import habits
 from gen_profile.assurance.proof.habits import MORE, Change, Manner, Surroundings, between
+from gen_profile.assurance.proof.rhythms import rhythm
 from gen_profile.assurance.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.dynamics.evaluation import phrases
 from gen_profile.dynamics.problem.hoisted_plant import hoisted
@@ -320,7 +321,7 @@ class Histories:
         swings = not lasts and manner * len(MANNERS) % 1.0 < ROUGH_SHARE
         rough = swings * (habits.BRAKING if is_sensed else len(habits.ROUGH))
         if 0.0 < lasts < SHIFT:
-            given = habits.rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)
+            given = rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)
             given += self._hoisted_at_rest(rows.ravel()[5 + axes], habits.commands_in(given)[-1].time)
         else:
             rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
