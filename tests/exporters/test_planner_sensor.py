@@ -174,9 +174,10 @@ def test_a_sensor_that_fails_before_it_showed_anything_withdraws_the_promise(com
 def test_a_value_that_stays_the_same_may_hide_a_gust():
     compiled = compile_counting(planner_block(preset_spec("bay-crane", [LIVE, SENSOR, GUSTS])).text)
     swung, sound = crane(compiled), {"noise": 0.002, "random": np.random.default_rng(4)}
-    assert swung.run(10.0, **sound)["bPromise"][-1]
+    assert swung.run(10.0, **sound)["nPromise"][-1] == 6.0  # nothing has moved yet
+    assert swung.run(0.1, **sound, bLoadAtRest=1.0)["bPromise"][-1]
     swung.gust = 0.08
-    swung.run(1.2, **sound)
+    swung.run(1.2, **sound, bLoadAtRest=0.0)
     swung.gust = 0.0
     swung.run(0.1, **sound)  # which the sensor has hardly shown yet
     issued = swung.run(10.0, sensor=lambda *_: 0.0)
