@@ -1,6 +1,6 @@
 # What a change must pass: quick tests, and slow ones whose rooms changed in five commits, or whose turn it is.
 check: lint
-    pytest -n auto --turn "${TURN:-$(git rev-list --count HEAD)}" --changed "$(git diff --name-only "${BASE:-HEAD~5}")"
+    pytest -n auto --turn "${TURN:-$(git rev-list --count HEAD)}" --changed "$(git diff --name-only "${BASE:-$(.ci/base)}")"
 
 # All that there is, whatever turn it is.
 check-all: lint coverage oldest
