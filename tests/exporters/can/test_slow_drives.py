@@ -37,12 +37,12 @@ def late(bench, number, milliseconds):
 
 def settings(drive):
     """Everything that a drive holds, but for what it tells of itself."""
-    told = {0x6040, 0x6041, 0x6061, 0x6064, 0x607A}
+    unlike = {0x6040, 0x6041, 0x6061, 0x6064, 0x607A}
     objects = drive.local.object_dictionary
     return {
         (index, sub): drive.value(index, sub)
         for index, entry in objects.items()
-        if index not in told
+        if index not in unlike
         for sub in getattr(entry, "subindices", [0])
         if objects.get_variable(index, sub).data_type in range(2, 8)
         and not (0x1600 <= index < 0x1C00 and sub > drive.value(index))  # an entry that does not count

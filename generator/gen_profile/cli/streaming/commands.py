@@ -57,6 +57,7 @@ _bus_options = options.together(
     "Draw the motion while it runs: here, or on a page of this machine.",
     click.Choice(["terminal", "browser"]),
 )
+@option("--eds FILE", "First try the drives' settings on their EDS or DCF.", options.InputFile())
 @option("--dry-run", "Print the plan, and touch no bus.")
 @option("--accept-unverified", "Stream what was exported without its check.")
 @option("--log CSV", "Write planned and actual positions side by side.", OutputFile(), into="table")
@@ -81,6 +82,8 @@ def stream(table: Path | None, **given: Any) -> None:
                 print_outcome(*at_start(source))
                 return
             source = slow
+        if request.eds is not None:
+            run.require_fit(source, request.eds)
         if request.dry_run:
             plan = run.summary(source)
             print_outcome(plan, plan_words(plan, [axis.unit for axis in source.axes]))
@@ -178,6 +181,7 @@ class StreamRequest:
     reset_fault: bool
     self_test: bool
     live: str | None
+    eds: Path | None
     dry_run: bool
     accept_unverified: bool
 

@@ -184,6 +184,18 @@ def summary(source: Source) -> dict[str, Any]:
     }
 
 
+def require_fit(source: Source, sheet: Path) -> None:
+    """Require that drives of an EDS or DCF can be set up for a motion, see `data_sheet.require_fit`.
+
+    Raises
+    ------
+    ExportError
+    """
+    from gen_profile_exporters.can.setup import data_sheet  # noqa: PLC0415  # canopen is an extra
+
+    data_sheet.require_fit(sheet, source.plan.demand, source.plan.target)
+
+
 def rehearsed_cycles(source: Source) -> int:
     """Count the cycles of a self-test."""
     return source.plan.planned or round(SELF_TEST / source.spec.can.sync_period)

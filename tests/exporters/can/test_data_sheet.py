@@ -1,0 +1,84 @@
+"""EDS files in place of drives: what the bus would refuse is refused at the desk, by the same sentences."""
+
+import re
+
+import pytest
+from exporters.can.bench import Bench
+from exporters.motions import quintic, target
+
+from gen_profile.support.errors import ExportError
+from gen_profile_exporters.can.export import exporter
+from gen_profile_exporters.can.setup.data_sheet import require_fit
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant, eds
+from gen_profile_exporters.can.streaming.plan import plan_of
+
+MOVE = quintic((0.0, 0.3), duration=2.0)
+RPM = DriveVariant(units=(0x00B5_0000, 0x00B4_4700, 0x00C0_0300), fixed_units=True, encoder=(4096, 1))
+IN_RPM = {"velocity_unit": "rpm", "acceleration_unit": "rpm/s", "counts_per_revolution": 4096.0}
+
+
+def tried(folder, make, change=lambda text: text, **options):
+    """Try a motion on the file of a drive, changed as a text."""
+    goal = target(**options)
+    plan = plan_of(exporter.encode(MOVE, goal)[0].content, goal)
+    path = folder / "drive.eds"
+    path.write_text(change(eds(1, make)), encoding="utf-8")
+    require_fit(path, plan.demand, goal)
+
+
+def without(index):
+    """Leave an object out, and its subindices."""
+    return lambda text: re.sub(rf"(?ms)^\[{index}(sub\w+)?\]\n.*?(?=^\[)", "", text)
+
+
+def of(index, key, value):
+    """Give an object another access, limit or value."""
+    return lambda text: re.sub(rf"(?ms)(^\[{index}\]\n)(.*?)(^PDOMapping)", rf"\1\2{key}={value}\n\3", text)
+
+
+@pytest.mark.parametrize(
+    ("make", "options"),
+    [
+        (DriveVariant(), {}),
+        (DriveVariant(own_mapping=True, period_exponent=-4, sync_counter=20), {"sync_period": 0.01}),
+        (DriveVariant(), {"mode": "csv", "following_error": 0.02}),
+        (RPM, IN_RPM),
+    ],
+)
+def test_drives_that_fit(tmp_path, make, options):
+    tried(tmp_path, make, **options)
+    with Bench(profile=MOVE, make=make, **options) as bench:
+        assert not bench.run().reason
+
+
+@pytest.mark.parametrize(
+    ("make", "change", "reason"),
+    [
+        (DriveVariant(), without("605A"), "605Ah:00 .* must hold 2 .*, but the drive keeps nothing there"),
+        (DriveVariant(), without("1016"), "1016h:01 .* but the drive keeps nothing there"),
+        (DriveVariant(), without("6502"), "the drive has no object 6502h"),
+        (DriveVariant(), of("6085", "HighLimit", "0x10"), "6085h:00 .* must hold"),
+        (DriveVariant(modes=1), None, "does not know the mode csp"),
+        (DriveVariant(fixed_period=(2, -3)), None, "60C2h:01 .* must hold 4"),
+        (RPM, None, "counts in rpm/s where the spec has counts/s"),
+        (DriveVariant(following_error=0), None, "does not watch its following error"),
+    ],
+)
+def test_what_the_bus_would_refuse(tmp_path, make, change, reason):
+    with pytest.raises(ExportError, match=rf"^drive.eds: axis cart: .*{reason}"):
+        tried(tmp_path, make, change or (lambda text: text))
+
+
+@pytest.mark.parametrize(
+    "change", [lambda _: "", lambda _: "[", lambda text: text[:5000], lambda _: "[1000]\nx=1\n"]
+)
+def test_other_files_are_sentences(tmp_path, change):
+    with pytest.raises(ExportError, match=r"drive\.eds"):
+        tried(tmp_path, DriveVariant(), change)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    goal = target()
+    demand = plan_of(exporter.encode(MOVE, goal)[0].content, goal).demand
+    with pytest.raises(ExportError, match=r"none.eds cannot be read \(No such file"):
+        require_fit(tmp_path / "none.eds", demand, goal)
