@@ -172,3 +172,31 @@ def test_a_sensitivity_that_the_others_imply_is_said_to_be_left_out(tmp_path):
     assert "left out" in outcome.out
     document = run_here("--set", uncertain, "--set", "check.residual_sway=0.1", "--out", tmp_path, "--json")
     assert document.document["solver"]["redundant"]
+
+
+@pytest.mark.parametrize(
+    ("names", "formats", "shared"),
+    [
+        (("bay-3", "bay_3"), "plc", "fb_bay_3"),
+        (("bay", "bay Axis"), "plc", "fb_bay_axis"),
+        (("Bay", "bay"), "csv", "bay.csv"),
+        (("bay-3", "bay_3"), "rockwell-l5x", "fb_bay_3"),
+        (("bay-3", "bay_3"), "csv", None),
+        (("bay-3", "bay-4"), "plc", None),
+    ],
+)
+def test_motions_that_would_share_files_or_blocks_are_kept_apart(tmp_path, names, formats, shared):
+    def exported(name):
+        words = ("--preset", "paper-beta0", "--set", f"name={name}", "--set", "export.cycle_time=0.01")
+        return run_here(*words, "--export", formats, "--no-check", "--out", tmp_path)
+
+    first, second = names
+    assert exported(first).code == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    done = exported(second)
+    if shared is None:
+        assert done.code == 0
+        return
+    assert done.code == 2 and f"would share {shared} with it; give it another name" in done.err
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert exported(first).code == 0  # again, as its own files are no others'

@@ -3,6 +3,7 @@
 import re
 import uuid
 
+import attrs
 import l5x
 import numpy as np
 import pytest
@@ -302,6 +303,20 @@ class TestRockwell:
             f"error {rockwell_l5x.spline_error(sample(move, CYCLE), cycles, single=True):.2g} m"
             in tag.description
         )
+
+    def test_tags_of_long_names_are_valid_and_apart(self):
+        """Logix takes 40 characters, no underscore at the end and no two in a row."""
+        tags = []
+        for end in ("north", "south"):
+            goal = attrs.evolve(
+                goal_of(TWO_MOVES), name=f"the third bay of hall - and its cranes, {end}".replace(",", "")
+            )
+            (file,) = rockwell_l5x.encode(TWO_MOVES, goal)
+            root = etree.fromstring(file.content)
+            tags.append({one.get("Name") for one in (*root.iter("Tag"), *root.iter("Routine"))})
+        assert not tags[0] & tags[1] - {"Timebase"}
+        for name in set.union(*tags):
+            assert re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name) and len(name) <= 40, name
 
     def test_profiles_are_calculated_once_after_an_import(self, tmp_path):
         """Structured Text runs MCCP in every scan that reaches it, and so would begin anew for ever."""

@@ -7,6 +7,7 @@ stated in the tag's description.
 """
 
 import re
+from hashlib import sha256
 
 import numpy as np
 from lxml import etree
@@ -159,13 +160,22 @@ def _real(value: float) -> str:
 
 
 def _tag_names(target: Target) -> list[str]:
-    stem = block_name(target.name).removeprefix("FB_")[: NAME_LENGTH - 16]
+    stem = _short(target.name, NAME_LENGTH - 16)
     several = len(target.axes) > 1
     return [f"Cam_{stem}{f'_{number}' if several else ''}" for number in range(1, len(target.axes) + 1)]
 
 
 def _routine(target: Target) -> str:
-    return f"Play_{block_name(target.name).removeprefix('FB_')}"[:NAME_LENGTH]
+    return f"Play_{_short(target.name, NAME_LENGTH - len('Play_'))}"
+
+
+def _short(name: str, most: int) -> str:
+    """Name tags after the motion; a part of its hash keeps those of long names apart."""
+    whole = block_name(name).removeprefix("FB_")
+    if len(whole) <= most:
+        return whole
+    digest = sha256(name.encode("ascii")).hexdigest()[:6]
+    return f"{whole[: most - 7].rstrip('_')}_{digest}"
 
 
 def _statements(names: list[str], points: int) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,12 +37,17 @@ from gen_profile.support.errors import OutputError, SpecError
 from gen_profile.support.progress import Progress, no_progress, require_progress
 from gen_profile.support.summary import Drawable
 from gen_profile_exporters.exporter import Exporter, target_of
+from gen_profile_exporters.playback.structured_text import block_name
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
 if TYPE_CHECKING:
     from gen_profile.assurance.proof.verdict import (
         Proof,  # SciPy's statistics take longer to load than the main job
     )
+
+WITHOUT_BLOCKS = {"csv", "can"}  # formats that name nothing in a controller after the motion
+# what names of blocks end in beside the motion's own: wrappers, and planner blocks with theirs
+BLOCKS = ("", "_Axis", "_Velocity", "_planner", "_planner_Axis", "_planner_Velocity")
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -293,6 +298,23 @@ def _after_earlier_ones(manifest: Manifest, earlier: bytes | None) -> Manifest:
     """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
     if earlier is None:
         return manifest
-    with suppress(OutputError):
-        return manifest.after(parse_manifest(earlier, FILENAME))
-    return manifest
+    try:
+        previous = parse_manifest(earlier, FILENAME)
+    except OutputError:
+        return manifest
+    for one in (previous, *previous.earlier):
+        if one.name != manifest.name and (shared := _taken(manifest) & _taken(one)):
+            raise OutputError(
+                f"The folder holds {one.name!r}, and {manifest.name!r} would share {min(shared)} with it; "
+                "give it another name, or another folder. Nothing was written."
+            )
+    return manifest.after(previous)
+
+
+def _taken(manifest: Manifest) -> set[str]:
+    """List the names of an export's files and blocks; neither Windows nor IEC 61131-3 tells case apart."""
+    blocks: tuple[str, ...] = ()
+    if any(known.format not in WITHOUT_BLOCKS for known in manifest.artefacts):
+        blocks = BLOCKS
+    files = [known.path for known in manifest.artefacts]
+    return {name.casefold() for name in (*files, *(block_name(manifest.name) + end for end in blocks))}
