@@ -76,3 +76,12 @@ def test_limits_bind_the_command_of_a_lagging_drive(tmp_path):
     limited = run_here("--set", f"limits.velocity={limit}", *words)
     assert limited.code == 0, limited.err
     assert limited.document["figures"]["command_velocity_max_m_per_s"] <= limit * (1.0 + 1e-6)
+
+
+def test_a_shortest_motion_without_a_limit_of_the_jerk_tells_its_own(tmp_path):
+    shortest = ("--set", "move.duration=minimum", "--set", "limits.acceleration=0.7", "--no-check")
+    outcome = run_here(*shortest, "--out", tmp_path, "--json")
+    (warning,) = outcome.errors
+    asked = outcome.document["axes"]["cart"]["jerk_max_m_per_s3"]
+    assert f"asks cart for {asked:.4g} m/s³, as no limit of its jerk is stated" in warning
+    assert run_here(*shortest, "--set", "limits.jerk=60", "--out", tmp_path, "--json").errors == []

@@ -12,7 +12,7 @@ import click
 from gen_profile.cli import options
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import Count, InputFile, Number, OutputFile, PathType, SpecChoice, option
-from gen_profile.cli.outcome import fail, leave_unproved, not_written, print_outcome, warn
+from gen_profile.cli.outcome import fail, leave_unproved, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import draw, progress
 from gen_profile.cli.signing import require_signature, sign, signed_by_option, signing_key, signing_option
 from gen_profile.support.errors import CertificateError, OutputError, SpecError
@@ -84,6 +84,8 @@ def design(
     document = outcome.to_dict() | {"certificate": worst and worst.to_dict()}
     print_outcome(document, words.design(outcome, certificates))
     warn(outcome.check)
+    if spec.move.shortest:
+        print_warnings(words.abrupt(outcome))
     if not outcome.passed:
         fail(outcome.reasons(), "The files were kept." if outcome.artefacts else not_written(folder))
     if refusals:

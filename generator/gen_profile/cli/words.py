@@ -395,6 +395,18 @@ def _move(spec: Spec) -> str:
     return ", ".join([spec.plant.type, f"{distances} in {duration}", *ranges])
 
 
+def abrupt(outcome: Design) -> Iterator[str]:
+    """Warn of the jerk of a shortest motion where no limit holds it: a finer mesh has a greater one."""
+    from gen_profile.dynamics.evaluation.demands import demands
+
+    for one in demands(outcome.spec, outcome.plan.evaluation.command):
+        if one.quantity == "jerk" and one.allowed is None and one.asked > 0.0:
+            yield (
+                f"The shortest motion asks {one.axis.name} for {number(one.asked)} {one.unit}, as no limit "
+                "of its jerk is stated; state limits.jerk if that is too much for drive or structure."
+            )
+
+
 def _assumed(spec: Spec) -> str:
     """List the values that the spec left to the type of its machine, with their sizes."""
     values, units = spec.plant.parameters, spec.machine().units
