@@ -162,7 +162,7 @@ def random_case(seed):
     random = np.random.default_rng(seed)
     preset = ("single-pendulum-crane", "gantry-crane", "mass-spring-chain")[seed % 3]
     values = {
-        "single-pendulum-crane": {"L0": 2.0, "c": 10 ** random.uniform(1, 3)},
+        "single-pendulum-crane": {"m": 1e3, "L0": 2.0, "c": 10 ** random.uniform(1, 3)},
         "gantry-crane": {"L": random.uniform(1.0, 8.0), "c": 0.0},
         "mass-spring-chain": {
             **{name: 10 ** random.uniform(-0.5, 0.5) for name in ("m1", "m2")},

@@ -224,7 +224,7 @@ def axis_lines(table: PlaybackTable) -> list[str]:
         f"{axis.unit}, peaks {velocity[number]:.4g} {axis.unit}/s and {acceleration[number]:.4g} "
         f"{axis.unit}/s2,\n"
         f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3; on the way {low[number]:g} to "
-        f"{high[number]:g} {axis.unit};\n        {_allowed(table.variants[number])}."
+        f"{high[number]:g} {axis.unit}; {_allowed(table.variants[number])}."
         for number, axis in enumerate(table.axes)
     ]
 
