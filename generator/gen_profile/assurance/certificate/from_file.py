@@ -1,5 +1,6 @@
 """Certificates of artefacts that lie on disk: made, and checked again."""
 
+import math
 import zlib
 from collections.abc import Sequence
 from functools import partial
@@ -132,6 +133,11 @@ def check_certificate(
         done += count
         progress(done, len(claimed.boxes))
     for sway, said, bound in zip(claimed.sways, stated.tolist(), bounds.tolist(), strict=True):
+        if math.isnan(bound):
+            raise CertificateError(
+                f"The certificate does not prove what it says: no bound of the {sway.limit.load} follows "
+                f"from its boxes, and it states {1e3 * said:.4g} mm."
+            )
         if not bound <= said:
             raise CertificateError(
                 f"The certificate does not prove what it says: the {sway.limit.load} is bounded by "

@@ -6,7 +6,8 @@ distance when ``Σ aᵢ = 1`` (Singer and Seering, 1990).
 
 A train for an undamped mode becomes one for a damped mode by stretching its times to the damped period and
 weighing its amplitudes by exp(−ζω tᵢ): every term of that sum is then what it was. Trains of unity magnitude
-keep their amplitudes and move in time instead.
+keep their amplitudes and move in time instead. So weighed, an extra-insensitive train would lose what it
+tolerates, and with it a part of its range: it follows published fits over the damping ratio instead.
 """
 
 import cmath
@@ -22,7 +23,7 @@ from gen_profile.motion.profile import Array, read_only
 from gen_profile.support.errors import InfeasibleProblem
 
 TOLERATED = 0.05  # share of the vibration that extra-insensitive shapers trade for a wider range
-UNITY_MAGNITUDE_DAMPING = 0.3  # ratio up to which trains of unity magnitude are known
+MOST_DAMPING = 0.3  # ratio up to which trains of unity magnitude, and those that tolerate, are known
 NEWTON_STEPS = 10  # six reach rounding for every ratio up to that
 MOST_IMPULSES = 4096
 
@@ -100,15 +101,53 @@ def unity_magnitude(guess: Sequence[float], frequency: float, damping_ratio: flo
     Raises
     ------
     InfeasibleProblem
-        The mode is damped beyond `UNITY_MAGNITUDE_DAMPING`.
+        The mode is damped beyond `MOST_DAMPING`.
     """
-    if damping_ratio > UNITY_MAGNITUDE_DAMPING:
-        raise InfeasibleProblem(
-            f"A mode of this machine has a damping ratio of {damping_ratio:.2g}, and shapers of unity "
-            f"magnitude are for ratios up to {UNITY_MAGNITUDE_DAMPING:g}; choose another method."
-        )
+    _require_little_damping(damping_ratio, "of unity magnitude")
     phases = _alternating_phases(tuple(guess), damping_ratio)
     return Impulses(times=phases / frequency, amplitudes=_alternating(len(phases)))
+
+
+def extra_insensitive(
+    amplitudes: Sequence[float],
+    weights: Sequence[Sequence[float]],
+    delays: Sequence[Sequence[float]],
+    frequency: float,
+    damping_ratio: float = 0.0,
+) -> Impulses:
+    """Place impulses that leave `TOLERATED` of a mode on purpose, by fits over its damping ratio ζ.
+
+    Parameters
+    ----------
+    amplitudes : (impulses,) sequence of float
+        For an undamped mode, half a period apart.
+    weights : (impulses,) sequence of sequence of float
+        What they change by: factors of ζ, ζ², ζ³.
+    delays : (impulses − 1,) sequence of sequence of float
+        Likewise of the times of all but the first, in damped periods.
+    frequency : float
+        Undamped, in rad/s.
+    damping_ratio : float
+
+    Raises
+    ------
+    InfeasibleProblem
+        The mode is damped beyond `MOST_DAMPING`.
+    """
+    _require_little_damping(damping_ratio, "that tolerate some vibration")
+    powers = damping_ratio ** np.arange(1, 4)
+    weighed = np.array(amplitudes) / sum(amplitudes) + np.array(weights) @ powers
+    places = 0.5 * np.arange(len(amplitudes)) + np.concatenate([[0.0], np.array(delays) @ powers])
+    period = 2.0 * math.pi / (frequency * math.sqrt(1.0 - damping_ratio**2))
+    return Impulses(times=places * period, amplitudes=weighed / weighed.sum())
+
+
+def _require_little_damping(damping_ratio: float, which: str) -> None:
+    if damping_ratio > MOST_DAMPING:
+        raise InfeasibleProblem(
+            f"A mode of this machine has a damping ratio of {damping_ratio:.2g}, and shapers {which} are for "
+            f"ratios up to {MOST_DAMPING:g}; choose another method."
+        )
 
 
 @cache
@@ -156,10 +195,42 @@ SHAPERS: dict[str, Shaper] = {
     "zvdd": partial(evenly_spaced, (1.0, 3.0, 3.0, 1.0), 0.5),
     # unity magnitude and derivative (Singhose et al., 1994)
     "umzvd": partial(unity_magnitude, (0.09, 0.37, 0.64, 0.73)),
-    # extra-insensitive: small vibration over a range of frequencies (Singhose et al., 1994 and 1997)
-    "ei": partial(evenly_spaced, (1.0 + TOLERATED, 2.0 - 2.0 * TOLERATED, 1.0 + TOLERATED), 0.5),
-    "2hump-ei": partial(evenly_spaced, _two_hump(TOLERATED), 0.5),
-    "3hump-ei": partial(evenly_spaced, _three_hump(TOLERATED), 0.5),
+    # extra-insensitive: small vibration over a range of frequencies (Singhose et al., 1994 and 1997), with
+    # their fits over the damping ratio for 5 %
+    "ei": partial(
+        extra_insensitive,
+        (1.0 + TOLERATED, 2.0 - 2.0 * TOLERATED, 1.0 + TOLERATED),
+        ((0.861744, 0.654648, 0.0), (-0.100003, -1.261411, 0.0), (-0.761741, 0.606763, 0.0)),
+        ((0.0445256, -0.0585255, 0.930273), (0.0, 0.0, 0.0)),
+    ),
+    "2hump-ei": partial(
+        extra_insensitive,
+        _two_hump(TOLERATED),
+        (
+            (0.76699, 2.26560, -1.22750),
+            (0.45081, -2.58080, 1.73650),
+            (-0.61533, -0.68765, 0.42261),
+            (-0.60246, 1.00280, -0.93145),
+        ),
+        ((0.16270, -0.54262, 6.16180), (0.18382, -1.58270, 8.17120), (-0.09297, -0.28338, 1.85710)),
+    ),
+    "3hump-ei": partial(
+        extra_insensitive,
+        _three_hump(TOLERATED),
+        (
+            (0.76632, 3.29160, -1.44380),
+            (0.61164, -2.57850, 4.85220),
+            (-0.19062, -2.14560, 0.13744),
+            (-0.73297, 0.46885, -2.08650),
+            (-0.45439, 0.96382, -1.46000),
+        ),
+        (
+            (0.23834, 0.44559, 12.47200),
+            (0.29808, -2.36460, 23.39900),
+            (0.10306, -2.01390, 17.03200),
+            (-0.28231, 0.61536, 5.40450),
+        ),
+    ),
     # zero vibration with three impulses within ¾ of a period, known from 3D printers' firmware
     "mzv": partial(evenly_spaced, (1.0 - math.sqrt(0.5), math.sqrt(2.0) - 1.0, 1.0 - math.sqrt(0.5)), 0.375),
 }
