@@ -86,9 +86,17 @@ def test_logs_with_and_without_a_header(separator, decimal):
         ("t;a\n1;2\n", "needs at least 16 samples, found 1"),
         ("t;a\n1;x\n", "row 2: a holds 'x', which is no number"),
         ("1;2\n1;\n", "needs at least 16 samples, found 1"),
-        ("\n".join("0;1" for _ in range(20)), "row 2: the times must rise from row to row, and 0 follows 0"),
         (
-            "Logger 3\n\nt;a\n" + "".join(f"{time};1\n" for time in [*range(9), *range(5, 40)]),
+            "\n".join("0;1" for _ in range(20)),
+            r"found 1 \(19 rows that were logged twice, the first .* row 2",
+        ),
+        (
+            "\n".join(f"0;{k}" for k in range(20)),
+            "row 2: the times must rise from row to row, and 0 follows 0",
+        ),
+        (
+            "Logger 3\n\nt;a\n"
+            + "".join(f"{time};{k}\n" for k, time in enumerate([*range(9), *([5, 9] * 4), *range(10, 40)])),
             "row 13: the times must rise from row to row, and 5 follows 8; .* where the clock was set back",
         ),
     ],

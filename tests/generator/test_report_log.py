@@ -64,6 +64,15 @@ def test_other_columns_are_left_alone_and_named():
     assert parse_log(text, "log.csv", paper()).ignored == ("torque", "crab_sway_mm", "position_per_s")
 
 
+def test_what_is_mended_is_told():
+    rows = table(["time_s", "sway_mm"], TIMES, TIMES) + "0.36,x\n0.36,0.36\n"
+    log = parse_log(rows, "log.csv", paper())
+    np.testing.assert_allclose(log.times, TIMES)
+    assert [note.partition(",")[0] for note in log.notes] == [
+        "1 rows that hold no number", "1 rows that were logged twice"
+    ]  # fmt: skip
+
+
 def test_the_exported_table_is_such_a_log(tmp_path):
     assert run_here("--preset", "paper", "--out", tmp_path, "--no-check").code == 0
     log = read_log(tmp_path / "paper.csv", paper())
@@ -93,20 +102,26 @@ def test_the_exported_table_is_such_a_log(tmp_path):
         ),
         (table(["time_s", "sway"], TIMES[:5], TIMES[:5]), "needs at least 16 samples, found 5"),
         (
-            table(["time_s", "sway"], TIMES[::-1], TIMES),
-            "row 3: the times must rise from row to row, and 0.36 follows 0.38; sort the rows, remove",
+            table(["time_s", "sway"], [0.0] * 20, TIMES),
+            "row 3: the times must rise from row to row, and 0 follows 0; sort the rows, remove",
         ),
-        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n", "row 22: sway holds 'x', which is no number"),
-        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,1e300\n", "row 22: sway holds '1e300', which is no"),
         (
-            table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n",
+            table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n" * 2,
+            "row 22: sway holds 'x', which is no number",
+        ),
+        (
+            table(["time_s", "sway"], TIMES, TIMES) + "0.5,1e300\n" * 2,
+            "row 22: sway holds '1e300', which is no",
+        ),
+        (
+            table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n" * 21,
             "which is no number of a log; leave the cell",
         ),
         (
-            "\n" + table(["time_s", "sway"], TIMES, TIMES) + "\n\n0.5,1 mm\n",
+            "\n" + table(["time_s", "sway"], TIMES, TIMES) + "\n\n0.5,1 mm\n0.6,1 mm\n",
             "row 25: sway holds '1 mm', which",
         ),
-        ('time_s,sway\n"0,0","0,5"\n' * 9, "row 2: time_s holds '0,0', which is no number of a log; write"),
+        ('time_s,sway\n"0,0","0,5"\n' * 9, "row 3: time_s holds 'time_s', which is no number of a log."),
         (
             "time_s,sway\n0,00,0,50\n" + "0,02,0,50\n" * 20,
             "row 2: holds 4 numbers below 2 names;",
@@ -143,7 +158,7 @@ def test_a_huge_file_is_refused_unread(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("option", [("report", "--measured"), ("identify", "--free", "L1", "--swing")])
 def test_a_workbook_is_told_how_to_become_a_log(tmp_path, option):
-    (tmp_path / "log.xlsx").write_bytes(b"PK\x03\x04 and so on")
+    (tmp_path / "log.xlsx").write_bytes(b"\xd0\xcf\x11\xe0 and so on")
     outcome = run_here(*option, tmp_path / "log.xlsx")
     assert outcome.code == 2
     assert outcome.errors[-1].endswith("open it and save the sheet as CSV.")

@@ -86,11 +86,11 @@ def test_a_move_is_told_from_a_swing_and_held_against_the_plan():
     ("content", "words"),
     [
         (b"", "empty"),
-        (b"PK\x03\x04 a workbook", "save the sheet as CSV"),
+        (b"PK\x03\x04 a workbook", "workbook is damaged"),
         (b"\x1f\x8b", "unpack"),
         (bytes(range(256)) * 40, "column"),
         (b"time_s,hook_angle\n" + b"0.1,nan\n" * 40, "no number"),
-        (b"time_s,hook_angle\n" + b"0.1,0.2\n" * 40, "rise"),
+        (b"time_s,hook_angle\n" + b"".join(b"0.1,0.%d\n" % k for k in range(40)), "rise"),
         (b"time_s,hook_angle\n0,1e300\n", "number"),
         (b'"' * 5000, ""),
     ],

@@ -263,8 +263,8 @@ def identification(identified: Identification, path: Path) -> str:
     rows = []
     for name, row in document["parameters"].items():
         size = f"{row['value']:.6g} ± {row['half_range']:.2g} {row['unit']}"
-        fraction = 100.0 * row["half_range"] / abs(row["value"] or 1.0)
-        rows.append((name, f"{size} (±{fraction:.2g} %; {row['given']:g} before)"))
+        relative = f"±{100.0 * row['half_range'] / abs(row['value']):.2g} %; " if row["value"] else ""
+        rows.append((name, f"{size} ({relative}{row['given']:g} before)"))
     for row in document["readings"]:
         what = row["parameter"] if "parameter" in row else f"period of mode {row['mode']}"
         read = row["value"] if "parameter" in row else row["seconds"]
@@ -276,6 +276,7 @@ def identification(identified: Identification, path: Path) -> str:
         taken = f" ({row['averages']} averages over {row['lasts_s']:.4g} s)" if row["averages"] else ""
         samples = f"{row['samples']} samples of its {row['quantity']}{taken}"
         rows.append((f"log of {row['load']}", f"{samples}, {sizes}"))
+        rows += [("as read", sentence) for sentence in row["read"]]
     rows += [("WARNING", sentence) for sentence in identified.warnings()]
     rows += [*_stated_ranges(identified), *_rests(identified)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]

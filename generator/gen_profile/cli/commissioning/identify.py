@@ -14,7 +14,7 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import InputFile, Number, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
-from gen_profile.support.errors import SpecError
+from gen_profile.support.errors import GenProfileError, SpecError
 
 if TYPE_CHECKING:
     from gen_profile.spec.model import Spec
@@ -24,32 +24,38 @@ if TYPE_CHECKING:
 def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add how a table of a swing is read; the command gets what reads one of a spec's machine as `read`."""
 
-    @option("--columns TIME,VALUE", "Columns of the log: names, or numbers.", default="1,2")
+    @option(
+        "--columns TIME,VALUE",
+        "Columns of the log: names, or numbers; by default those whose names tell it, or the first two.",
+    )
     @option(
         "--signal SIGNAL",
-        "What the log's values are: angle, sway or rate (of the angle), of the first load or, as in "
-        "rate:hook, of another.",
+        "What the log's values are: angle, sway, rate (of the angle) or acceleration (without gravity), of "
+        "the first load or, as in rate:hook, of another.",
         default="angle",
     )
     @option(
         "--unit UNIT",
-        "Unit of the log's values: rad, deg, m, mm, um, rad/s or deg/s; by default what their column's "
-        "name says; for counts the size of one, as in '0.09 deg'.",
+        "Unit of the log's values: rad, deg, m, mm, um, rad/s, deg/s, m/s² or g; by default what their "
+        "column's name says; for counts the size of one, as in '0.09 deg'.",
     )
     @option(
         "--time-unit",
-        "Unit of its times; by default what their column's name says, or s.",
-        click.Choice(["s", "ms", "us"]),
+        "Unit of its times; by default what their column's name says, or the times show.",
+        click.Choice(["s", "ms", "us", "ns"]),
     )
     @wraps(command)
-    def reading(*, columns: str, signal: str, unit: str | None, time_unit: str | None, **given: Any) -> Any:
-        time, comma, value = columns.partition(",")
+    def reading(
+        *, columns: str | None, signal: str, unit: str | None, time_unit: str | None, **given: Any
+    ) -> Any:
+        time, comma, value = (columns or ",").partition(",")
         if not comma:
             raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
 
         from gen_profile.studies.identification.identify import read_swing
 
-        read = partial(read_swing, columns=(time, value), signal=signal, unit=unit, time_unit=time_unit)
+        named = (time, value) if columns else None
+        read = partial(read_swing, columns=named, signal=signal, unit=unit, time_unit=time_unit)
         return command(read=read, **given)
 
     return reading
@@ -73,7 +79,6 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--after SECONDS",
     "Leave out what the log holds before this time; of dates, so long after the first.",
     Number(),
-    default=0.0,
 )
 @options.repeatable("--free NAME", "Identify a parameter that was not read directly.")
 @option("--at POSITION,…", "Where the axes stood, in m or rad; at the move's target by default.")
@@ -87,7 +92,7 @@ def identify(
     periods: tuple[str, ...],
     logs: tuple[Path, ...],
     read: Callable[..., SwingLog],
-    after: float,
+    after: float | None,
     free: tuple[str, ...],
     at: str | None,
     out: Path,
@@ -106,8 +111,14 @@ def identify(
     with progress() as tell:
         if logs:
             tell("reading the log")
-            measurements += (read(log, spec, after=after) for log in logs)
-        identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
+            swings = [read(log, spec, after=after) for log in logs]
+            measurements += swings
+        try:
+            identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
+        except GenProfileError:
+            if logs:  # which shows a wrong column or unit at once
+                draw(swings[0], picture, tell)
+            raise
         draw(identified, picture, tell)
         write_spec(identified.spec, out, rewritten(identified.spec))
     print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out))

@@ -107,7 +107,7 @@ def _logged(tables: Iterator[Array], seconds: float | None) -> Array:
     import numpy as np
 
     from gen_profile.delivery.deployment.mailbox import LinkLostError
-    from gen_profile.studies.identification.measurements import LEAST_SAMPLES
+    from gen_profile.studies.identification.log_columns import LEAST_SAMPLES
     from gen_profile.studies.identification.phone import about_its_axis
     from gen_profile.support.interrupts import interrupts_collected
 

@@ -7,6 +7,7 @@ import numpy as np
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.presentation.charts.figure import INK, PALETTE, Band, Figure, Line, Panel, Style
 from gen_profile.studies.identification.identify import Identification
+from gen_profile.studies.identification.measurements import SwingLog
 from gen_profile.studies.identification.misfit import spectrum
 from gen_profile.support.phrase import Phrase
 
@@ -14,6 +15,17 @@ LOGGED, FOUND = Style(colour=PALETTE[1], dash="points"), Style(colour=PALETTE[0]
 LEFT, CHANCE = Style(colour=PALETTE[1], width=1.0), Style(colour=INK, dash="dash", width=1.0)
 GAP = 10.0  # times as long as samples are apart: over it no curve is drawn
 BELOW = 1.5  # decades that are shown below what chance does
+
+
+def log_figure(log: SwingLog) -> Figure:
+    """Draw a log as it was read, which shows a wrong column or unit at once."""
+    logged = Line("logged", log.times, log.values, LOGGED)
+    return Figure("As it was read.", [_panel(log, [logged])], columns=1)
+
+
+def _panel(log: SwingLog, lines: list[Line]) -> Panel:
+    label = Phrase("{quantity} of {load} ({unit})", quantity=log.quantity, load=log.load, unit=log.unit)
+    return Panel(Phrase("Swing of the {load}", load=log.load), label, lines)
 
 
 def identification_figure(identified: Identification) -> Figure:
@@ -31,8 +43,6 @@ def identification_figure(identified: Identification) -> Figure:
     values, swing, left = (np.insert(row, gaps, np.nan) for row in (log.values, swing, left))
     logged = Line("logged", times, values, LOGGED)
     found = Line("machine found", times, swing, FOUND)
-    template = "{quantity} of {load} ({unit})"
-    label = Phrase(template, quantity=log.quantity, load=log.load, unit=log.unit)
     rest = Line("left", times, left, LEFT)
     of_rest = Phrase("left of it ({unit})", unit=log.unit)
     spectral = [
@@ -40,7 +50,7 @@ def identification_figure(identified: Identification) -> Figure:
         Line("noise stays below", shown.frequencies, chance, CHANCE),
     ]
     panels = [
-        Panel(Phrase("Swing of the {load}", load=log.load), label, [logged, found]),
+        _panel(log, [logged, found]),
         Panel("What is left of the log", of_rest, [rest]),
         Panel(
             "Spectrum of what is left",

@@ -17,7 +17,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.presentation.charts.comparison import comparison_figure
 from gen_profile.presentation.charts.curves import motion_figure, profile_figure, select_machines, sway_figure
 from gen_profile.presentation.charts.figure import PLAIN, Bars, Figure
-from gen_profile.presentation.charts.identification import identification_figure
+from gen_profile.presentation.charts.identification import identification_figure, log_figure
 from gen_profile.presentation.charts.machine import draw_machine
 from gen_profile.presentation.charts.picture import require_drawable, save
 from gen_profile.presentation.charts.proof import draw
@@ -27,6 +27,7 @@ from gen_profile.spec.reading import as_path
 from gen_profile.studies.comparison.compare import Comparison
 from gen_profile.studies.comparison.robustness import Robustness
 from gen_profile.studies.identification.identify import Identification
+from gen_profile.studies.identification.measurements import SwingLog
 from gen_profile.support.errors import OutputError, SpecError
 from gen_profile.support.suggestion import found
 
@@ -44,16 +45,27 @@ class Picture:
 
 
 Drawn = (
-    Spec | Plan | Design | Profile | Check | Judgement | Comparison | Robustness | Identification | Deployment
+    Spec
+    | Plan
+    | Design
+    | Profile
+    | Check
+    | Judgement
+    | Comparison
+    | Robustness
+    | Identification
+    | SwingLog
+    | Deployment
 )
 
 
 def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) -> Picture | None:
-    """Draw a result: a machine, a motion, its sway, a check, a comparison, a fitted swing, a proof.
+    """Draw a result: a machine, a motion, its sway, a check, a comparison, a swing, a proof.
 
     Parameters
     ----------
-    result : Spec, Plan, Design, Profile, Check, Judgement, Comparison, Robustness, Identification, Deployment
+    result : Spec, Plan, Design, Profile, Check, Judgement, Comparison, Robustness, Identification, SwingLog
+        or Deployment
     path : Path or str, optional
         Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
     every : bool, optional
@@ -111,6 +123,8 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
             return [robustness_figure(result)], spec.name, title
         case Identification(logs=()):
             raise OutputError("There is nothing to draw: no log was identified from.")
+        case SwingLog(load=load):
+            return [log_figure(result)], load, f"Log of {load}"
         case Identification(spec=spec):
             names = ", ".join(result.estimate.values)
             return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"

@@ -21,8 +21,10 @@ import attrs
 
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.spec.model import Spec
+from gen_profile.studies.identification.log_clock import TIME_UNITS
+from gen_profile.studies.identification.log_columns import read_columns, require_samples
 from gen_profile.studies.identification.log_table import SPELLINGS, LogTable, read_table, read_text
-from gen_profile.studies.identification.measurements import LEAST_SAMPLES, SI_UNITS, require_angle
+from gen_profile.studies.identification.measurements import SI_UNITS, require_angle
 from gen_profile.support.errors import OutputError
 from gen_profile.support.units import COUNTS, UNITS
 
@@ -39,7 +41,7 @@ WORDS = {
 }
 _COLUMN = re.compile(
     r"(?:(?P<owner>\S.*?)[ _.])?(?P<quantity>" + "|".join(WORDS) + r")"
-    rf"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts|{'|'.join(SPELLINGS)})[\])]?)?",
+    rf"(?:[ _]?[\[(]?(?P<unit>s|ms|us|ns|m|mm|um|rad|deg|counts|{'|'.join(SPELLINGS)})[\])]?)?",
     re.IGNORECASE,
 )
 # only where a person says so: in a file's own names a number may be a sensor's
@@ -60,6 +62,8 @@ class MeasuredLog:
         By axis or load, in m (or rad).
     ignored : tuple of str
         Columns of other names.
+    notes : tuple of str
+        What was mended as it was read.
     """
 
     source: str
@@ -68,15 +72,16 @@ class MeasuredLog:
     sways: Mapping[str, Array]
     angles: Mapping[str, Array]
     ignored: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @attrs.frozen(kw_only=True)
 class _Column:
-    """What a column holds, and what its numbers are divided by."""
+    """What a column holds, and what its numbers are divided by; None for times whose unit nobody says."""
 
     quantity: str
     owner: str
-    divisor: float
+    divisor: float | None
 
 
 def read_log(path: Path, spec: Spec, columns: str | None = None) -> MeasuredLog:
@@ -120,15 +125,13 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     head, known = _known_columns(table, spec, where, columns)
     known.sort(key=lambda pair: pair[1].quantity != "time")
     places = [place for place, _ in known]
-    numbers = table.numbers(head, places)
+    read = read_columns(table, head, places, known[0][1].divisor)
+    times = read.times
     signals = {
-        (column.quantity, column.owner): values / column.divisor
-        for (_, column), values in zip(known, numbers.T, strict=True)
+        (column.quantity, column.owner): values / (column.divisor or 1.0)
+        for (_, column), values in zip(known[1:], read.values.T, strict=True)
     }
-    times = signals.pop(("time", ""))
-    if len(times) < LEAST_SAMPLES:
-        template = "{where}: needs at least {least} samples, found {count}."
-        raise OutputError(template, where=where, least=LEAST_SAMPLES, count=len(times))
+    require_samples(where, len(times), read.notes)
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
     for (quantity, owner), values in signals.items():
         if quantity == "angle":
@@ -140,6 +143,7 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
         positions=by_quantity["position"],
         sways=by_quantity["sway"],
         angles=by_quantity["angle"],
+        notes=read.notes,
         ignored=tuple(name for place, name in enumerate(table.rows[head]) if place not in places),
     )
 
@@ -243,7 +247,7 @@ def _required(meaning: str, spec: Spec, where: str) -> _Column:
             "{load}_sway or {load}_angle, with a unit behind such as _mm or _deg."
         )
         raise OutputError(template, meaning=meaning, axis=plant.actuated[0].name, load=plant.loads[-1])
-    return attrs.evolve(column, divisor=column.divisor / step)
+    return attrs.evolve(column, divisor=(column.divisor or 1.0) / step)
 
 
 def _head(table: LogTable, chosen: Collection[str]) -> int:
@@ -281,9 +285,8 @@ def _column(name: str, spec: Spec, where: str) -> _Column | None:
     owner, unit = match["owner"] or "", _unit(match)
     quantity = WORDS[match["quantity"].lower()]
     if quantity == "time":
-        seconds = {"": 1.0, "s": 1.0, "ms": 1e3}
-        known = unit in seconds and not owner
-        return _Column(quantity="time", owner="", divisor=seconds[unit]) if known else None
+        known = unit in ("", *TIME_UNITS) and not owner
+        return _Column(quantity="time", owner="", divisor=TIME_UNITS.get(unit)) if known else None
     plant = spec.machine()
     if quantity == "position":
         owners = [axis.name for axis in plant.actuated]

@@ -57,6 +57,7 @@ def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measure
     template = "The move begins at {start} s in {source}."
     words: list[str] = [Phrase(template, start=number(measured.start), source=measured.log.source)]
     words += _likeness(evaluation, measured)
+    words += [Phrase("As read: {note}.", note=note) for note in measured.log.notes]
     if ignored := ", ".join(measured.log.ignored):
         words.append(Phrase("Columns that were left alone: {ignored}.", ignored=ignored))
     caption = "Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on."

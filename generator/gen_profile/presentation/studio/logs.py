@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import attrs
@@ -95,7 +96,7 @@ def _swing(asked: LogQuestion, spec: Spec, read: MeasuredLog, places: Mapping[st
         "part": "identified",
         "confidence": CONFIDENCE,
         "parameters": [{"name": name, **row} for name, row in identified.to_dict()["parameters"].items()],
-        "warnings": list(identified.warnings()),
+        "warnings": [*swing.notes, *identified.warnings()],
         "panels": curves_json(identification_figure(identified)),
         "edits": _edits(identified),
         "command": _identify_command(asked, swing, places),
@@ -106,7 +107,8 @@ def _only_swing(read: MeasuredLog, after: float) -> SwingLog:
     """Take the first angle or sway of a log; times count from its first row, as `identify` has it."""
     for quantity, signals in (("angle", read.angles), ("sway", read.sways)):
         for load, values in signals.items():
-            return cut_swing(read.times, values, read.source, after=after, quantity=quantity, load=load)
+            cut = partial(cut_swing, after=after or None, quantity=quantity, load=load, notes=read.notes)
+            return cut(read.times, values, read.source)
     template = "{source}: no column's name is that of a sway or an angle of a load; choose one."
     raise OutputError(template, source=read.source)
 
@@ -127,7 +129,7 @@ def _identify_command(asked: LogQuestion, swing: SwingLog, places: Mapping[str, 
     words = ["--swing", asked.name, "--columns", f"{places[time]},{places[value]}"]
     words += ["--signal", f"{swing.quantity}:{swing.load}"]
     words += ["--unit", value.rpartition("_")[2]] if value != signal else []
-    words += ["--time-unit", "ms"] if time == "time_ms" else []
+    words += ["--time-unit", time.rpartition("_")[2]] if "_" in time else []
     words += ["--after", f"{asked.after:g}"] if asked.after else []
     words += ["--at", ",".join(f"{place:g}" for place in asked.at)] if asked.at else []
     words += [word for name in asked.free for word in ("--free", name)]

@@ -10,7 +10,13 @@ from gen_profile.dynamics.evaluation.simulation import driven_swing, motion_of
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.studies.identification.measurements import SwingLog
-from gen_profile.studies.identification.swing_model import SwingingMachine, SwingModel, swing_model
+from gen_profile.studies.identification.swing_model import (
+    DERIVATIVES,
+    OF_SWAY,
+    SwingingMachine,
+    SwingModel,
+    swing_model,
+)
 
 FINE, COARSE = 60.0, 16.0  # places in a swing of the fastest mode, between which splines are laid
 SWUNG = 0.1  # rad or m, about as far as loads swing: what steps of a start are compared with
@@ -114,8 +120,9 @@ class DrivenModel(SwingModel):
             return values
 
         sway, angle = driven_swing(plant, machines, motion=motion, starts=starts, times=times)
-        shown = (sway if self.log.quantity == "sway" else angle)[:, :, plant.loads.index(self.log.load)].T
-        return np.asarray(CubicSpline(times, shown)(times, 1) if self.log.quantity == "rate" else shown)
+        shown = (sway if self.log.quantity in OF_SWAY else angle)[:, :, plant.loads.index(self.log.load)].T
+        slopes = DERIVATIVES.get(self.log.quantity, 0)
+        return np.asarray(CubicSpline(times, shown)(times, slopes) if slopes else shown)
 
 
 def driven_model(machine: SwingingMachine, played: SampledProfile, log: SwingLog) -> DrivenModel:

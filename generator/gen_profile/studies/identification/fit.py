@@ -137,7 +137,7 @@ class Fit:
             ftol=TOLERANCE,
             max_nfev=STEPS,
         )
-        if solution.status == 0:
+        if solution.status == 0 and not np.isfinite(until):  # of a part, the next one goes on from there
             template = (
                 "The search for {names} does not come to rest: no such machine swings like the "
                 "measurements; look for a wrong unit or signal, or start from a nearer value of the "

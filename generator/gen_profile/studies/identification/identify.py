@@ -18,16 +18,17 @@ from gen_profile.studies.identification.estimation import (
     Estimate,
     estimate,
 )
+from gen_profile.studies.identification.log_clock import TIME_UNITS
 from gen_profile.studies.identification.log_table import read_text
 from gen_profile.studies.identification.measurements import (
     GREATEST,
     SI_UNITS,
-    TIME_UNITS,
     DirectReading,
     Measurement,
     Period,
     SwingLog,
     parse_swing,
+    signal_units,
 )
 from gen_profile.studies.identification.swing_model import SwingingMachine, shortened
 from gen_profile.studies.identification.uncertainty import WIDEST
@@ -38,8 +39,8 @@ from gen_profile.support.phrase import AND, Phrase, joined
 from gen_profile.support.progress import Progress, no_progress, require_progress
 from gen_profile.support.suggestion import finite_number, suggestion
 from gen_profile.support.summary import Drawable
-from gen_profile.support.units import units_of
 
+RELATIVE = 3.0  # of a value: what is known no better is told in its own unit
 NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 
 
@@ -122,6 +123,7 @@ class Identification(Drawable):
             "samples": log.logged,
             "averages": len(log.times) if len(log.times) < log.logged else None,
             "lasts_s": float(log.times[-1]),
+            "read": list(log.notes),
             "unit": log.unit,
             "swing": float(np.ptp(log.values)) / 2.0,
             "noise": found.noise[index],
@@ -134,11 +136,11 @@ def read_swing(
     path: Path | str,
     spec: Spec | Path | str,
     *,
-    columns: tuple[str | int, str | int],
+    columns: tuple[str | int, str | int] | None = None,
     signal: str = "angle",
     unit: str | None = None,
     time_unit: str | None = None,
-    after: float = 0.0,
+    after: float | None = None,
 ) -> SwingLog:
     """Read a logged swing of a spec's machine.
 
@@ -147,18 +149,18 @@ def read_swing(
     path : Path or str
         Table with a column of times and one of values.
     spec : Spec, or the path of one
-    columns : (str or int, str or int)
-        Their names, or their numbers from 1.
+    columns : (str or int, str or int) or None
+        Their names, or their numbers from 1; by default those whose names tell it, or the first two.
     signal : str
-        What the values are: ``angle``, ``sway`` or ``rate`` (of the angle) of the first load, or of a named
-        one, ``angle:hook``.
+        What the values are: ``angle``, ``sway``, ``rate`` (of the angle) or ``acceleration`` (of the sway,
+        without gravity) of the first load, or of a named one, ``angle:hook``.
     unit : str or None
         Of the values; by default what their column's name says, or the SI unit. A number before it is the
         size of one count, ``0.09 deg``.
     time_unit : str or None
-        One of `TIME_UNITS`; by default what the column's name says, or s.
-    after : float
-        Time in s from which on the axes stood still.
+        One of `TIME_UNITS`; by default what the column's name says, or the times show.
+    after : float or None
+        Time in s from which on the axes stood still; None for the whole log.
 
     Raises
     ------
@@ -176,8 +178,9 @@ def read_swing(
     <SwingLog times: (400,), values: (400,), quantity: angle, load: hook, ...>
     """
     spec = as_spec(spec)
-    loads = spec.machine().loads
-    if not isinstance(columns, tuple | list) or len(columns) != len(("time", "value")):
+    plant = spec.machine()
+    loads = plant.loads
+    if columns is not None and (not isinstance(columns, tuple | list) or len(columns) != 2):
         raise SpecError(f"columns: name two, of times and values, such as (1, 2), found {columns!r}.")
     if time_unit is not None and as_text(time_unit, "time_unit: a unit") not in TIME_UNITS:
         raise SpecError(f"time_unit: unknown unit {time_unit!r}{suggestion(time_unit, TIME_UNITS)}")
@@ -187,26 +190,25 @@ def read_swing(
         raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, SI_UNITS)}")
     if load not in loads:
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
-    per_unit = (
-        None if unit is None else _per_unit(as_text(unit, "unit: a unit"), quantity, SI_UNITS[quantity])
-    )
+    per_unit = None if unit is None else _per_unit(as_text(unit, "unit: a unit"), quantity)
     return parse_swing(
         read_text(as_path(path), "swing"),
         str(path),
-        columns=(str(columns[0]), str(columns[1])),
+        columns=None if columns is None else (str(columns[0]), str(columns[1])),
         per_second=None if time_unit is None else TIME_UNITS[time_unit],
         per_unit=per_unit,
-        after=as_number(after, "after"),
+        after=None if after is None else as_number(after, "after"),
         quantity=quantity,
         load=load,
+        one_direction=plant.directions == 1,
     )
 
 
-def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
+def _per_unit(unit: str, quantity: str) -> float:
     """Say how many of a log's steps make an SI unit."""
     name = unit.lstrip("0123456789. ").rstrip()
     size = unit.rstrip().removesuffix(name).strip()
-    fitting = units_of(si_unit)
+    fitting = signal_units(quantity)
     if name not in fitting:
         raise SpecError(f"unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
     step = finite_number(size or "1")
@@ -354,9 +356,7 @@ def _identified(spec: Spec, estimated: Estimate, logs: Sequence[SwingLog]) -> Sp
     shares = {name: estimated.half_range[name] / size for name, size in known.items()}
     wide = {name: fraction for name, fraction in shares.items() if fraction > WIDEST}
     if wide:
-        template = "{name} to ±{percent:.0f} % only"
-        each = [Phrase(template, name=name, percent=100.0 * share) for name, share in wide.items()]
-        words = joined(AND, each)
+        words = joined(AND, [_how_well(spec, estimated, name) for name in wide])
         rows = zip(logs, estimated.misfits, strict=True)
         if foreign := [(log, left) for log, left in rows if left is not None]:
             log, left = max(foreign, key=lambda one: one[1].rms / one[1].noise)
@@ -393,6 +393,17 @@ def _identified(spec: Spec, estimated: Estimate, logs: Sequence[SwingLog]) -> Sp
             "robustness.uncertain": {name: uncertain[name] for name in order},
         }
     )
+
+
+def _how_well(spec: Spec, estimated: Estimate, name: str) -> str:
+    """Say how well a parameter is known that is not known well; one that may be nothing in its own unit."""
+    half, value = estimated.half_range[name], abs(estimated.values[name])
+    if half <= RELATIVE * value:
+        return Phrase("{name} to ±{percent:.0f} % only", name=name, percent=100.0 * half / value)
+    if not half < math.inf:
+        return Phrase("{name} not at all", name=name)
+    template = "{name} to ±{half:.2g} {unit} only, which may be nothing"
+    return Phrase(template, name=name, half=half, unit=spec.machine().units[name])
 
 
 def _rounded(value: float, uncertainty: float) -> float:

@@ -5,9 +5,7 @@ import csv
 import errno
 import math
 import re
-from array import array
 from collections.abc import Collection, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,29 +13,49 @@ import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.studies.identification.log_archive import table_in
+from gen_profile.studies.identification.log_clock import seconds_of
 from gen_profile.support.bounded_file import read_bounded
 from gen_profile.support.errors import OutputError
 from gen_profile.support.phrase import Phrase
-from gen_profile.support.suggestion import finite_number, number_meant, suggestion
+from gen_profile.support.suggestion import finite_number, suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
-MOST_BYTES = 1 << 25
+MOST_BYTES = 1 << 27
 # units as loggers write them, in brackets or behind a name, and what they are called here
 SPELLINGS = {"°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad"}
 SPELLINGS |= {"°/s": "deg/s", "dps": "deg/s"}
 SPELLINGS |= {"sec": "s", "seconds": "s", "sek": "s", "µs": "us", "μs": "us", "µm": "um", "μm": "um"}
+TIMES = {"millis": "ms", "millisec": "ms", "milliseconds": "ms", "msec": "ms", "micros": "us"}
+TIMES |= {"microseconds": "us", "usec": "us", "nanos": "ns", "nanoseconds": "ns", "nsec": "ns"}
+SPELLINGS |= TIMES
 _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")
-_BEHIND = re.compile(r".+[_ ](ms|us|s|rad|deg|mm|um)", re.IGNORECASE)
+_BEHIND = re.compile(rf".+[_ ](ms|us|ns|s|rad|deg|mm|um|dps|{'|'.join(TIMES)})", re.IGNORECASE)
 # what is a unit, and no remark, though it may be one that nothing here is measured in
-_UNIT = re.compile(r".*[/^²³·].*|[kmµ]?[VAWNg]|kg|t|%|k?Hz|m?bar|°C|K|min|h|ms|us|s|rad|deg|m|mm|um")
-_DAY_FIRST = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})(?!\d)")  # as in 27.11.2026
-MISSING = {"nan", "na", "n/a", "null", "none", "-", "--"}  # what loggers write where they have no value
-AS_ISO = "; write dates as 2026-11-27 10:00:00"
-LEAVE_EMPTY = "; leave the cell empty where nothing was measured"
-GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
+_UNIT = re.compile(r".*[/^²³·].*|[kmµ]?[VAWNg]|kg|t|%|k?Hz|m?bar|°C|K|min|h|ms|us|ns|s|rad|deg|m|mm|um")
+_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+_SPACED = re.compile(rf"\s*{_NUMBER}(?:\s+{_NUMBER})+\s*")
+# what loggers write where they have no value
+MISSING = {
+    "nan",
+    "+nan",
+    "-nan",
+    "na",
+    "n/a",
+    "#n/a",
+    "#num!",
+    "null",
+    "none",
+    "-",
+    "--",
+    "inf",
+    "+inf",
+    "-inf",
+}
+ARCHIVE = b"PK\x03\x04"  # what a workbook (xlsx) or another archive begins with
 # what a file begins with that is no text, and what to do about it
 OTHERS = {
-    b"PK\x03\x04": "a workbook (xlsx, ods) or another archive: open it and save the sheet as CSV",
     b"\xd0\xcf\x11\xe0": "an old workbook (xls): open it and save the sheet as CSV",
     b"PAR1": "a Parquet table: convert it to CSV",
     b"\x1f\x8b": "compressed (gzip): unpack it",
@@ -71,19 +89,25 @@ class LogTable:
     def number(self, row: int, place: int) -> float:
         """Value of a cell; NaN where it holds no finite number."""
         text = self.cell(row, place)
-        return finite_number(text.replace(",", ".") if self.decimal_comma else text)
+        comma = self.decimal_comma or _COMMA.fullmatch(text)  # which a cell in quotes may hold, too
+        return finite_number(text.replace(",", ".") if comma else text)
+
+    def block(self, rows: range, places: Sequence[int]) -> Array | None:
+        """Read cells of many rows at once where all are plain numbers, (rows, places); else None."""
+        lines = self.rows.lines[rows.start : rows.stop]
+        if self.decimal_comma:
+            lines = [line.replace(",", ".") for line in lines]
+        between = None if self.rows.separator == " " else self.rows.separator
+        try:
+            values = np.loadtxt(lines, delimiter=between, usecols=places, comments=None, ndmin=2)
+        except ValueError:
+            return None
+        return values if np.isfinite(values).all() else None
 
     def seconds(self, row: int, place: int) -> float:
-        """Time of a cell: a number, a date (ISO 8601, or day first) or a time of day, in s; else NaN."""
+        """Time of a cell: a number, a date or a time of day (see `seconds_of`), in s; else NaN."""
         value = self.number(row, place)
-        if not math.isnan(value):
-            return value
-        text = _DAY_FIRST.sub(lambda day: f"{day[3]}-{day[2]:0>2}-{day[1]:0>2}", self.cell(row, place))
-        try:
-            moment = datetime.fromisoformat(f"{'1970-01-01 ' * (text[2:3] == ':')}{text.replace(',', '.')}")
-        except ValueError:
-            return math.nan
-        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        return seconds_of(self.cell(row, place)) if math.isnan(value) else value
 
     def head(self, columns: Collection[str]) -> int:
         """Find the row of these columns' names; where all are numbers, the last above values and units."""
@@ -131,77 +155,13 @@ class LogTable:
             return ""
         name = self.cell(head, place)
         match = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
-        unit = _spelt(match[1] if match else self.cell(head + 1, place))
-        return unit if _UNIT.fullmatch(unit) else ""
+        told = match[1] if match else name if name.lower() in TIMES else self.cell(head + 1, place)
+        unit = _spelt(told)
+        return unit if _UNIT.fullmatch(unit) and not unit[0].isdecimal() else ""
 
     def is_head(self, row: int) -> bool:
         """Tell whether a row holds more than numbers."""
         return any(math.isnan(self.number(row, place)) for place in range(len(self.rows[row])))
-
-    def numbers(self, head: int, places: Sequence[int], since: float = -math.inf) -> Array:
-        """Read columns of numbers, the first of which are times, below a row; shape (rows, columns).
-
-        What stands above the first time is passed over, and rows in which a logger left a cell empty. Dates
-        count from the first, in s. From the time `since` on they must rise.
-
-        Raises
-        ------
-        OutputError
-            A cell holds no number, numbers with decimal commas stand between commas, or times do not rise.
-        """
-        time, values, read = places[0], array("d"), array("L")
-        below = range(head + self.is_head(head), len(self.rows))
-        first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
-        self._require_separate(head, first)
-        for row in range(first, len(self.rows)):
-            held = [self.cell(row, place) for place in places]
-            if not all(held):
-                continue
-            values_here = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
-            for place, text, value in zip(places, held, values_here, strict=True):
-                if not abs(value) <= GREATEST:
-                    name: str = Phrase("column {number}", number=place + 1)
-                    if self.is_head(head):
-                        name = self.cell(head, place)
-                    line = self.rows.line(row)
-                    hint = LEAVE_EMPTY if text.lower() in MISSING else number_meant(text)
-                    if place == time and not hint and re.match(r"\d+[-/.:]\d", text):
-                        hint = AS_ISO
-                    template = (
-                        "{source}, row {row}: {name} holds {text!r}, which is no number of a log{hint}."
-                    )
-                    raise self._fault(template, row=line, name=name, text=text[:40], hint=hint)
-            values.extend(values_here)
-            read.append(row)
-        table = np.array(values).reshape(-1, len(places))
-        if len(table) and math.isnan(self.number(first, time)):  # a date
-            table[:, 0] -= table[0, 0]
-        self._require_rising(table[:, 0], read, since)
-        return table
-
-    def _require_rising(self, times: Array, rows: Sequence[int], since: float) -> None:
-        counts = np.flatnonzero(times >= since)
-        back = np.flatnonzero(np.diff(times[counts]) <= 0.0)
-        if len(back):
-            before, after = counts[back[0] : back[0] + 2]
-            template = (
-                "{source}, row {row}: the times must rise from row to row, and {after:.9g} follows "
-                "{before:.9g}; sort the rows, remove those that come twice, or cut the log where the clock "
-                "was set back."
-            )
-            row = self.rows.line(rows[after])
-            raise self._fault(template, row=row, after=times[after], before=times[before])
-
-    def _require_separate(self, head: int, first: int) -> None:
-        """Refuse numbers whose decimal commas separate columns, too: they are twice as many as the names."""
-        names, cells = len(self.rows[head]), self.rows[first] if first < len(self.rows) else ()
-        whole = all(cell.lstrip("+-").isdecimal() for cell in cells)
-        if not self.decimal_comma and self.is_head(head) and names > 1 and whole and len(cells) == 2 * names:
-            template = (
-                "{source}, row {row}: holds {count} numbers below {names} names; where decimals have commas, "
-                "separate columns by semicolons or tabs."
-            )
-            raise self._fault(template, row=self.rows.line(first), count=len(cells), names=names)
 
     def _fault(self, template: str, **values: object) -> OutputError:
         return OutputError(template, source=self.source, **values)
@@ -233,13 +193,15 @@ def read_text(path: Path, option: str) -> str:
 
 
 def decoded(content: bytes, source: str) -> str:
-    """Decode what a logger wrote: UTF-16 or UTF-8 if it is, else Windows' Western European.
+    """Decode what a logger wrote, in a workbook or archive, too: UTF-16 or UTF-8, else Western European.
 
     Raises
     ------
     OutputError
         It is no text.
     """
+    if content.startswith(ARCHIVE):
+        content = table_in(content, source, MOST_BYTES)
     for mark, words in OTHERS.items():
         if content.startswith(mark):
             raise OutputError("{source}: this is {words}.", source=source, words=words)
@@ -271,6 +233,8 @@ def read_table(text: str, source: str) -> LogTable:
         raise OutputError("{source}: the log is empty.", source=source)
     common = (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines))
     rows.separator = next(common, ",")
+    if rows.separator == "," and 2 * sum(_SPACED.fullmatch(line) is not None for line in lines) >= len(lines):
+        rows.separator = " "
     return LogTable(rows=rows, decimal_comma=rows.separator != ",", source=source)
 
 
@@ -292,8 +256,13 @@ class _Rows(Sequence[Sequence[str]]):
 
     def __getitem__(self, row: Any) -> Any:
         if row != self._split[0]:
+            line = self.lines[row]
             try:
-                cells = next(csv.reader([self.lines[row]], delimiter=self.separator))
+                cells = (
+                    line.split()
+                    if self.separator == " "
+                    else next(csv.reader([line], delimiter=self.separator))
+                )
             except csv.Error as error:
                 template = "{source}, row {row}: it is no table ({problem})."
                 raise OutputError(template, source=self._source, row=self.line(row), problem=error) from error

@@ -13,7 +13,16 @@ import numpy as np
 
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.spec.reading import as_text
-from gen_profile.studies.identification.log_table import read_table
+from gen_profile.studies.identification.log_clock import TIME_UNITS
+from gen_profile.studies.identification.log_columns import SHARE, read_columns, require_samples
+from gen_profile.studies.identification.log_signal import (
+    about_one_axis,
+    axis_note,
+    jumps,
+    likely_columns,
+    same_sensor,
+)
+from gen_profile.studies.identification.log_table import LogTable, read_table
 from gen_profile.support.errors import OutputError, SpecError
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.summary import Sampled
@@ -21,11 +30,12 @@ from gen_profile.support.units import units_of
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
 _VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
-LEAST_SAMPLES = 16
 GREATEST = 1e9  # s, swings or SI units of any reading
 FINEST = 1e-9  # of a value, to which no instrument reads it
-TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
 SI_UNITS = {"angle": "rad", "sway": "m", "rate": "rad/s"}  # of what may be logged of a load
+SI_UNITS |= {"acceleration": "m/s²"}
+ACCELERATIONS = {"m/s²": 1.0, "m/s^2": 1.0, "m/s2": 1.0, "mm/s²": 1e3, "mm/s^2": 1e3, "g": 1.0 / 9.80665}
+OF_SENSORS = ("rate", "acceleration")  # which a sensor measures along axes of its own
 
 
 @attrs.frozen(kw_only=True)
@@ -63,11 +73,13 @@ class SwingLog(Sampled):
     times : (samples,) array
         s, rising; not necessarily evenly spaced.
     values : (samples,) array
-        Of one output of one load in rad, m or rad/s, which may be off by a constant.
+        Of one output of one load in the SI unit, which may be off by what drifts slowly.
     quantity : str
-        ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them, or ``"rate"`` of the
-        angle, as a gyroscope on the load measures it.
+        ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them, ``"rate"`` of the
+        angle, as a gyroscope on the load measures it, or ``"acceleration"`` of the sway, without gravity.
     load : str
+    notes : tuple of str
+        What was mended as it was read, or taken to be meant.
     resolution : float
         Least step between different values as they were read, as of an encoder that counts.
     logged : int
@@ -78,6 +90,7 @@ class SwingLog(Sampled):
     values: Array = attrs.field(converter=read_only)
     quantity: str
     load: str
+    notes: tuple[str, ...] = ()
     resolution: float = attrs.field()
     logged: int = attrs.field()
 
@@ -174,32 +187,38 @@ def parse_swing(
     text: str,
     source: str,
     *,
-    columns: tuple[str, str],
+    columns: tuple[str, str] | None,
     per_second: float | None,
     per_unit: float | None,
-    after: float,
+    after: float | None,
     quantity: str,
     load: str,
+    one_direction: bool = True,
 ) -> SwingLog:
     """Read a log: two columns of a table, below their names and whatever else stands there.
 
-    Rows in which the logger left one of the two empty are left out.
+    Rows in which the logger left one of the two empty are left out; what is mended stands in the log's notes.
+    Of a sensor with axes x, y and z on a load that swings in one direction all are taken: it may lie askew.
 
     Parameters
     ----------
     text : str
     source : str
         Where it comes from, for errors.
-    columns : (str, str)
-        Of time, and of the value: names, or numbers from 1. Dates and times are given in s from the first.
+    columns : (str, str) or None
+        Of time, and of the value: names, or numbers from 1; by default those whose names tell it, or the
+        first two. Dates and times are given in s from the first.
     per_second : float or None
-        How many of the time's unit make a second; None for what the column's name says, or s.
+        How many of the time's unit make a second; None for what the column's name says, or the times show.
     per_unit : float or None
         How many of the value's unit make an SI unit; None for what the column's name says, or one.
-    after : float
-        Time in s from which on the axes stood still; earlier rows are left out.
+    after : float or None
+        Time in s from which on the axes stood still; earlier rows are left out. None for all, also those
+        before 0, where a trigger was.
     quantity, load : str
         What the value is; see `SwingLog`.
+    one_direction : bool
+        Whether the machine swings in one direction only.
 
     Raises
     ------
@@ -207,21 +226,34 @@ def parse_swing(
         The table cannot be read.
     """
     cells = read_table(text, source)
-    head = cells.head(columns)
-    places = [cells.place(head, column) for column in columns]
-    known = ((per_second, "time", TIME_UNITS), (per_unit, quantity, units_of(SI_UNITS[quantity])))
-    scales = [
-        per or _per_stated(cells.cell(head, place), cells.unit(head, place), source, measured, units)
-        for place, (per, measured, units) in zip(places, known, strict=True)
-    ]
-    table = cells.numbers(head, places, after * scales[0]) / scales
-    return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
+    chosen = likely_columns(cells, quantity) if columns is None else columns
+    head = cells.head(chosen)
+    time, place = (cells.place(head, column) for column in chosen)
+    per_second = per_second or _per_stated(cells, head, time, "time", TIME_UNITS)
+    per_unit = per_unit or _per_stated(cells, head, place, quantity, signal_units(quantity)) or 1.0
+    sensor = one_direction and quantity in OF_SENSORS
+    places = same_sensor(cells, head, place) if sensor else (place,)
+    read = read_columns(cells, head, (time, *places), per_second)
+    notes, values = list(read.notes), read.values[:, 0]
+    if columns is None and chosen != ("1", "2"):
+        template = "the times are those of column {time}, the values those of column {value}"
+        notes.insert(0, Phrase(template, time=chosen[0], value=chosen[1]))
+    if len(places) > 1 and len(read.times) > 1:
+        values, axis, share = about_one_axis(read.values, places.index(place))
+        notes.append(axis_note(cells.cell(head, place), axis, share))
+    values = values / per_unit
+    return cut_swing(
+        read.times, values, source, after=after, quantity=quantity, load=load, notes=tuple(notes)
+    )
 
 
-def _per_stated(name: str, unit: str, source: str, measured: str, units: Mapping[str, float]) -> float:
-    """Say how many of the unit that a column states, if it does, make an SI unit."""
+def _per_stated(
+    cells: LogTable, head: int, place: int, measured: str, units: Mapping[str, float]
+) -> float | None:
+    """Say how many of the unit that a column states make an SI unit; None where it states none."""
+    name, unit = cells.cell(head, place), cells.unit(head, place)
     if unit and unit not in units:
-        others = [other for other, si in SI_UNITS.items() if unit in units_of(si)]
+        others = [other for other in SI_UNITS if unit in signal_units(other)]
         cure: str = "name another column"
         if others:
             cure = Phrase("take it for a log of the {quantity} (signal)", quantity=others[0])
@@ -229,14 +261,26 @@ def _per_stated(name: str, unit: str, source: str, measured: str, units: Mapping
             "{source}: column {name!r} is in {unit}, which measures no {measured}; {cure}, or state the "
             "unit if the name is wrong."
         )
-        raise OutputError(template, source=source, name=name, unit=unit, measured=measured, cure=cure)
-    return units[unit] if unit else 1.0
+        raise OutputError(template, source=cells.source, name=name, unit=unit, measured=measured, cure=cure)
+    return units[unit] if unit else None
+
+
+def signal_units(quantity: str) -> Mapping[str, float]:
+    """List the units that a quantity may be logged in, and how many of them make an SI unit."""
+    return ACCELERATIONS if quantity == "acceleration" else units_of(SI_UNITS[quantity])
 
 
 def cut_swing(
-    times: Array, values: Array, source: str, *, after: float, quantity: str, load: str
+    times: Array,
+    values: Array,
+    source: str,
+    *,
+    after: float | None,
+    quantity: str,
+    load: str,
+    notes: tuple[str, ...] = (),
 ) -> SwingLog:
-    """Leave out of a log what was logged before the axes stood still.
+    """Leave out of a log what was logged before the axes stood still, and single samples that jump.
 
     Parameters
     ----------
@@ -244,23 +288,33 @@ def cut_swing(
         s, and SI units.
     source : str
         Where it comes from, for errors.
-    after : float
-        Time in s from which on the axes stood still.
+    after : float or None
+        Time in s from which on the axes stood still; None for the whole log.
     quantity, load : str
         What the value is; see `SwingLog`.
+    notes : tuple of str
+        What was mended before.
 
     Raises
     ------
     OutputError
         What is left is no swing.
     """
-    times, values = times[times >= after], values[times >= after]
-    if len(times) < LEAST_SAMPLES:
-        template = "{source}: a swing needs at least {least} samples, found {count}."
-        raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
-    if quantity == "angle":
-        require_angle(values)
-    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
+    if after is not None:
+        times, values = times[times >= after], values[times >= after]
+    elif len(times) and times[0] < 0.0 < times[-1]:
+        template = (
+            "the log begins {before:.4g} s before its time 0; if the axes moved till then, leave that "
+            "out (after)"
+        )
+        notes = (*notes, Phrase(template, before=-float(times[0])))
+    require_samples(source, len(times), notes)
+    beside = jumps(times, values, float(np.diff(np.unique(values)).min(initial=np.inf)))
+    if 0 < len(beside) <= SHARE * len(times):
+        template = "{count} samples that jump aside, the first at {time:.4g} s, are left out"
+        notes = (*notes, Phrase(template, count=len(beside), time=float(times[beside[0]])))
+        times, values = np.delete(times, beside), np.delete(values, beside)
+    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load, notes=notes)
 
 
 def require_angle(values: Array) -> None:

@@ -98,7 +98,11 @@ def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
     highest = min(max(HARMONICS * fastest, FEWEST * apart), np.pi / float(np.median(np.diff(times))))
     count = min(max(int(highest / apart), 1), MOST_LINES)
     frequencies = np.linspace(1.0, highest / apart, count) * apart
-    swinging = residuals - residuals.mean()
+    # a line that swells or dies would hide all around it in its own skirt, which a window takes away
+    place = (times - times[0]) / (times[-1] - times[0])
+    window = 1.0 - np.cos(2.0 * np.pi * place)
+    swinging = window * (residuals - float(window @ residuals / window.sum()))
+    swinging *= math.sqrt(len(times) / float(window @ window))
     parts = np.array_split(frequencies, max(count * len(times) // AT_ONCE, 1))
     power = np.concatenate([lombscargle(np.array(times), swinging, part) for part in parts])
     around = median_filter(power, min(NEIGHBOURS, len(power)), mode="reflect")

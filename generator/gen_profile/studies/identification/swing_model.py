@@ -14,14 +14,17 @@ from gen_profile.dynamics.evaluation.simulation import free_swing
 from gen_profile.dynamics.problem.linearization import Linearization, linearize
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.studies.identification.measurements import SwingLog
+from gen_profile.studies.identification.measurements import SwingLog, require_angle
 from gen_profile.support.errors import InfeasibleProblem
 
 STEP = 1e-6  # relative, of numerical slopes
 WIDEST_SWING = math.pi / 4.0  # rad, beyond which no load is let swing
 STILL = 1e-9  # SI units, which no sensor tells from rest
-APART = 1e-3  # periods, between angles whose difference is a rate; at most half the time between samples
+APART = 1e-3  # periods, between angles whose difference is a rate; less than the time between samples
+DERIVATIVES = {"rate": 1, "acceleration": 2}  # by time; of the angle, or the sway
+OF_SWAY = ("sway", "acceleration")
 MOST_SAMPLES, SWINGS = 6000, 300  # of a log that is fitted: twenty averages of each swing
+SWINGS_A_DRIFT, MOST_DRIFTS = 2.0, 4  # a zero drifts slower than the load swings
 SHOWN = 1e-6  # relative size from which on a log shows a part of its start
 
 
@@ -48,8 +51,8 @@ class SwingModel:
     """A log beside the machine that swings.
 
     The unknowns of a log beside the machine's parameters, its *start*, are those of q_u and q̇_u at its first
-    sample that it shows, and the sensor's zero. A log of one direction of a gantry's payload shows nothing
-    of the other.
+    sample that it shows, and the sensor's zero, by Legendre's polynomials over the log: it drifts, slower
+    than the load swings. A log of one direction of a gantry's payload shows nothing of the other.
 
     Attributes
     ----------
@@ -73,7 +76,21 @@ class SwingModel:
     @property
     def unknowns(self) -> int:
         """Numbers in a start."""
-        return len(self.shown) + 1
+        return len(self.shown) + self.drifts
+
+    @property
+    def drifts(self) -> int:
+        """Numbers that a sensor's zero takes: a constant, and one more for every few swings."""
+        return 1 + min(int(self.log.times[-1] / (SWINGS_A_DRIFT * self.period)), MOST_DRIFTS)
+
+    def zeros(self, until: float = math.inf) -> Array:
+        """Give unit drifts of the zero up to a time, (samples, drifts); constants alone of a part."""
+        count = self.samples(until)
+        place = 2.0 * self.log.times[:count] / self.log.times[-1] - 1.0
+        drifts = np.polynomial.legendre.legvander(place, self.drifts - 1)
+        if count < len(self.log.times):
+            drifts[:, 1:] = 0.0
+        return np.asarray(drifts)
 
     def samples(self, until: float) -> int:
         """Count the samples before a time in s."""
@@ -83,8 +100,9 @@ class SwingModel:
         """Find the start that the linear model agrees with best, up to a time in s."""
         count = self.samples(until)
         columns = _linear_answers(self.machine.of(parameters), self.log, count)[:, self.shown]
-        design = np.column_stack([columns, np.ones(count)])
+        design = np.column_stack([columns, self.zeros(until)])
         size = np.linalg.norm(design, axis=0)
+        size[size == 0.0] = 1.0
         start = np.linalg.lstsq(design / size, self.log.values[:count], rcond=1e-8)[0] / size
         return np.asarray(start)
 
@@ -92,7 +110,7 @@ class SwingModel:
         """Say how far any load swings from such a start, in rad, were its swings small."""
         machine, loads = self.machine.of(parameters), self.machine.plant.loads
         logs = (attrs.evolve(self.log, quantity="angle", load=load) for load in loads)
-        answers = (_linear_answers(machine, log)[:, self.shown] @ start[:-1] for log in logs)
+        answers = (_linear_answers(machine, log)[:, self.shown] @ start[: len(self.shown)] for log in logs)
         return max(float(np.abs(answer).max()) for answer in answers)
 
     def residuals(
@@ -107,20 +125,21 @@ class SwingModel:
             Parameters to take slopes by.
         steps : (p,) array
             How far to step for them, in their units.
-        start : (s + 1,) array
+        start : (s + drifts,) array
 
         Returns
         -------
         residuals : (samples,) array
             In the log's unit.
-        slopes : (samples, p + s + 1) array
+        slopes : (samples, p + s + drifts) array
         """
-        count, n = self.samples(until), len(start) - 1
+        count, n, zeros = self.samples(until), len(self.shown), self.zeros(until)
         size = float(np.abs(start[:n]).max()) or 1.0
         machines, starts, by = self.lanes(parameters, names, steps, start[:n], size)
         outputs = self._outputs(machines, starts, count)
         slopes = (outputs[1:] - outputs[0]).T / by
-        return outputs[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
+        left = outputs[0] + zeros @ start[n:] - self.log.values[:count]
+        return left, np.column_stack([slopes, zeros])
 
     def lanes(
         self, parameters: Mapping[str, float], names: Sequence[str], steps: Array, start: Array, size: float
@@ -154,19 +173,19 @@ class SwingModel:
 
     def _outputs(self, machines: Array, starts: Array, count: int) -> Array:
         """Say what the log would show of machines that begin so: (machines, count)."""
-        plant, is_rate = self.machine.plant, self.log.quantity == "rate"
+        plant, slopes = self.machine.plant, DERIVATIVES.get(self.log.quantity, 0)
         if self.small:
             order = [q.name for q in plant.parameters]
             rows = (dict(zip(order, row, strict=True)) for row in machines.tolist())
             pairs = zip(rows, starts, strict=True)
             return np.stack([self._small_swing(parameters, start, count) for parameters, start in pairs])
         times = self.log.times[:count]
-        apart = min(APART * self.period, 0.5 * float(np.diff(self.log.times).min()))
-        if is_rate:  # half that time later, by which the start is another one
-            times = np.stack([times, times + apart], axis=1).ravel()
+        apart = min(APART * self.period, 0.4 * float(np.diff(self.log.times).min()))
+        # that time later, and later again: a start is another one then
+        times = (times[:, None] + apart * np.arange(slopes + 1)).ravel()
         sway, angle = free_swing(plant, machines, q_a=self.machine.q_a, starts=starts, times=times)
-        outputs = (sway if self.log.quantity == "sway" else angle)[:, :, plant.loads.index(self.log.load)]
-        return np.asarray((outputs[:, 1::2] - outputs[:, ::2]) / apart if is_rate else outputs)
+        shown = (sway if self.log.quantity in OF_SWAY else angle)[:, :, plant.loads.index(self.log.load)]
+        return np.asarray(np.diff(shown.reshape(len(machines), count, -1), slopes)[..., 0] / apart**slopes)
 
     def _small_swing(self, parameters: Mapping[str, float], start: Array, count: int) -> Array:
         """Say what the log would show of a machine of small swings; of two conjugate rates one tells all."""
@@ -212,11 +231,12 @@ def shortened(log: SwingLog, machine: SwingingMachine, most: int = MOST_SAMPLES)
 
 def _require_swing(machine: SwingingMachine, log: SwingLog) -> None:
     """Refuse a log of swings that no machine makes: it is in another unit."""
+    if log.quantity == "angle":
+        require_angle(log.values)
     linear = machine.linear
     gains = _gain(machine, log) @ linear.modes
     angles = _gain(machine, attrs.evolve(log, quantity="angle")) @ linear.modes
-    if log.quantity == "rate":
-        gains = gains * linear.frequencies
+    gains = gains * linear.frequencies ** DERIVATIVES.get(log.quantity, 0)
     mode = int(np.argmax(np.abs(gains)))
     swing = float(np.ptp(log.values)) / 2.0
     if swing < STILL:
@@ -247,12 +267,12 @@ def _linear_modes(machine: SwingingMachine, log: SwingLog) -> tuple[Array, Array
     system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
     rates, vectors = np.linalg.eig(system)
     gains = _gain(machine, log) @ vectors[:n_u]
-    return rates, gains * rates if log.quantity == "rate" else gains, np.linalg.inv(vectors)
+    return rates, gains * rates ** DERIVATIVES.get(log.quantity, 0), np.linalg.inv(vectors)
 
 
 def _gain(machine: SwingingMachine, log: SwingLog) -> Array:
-    """Slopes of the logged output by q_u, at rest; of a rate those of its angle."""
+    """Slopes of the logged output by q_u, at rest; of a derivative those of what it is of."""
     p, plant = SimpleNamespace(**machine.parameters), machine.plant
     outputs = [plant.outputs(q_u, machine.q_a, p) for q_u in STEP * np.eye(len(plant.unactuated))]
-    name = "sway" if log.quantity == "sway" else "angle"
+    name = "sway" if log.quantity in OF_SWAY else "angle"
     return np.array([getattr(output, name)[plant.loads.index(log.load)] for output in outputs]) / STEP

@@ -1,0 +1,127 @@
+"""The signal of a swing among a logger's columns: which hold it, about which axis, and where it jumps."""
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from gen_profile.motion.profile import Array
+from gen_profile.studies.identification.log_table import LogTable
+from gen_profile.support.phrase import Phrase
+
+_TIME = re.compile(
+    r".*(time|zeit|temps|tempo|tiempo|stamp|elapsed|millis|micros|seconds|date|datum|uhr|epoch).*"
+    r"|t([ _\[(].*)?|#|no\.?|nr\.?|index|sample",
+    re.IGNORECASE,
+)
+NAMES = {  # what columns are called that hold a quantity
+    "angle": re.compile(r".*(angle|winkel|angol|ángulo|tilt|incl|pitch|roll).*", re.IGNORECASE),
+    "sway": re.compile(r".*(sway|auslenk|oscill|oscilac|deflection).*", re.IGNORECASE),
+    "rate": re.compile(r".*(gyr|rate|omega|ω|angular.?vel).*", re.IGNORECASE),
+    "acceleration": re.compile(r".*(acc|beschl).*", re.IGNORECASE),
+}
+ALONE = 0.9  # of a swing, which a sensor shows about one axis where the load swings in one direction
+NEIGHBOURS = 51  # samples, among which one that jumps is told
+JUMP = 12.0  # times as far beside the middle of its neighbours as most are around it
+ROUNDS = 3
+GAP = 3.5  # usual steps, over which nothing tells where a swing would be
+STEPS = 10.0  # of a sensor's resolution, which no jump is less than
+
+
+def likely_columns(table: LogTable, quantity: str) -> tuple[str, str]:
+    """Choose the columns of times and of values by their names, or else the first two; numbers from 1."""
+    head = table.head(("1", "2"))
+    names = list(table.rows[head]) if table.is_head(head) else []
+    clocks = [place for place, name in enumerate(names) if _TIME.fullmatch(name)]
+    first, last = min(head + 2, len(table.rows) - 1), len(table.rows) - 1
+    running = [place for place in clocks if table.seconds(first, place) < table.seconds(last, place)]
+    time = next(iter(running or clocks), 0)
+    others = [place for place in range(len(names)) if place not in {*clocks, time}]
+    named = [place for place in others if NAMES[quantity].fullmatch(names[place])]
+    value = next(iter(named or others), 1)
+    return str(time + 1), str(value + 1)
+
+
+def same_sensor(table: LogTable, head: int, place: int) -> tuple[int, ...]:
+    """Find the columns of a sensor's axes x, y and z by the name of one; else that one alone."""
+    if not table.is_head(head):
+        return (place,)
+    names, name = list(table.rows[head]), table.cell(head, place)
+    for at, letter in enumerate(name):
+        axes = next((axes for axes in ("xyz", "XYZ") if letter in axes), "")
+        found = [f"{name[:at]}{axis}{name[at + 1 :]}" for axis in axes]
+        if axes and all(one in names for one in found):
+            return tuple(names.index(one) for one in found)
+    return (place,)
+
+
+def about_one_axis(values: Array, chosen: int) -> tuple[Array, Array, float]:
+    """Combine a sensor's axes into that of the swing.
+
+    Parameters
+    ----------
+    values : (samples, 3) array
+    chosen : int
+        The axis that shall be positive.
+
+    Returns
+    -------
+    (samples,) array
+    axis : (3,) array
+        Its direction, of length 1.
+    share : float
+        How much of what all axes show it does.
+    """
+    swing = values - values.mean(axis=0)
+    powers, axes = np.linalg.eigh(swing.T @ swing)
+    axis = axes[:, -1]
+    sign = np.sign(axis[chosen]) or 1.0
+    return values @ axis * sign, axis * sign, float(powers[-1] / max(powers.sum(), 1e-300))
+
+
+def axis_note(name: str, axis: Array, share: float) -> str:
+    """Tell which axis was taken, and whether that is all of it."""
+    words = " ".join(f"{part:+.2f} {letter}" for part, letter in zip(axis.tolist(), "xyz", strict=True))
+    if share < ALONE:
+        template = (
+            "of {name!r} and the sensor's other axes the swing's own is taken ({words}), though it shows "
+            "{share:.0%} only of what they show: let the load swing in one direction, and not turn"
+        )
+        return Phrase(template, name=name, words=words, share=share)
+    template = "of {name!r} and the sensor's other axes the swing's own is taken ({words})"
+    return Phrase(template, name=name, words=words)
+
+
+def jumps(times: Array, values: Array, resolution: float) -> NDArray[np.intp]:
+    """Find single samples that are beside a smooth swing, as a lost bit or a loose contact leaves them.
+
+    Parameters
+    ----------
+    times, values : (samples,) arrays
+    resolution : float
+        Least step between different values.
+
+    Returns
+    -------
+    (jumps,) array of int
+    """
+    kept = np.arange(len(values))
+    for _ in range(ROUNDS):  # one jump beside another is seen once that is left out
+        beside = _alone(times[kept], values[kept], resolution) if len(kept) > NEIGHBOURS else kept[:0]
+        kept = np.delete(kept, beside)
+    return np.setdiff1d(np.arange(len(values)), kept)
+
+
+def _alone(times: Array, values: Array, resolution: float) -> NDArray[np.intp]:
+    """Find samples that are farther beside a line between their neighbours than those are beside theirs."""
+    before, after = values[:-2], values[2:]
+    steps = np.diff(times)
+    share = steps[:-1] / (steps[:-1] + steps[1:])
+    beside = np.abs(values[1:-1] - (before + share * (after - before)))
+    around = median_filter(beside, NEIGHBOURS, mode="reflect")
+    limit = JUMP * around + STEPS * (resolution if np.isfinite(resolution) else 0.0)
+    padded = np.pad(beside, 1)
+    alone = beside > np.maximum(padded[:-2], padded[2:])
+    close = np.maximum(steps[:-1], steps[1:]) < GAP * np.median(steps)
+    return np.flatnonzero((beside > limit) & alone & close) + 1
