@@ -291,7 +291,9 @@ def test_a_library_is_deployed_and_any_motion_of_it_that_sways_too_much_stops_th
 def test_a_trial_is_refused_before_anything_is_asked_of_the_controller(planners, name):
     """Its manifest states 8 histories, as one may that was sealed again."""
     link = DirectLink(fresh(planners))
-    with pytest.raises(CheckFailed, match=r"is a trial, on 8 histories, and 200 make a proof: .* --trial"):
+    with pytest.raises(
+        CheckFailed, match=r"is a trial, on 8 histories, and 200 make a proof: .* for a trial by name"
+    ):
         deploy(planners[name], box_of(link))
     assert link.operations == 0
 

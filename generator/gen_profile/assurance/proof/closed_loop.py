@@ -172,9 +172,9 @@ class ClosedLoop:
 
     def _unproven(self, run: BlockRun) -> bool:
         """Tell whether a sensor has not shown a motion of its axis until the end."""
-        told = [name for name in self.outputs if name.startswith("nSensorFault")]
+        names = [name for name in self.outputs if name.startswith("nSensorFault")]
         last = dict(zip(self.outputs, run.trace[-1], strict=False)) if run.trace is not None else {}
-        return any(last.get(name) == UNPROVEN for name in told)
+        return any(last.get(name) == UNPROVEN for name in names)
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.

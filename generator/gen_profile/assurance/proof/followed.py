@@ -250,8 +250,8 @@ class Followed:
     @property
     def lost_sensors(self) -> Flags:
         """Tell when a sensor is not used for a fault."""
-        told = [axis.of("nSensorFault") for axis in self.axes]
-        issued = [self.issued[name] % UNPROVEN for name in told if name in self.issued]
+        shown_faults = [axis.of("nSensorFault") for axis in self.axes]
+        issued = [self.issued[name] % UNPROVEN for name in shown_faults if name in self.issued]
         return np.asarray(np.any([np.zeros(self.cycles), *issued], axis=0))
 
     @property

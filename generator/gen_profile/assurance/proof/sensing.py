@@ -303,11 +303,13 @@ def sensor_faults(
                 period=period,
                 resets=resets,
             )
-        told = issued[axis.of("nSensorFault")]
-        noticed = np.where(told == UNPROVEN, 0.0, told)
+        shown_faults = issued[axis.of("nSensorFault")]
+        noticed = np.where(shown_faults == UNPROVEN, 0.0, shown_faults)
         at = int(np.argmax(noticed != 0.0)) * cycle
         if fault:
-            found = at if noticed.any() else len(told) * cycle if told[-1] == UNPROVEN else None
+            found = (
+                at if noticed.any() else len(shown_faults) * cycle if shown_faults[-1] == UNPROVEN else None
+            )
             yield from _faults_of_a_faulty_one(spec, one, run, sway, noticed=found, cycle=cycle)
             if fault == "away" and noticed[-1]:
                 yield f"a sensor that is back is not used again, from {one.fails:.2f} s"

@@ -247,8 +247,8 @@ class Proof(Summarised, Examination):
             sentences.append(f"In history {those[0].number} of {self.count} {first}{others}{cure}.")
         if not sentences and len(self.judged) == self.count and not self.promised:
             sentences.append(
-                f"None of the {self.count} histories ends with a promise, so no sway was judged: try more "
-                f"(--histories; {HISTORIES} make a proof)."
+                f"None of the {self.count} histories ends with a promise, so no sway was judged: try more, "
+                f"as {HISTORIES} make a proof."
             )
         if missing := never(self.exercised, self.required):
             sentences.append(

@@ -171,8 +171,8 @@ class PlannerTable(BlockTable):
         """
         if self.histories < HISTORIES:
             raise CheckFailed(
-                f"{self.path} is a trial, on {self.histories} histories, and {HISTORIES} make a proof: write "
-                "it again without --histories, or add --trial to use it all the same."
+                f"{self.path} is a trial, on {self.histories} histories, and {HISTORIES} make a proof: prove "
+                "it on so many, or ask for a trial by name to use it all the same."
             )
 
     def check(self, values: Array, progress: Progress) -> BlockJudgement:
