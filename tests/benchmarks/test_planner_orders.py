@@ -9,6 +9,7 @@ from collections import defaultdict
 import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
+from exporters.played_planner import played_text
 
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.left_swinging import GivenModes
@@ -73,11 +74,11 @@ class Axis:
         pieces = round(time / self.promise.piece)
         return time, motion(self.promise, state, goal, pieces, shortest=True)[2, -1]
 
-    def moves(self, random):
+    def moves(self, random, sticks):
         """Move in some way for a while; whether it goes then."""
         low, high = self.spec.limits.of(0).travel
         while_ = random.uniform(0.2, 2.5) * self.period
-        if random.integers(2):
+        if random.integers(2) or not sticks:
             self.hold(while_, bExecute=1.0, fTarget=random.uniform(low, high))
         else:
             self.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
@@ -91,12 +92,12 @@ def _rests(issued, cycle):
     return cycle * (moving[-1] + 1), issued["fPosition"][-1]
 
 
-def _orders(axis, random):
+def _orders(axis, random, sticks):
     """Give an order at a random moment: by name the ratios of its time and way."""
     limits, period = axis.spec.limits.of(0), axis.period
     speed = limits.velocity * random.choice([0.2, 1.0])
     state = axis.state()
-    if abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
+    if sticks and abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
         axis.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
         starts = axis.hold(3.0 * period, fVelocityCommand=speed)
         soonest = axis.soonest(state, Goal(speed=speed))
@@ -105,7 +106,7 @@ def _orders(axis, random):
             yield f"stick to {speed / limits.velocity:.0%}", reached / soonest[0], 1.0
         axis.hold(6.0 * period, bVelocity=0.0, bStop=1.0)
         axis.hold(0.0, bStop=0.0)
-    if not axis.moves(random):
+    if not axis.moves(random, sticks):
         return
     state = axis.state()
     if random.integers(2):
@@ -130,18 +131,21 @@ def _orders(axis, random):
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_orders_at_random_moments(name):
+@pytest.mark.parametrize("block", ["today", "next"])
+def test_orders_at_random_moments(name, block):
     preset, changes = MACHINES[name]
     spec = preset_spec(preset, list(changes))
     random, found = np.random.default_rng(26), defaultdict(list)
-    histories, compiled = Histories.of(spec), compile_counting(planner_block(spec).text)
+    text = planner_block(spec).text if block == "today" else played_text(spec)  # that one takes no sticks yet
+    histories, compiled = Histories.of(spec), compile_counting(text)
     for _ in range(STATES):
-        for order, *ratios in _orders(Axis(spec, histories, compiled, random), random):
+        axis = Axis(spec, histories, compiled, random)
+        for order, *ratios in _orders(axis, random, sticks=block == "today"):
             found[order].append(ratios)
     for order, ratios in sorted(found.items()):
         times, ways = np.transpose(ratios)
         way = f", way {ways.mean():.2f}, at most {ways.max():.2f}" if order == "stop" else ""
         print(
-            f"{name}, {len(times)} {order}: time {times.mean():.2f} of the quickest,"
+            f"{name}, {block}, {len(times)} {order}: time {times.mean():.2f} of the quickest,"
             f" at most {times.max():.2f}{way}"
         )

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from exporters.st_interpreter import FunctionBlock
+from exporters.st_interpreter import block_of
 
 from gen_profile.planner.execution import translated
 from gen_profile_fmu.building.cache import cached
@@ -100,7 +100,7 @@ def require_interpreted(text, block, orders):
 
     Orders are cycles and the inputs that change from there on. Gives the outputs of the last cycle.
     """
-    oracle = FunctionBlock(text)
+    oracle = block_of(text)
     for cycles, given in orders:
         for number in range(cycles):
             out = block.hold(1, **(given if number == 0 else {}))

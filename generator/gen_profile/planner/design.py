@@ -74,12 +74,29 @@ def planner_block(spec: Spec) -> PlannerBlock:
     SpecError
         A limit is not stated, or the block does not take this machine.
     """
+    modes_of_live, constants = planner_constants(spec)
+    text = block_text(constants)
+    declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
+    if taken := [name for name in modes_of_live.live if declared[f"f{name}".lower()] > 1]:
+        problems = {name: Phrase("the block has an {own} of its own", own=f"f{name}") for name in taken}
+        raise SpecError(*(placed(f"planner.live.{name}", problem) for name, problem in problems.items()))
+    return PlannerBlock(
+        filename=f"{spec.name}.st",
+        text=text,
+        modes=modes_of_live.modes,
+        frequency_error=modes_of_live.error,
+        period=_shortest_period(modes_of_live),
+    )
+
+
+def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
+    """Find what a planner block has to know of a spec's machine; raises as `planner_block`."""
     modes_of_live = live_modes(spec)
     planned = planned_axes(spec)
     if faults := [fault for number, axis in planned.items() for fault in _faults(spec, number, axis.suffix)]:
         raise SpecError(*faults)
     axes = tuple(_axis(spec, number, axis.suffix) for number, axis in planned.items())
-    period = 2.0 * np.pi / max(_rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live))
+    period = _shortest_period(modes_of_live)
     if period / (SLOTS_PER_PERIOD * spec.export.cycle_time) < FEWEST_CYCLES:
         most = period / (SLOTS_PER_PERIOD * FEWEST_CYCLES)
         problem = Phrase("at most {most:.2g} s for a machine that swings this fast", most=most)
@@ -93,7 +110,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
     sensed = sensor_constants(spec, between(len(modes_of_live.live)), modes_of_live.others)
     parts = [modes_of_live.interpolant, modes_of_live.others, *([sensed[1]] if sensed else [])]
     exponents, coefficients = same_terms(*parts)
-    constants = PlannerConstants(
+    return modes_of_live, PlannerConstants(
         name=spec.name,
         machine=spec.machine().type,
         axes=axes,
@@ -127,18 +144,12 @@ def planner_block(spec: Spec) -> PlannerBlock:
         model=np.vstack(coefficients),
         sensor=sensed[0] if sensed else None,
     )
-    text = block_text(constants)
-    declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
-    if taken := [name for name in modes_of_live.live if declared[f"f{name}".lower()] > 1]:
-        problems = {name: Phrase("the block has an {own} of its own", own=f"f{name}") for name in taken}
-        raise SpecError(*(placed(f"planner.live.{name}", problem) for name, problem in problems.items()))
-    return PlannerBlock(
-        filename=f"{spec.name}.st",
-        text=text,
-        modes=modes_of_live.modes,
-        frequency_error=modes_of_live.error,
-        period=period,
-    )
+
+
+def _shortest_period(modes_of_live: LiveModes) -> float:
+    """Give that of the slowest mode in s, over the live ranges."""
+    rates = (_rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live))
+    return 2.0 * float(np.pi) / float(max(rates))
 
 
 def _faults(spec: Spec, number: int, suffix: str) -> list[str]:

@@ -1,10 +1,48 @@
-"""The texts of the blocks, with the sizes of their arrays put in."""
+"""The texts of the blocks, with a machine's constants and the sizes of arrays put in."""
 
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+import attrs
+import numpy as np
+
+from gen_profile_exporters.block_source import initialiser
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants
+from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent
 SIDES = 12  # of a polygon
+LONGEST, FEWEST = (
+    64,
+    40,
+)  # slots of the longest programme, where there are operations for it, and where there are few
+SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
+QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
+QUICK_WORK = 600_000  # for so many in a slot
+
+
+@attrs.frozen(kw_only=True)
+class Sizes:
+    """What the blocks of a planner are made for.
+
+    Attributes
+    ----------
+    watched : tuple of float
+        Machines that are watched: shares of the stated errors.
+    shown : tuple of float
+        Those of them that every programme has rows of.
+    shares : tuple of float
+        Of what the errors may leave, of each mode.
+    """
+
+    watched: tuple[float, ...] = (-1.0, 1.0)
+    shown: tuple[float, ...] = (-1.0, 1.0)
+    shares: tuple[float, ...] = (0.8, 0.2)
+
+    def rows(self, modes: int) -> int:
+        """Rows of a programme: those of the swings, and a target's way."""
+        return 2 * modes * (1 + len(self.shown)) + 1
 
 
 def linear_programme(name: str, *, slots: int, rows: int) -> str:
@@ -30,6 +68,110 @@ def linear_programme(name: str, *, slots: int, rows: int) -> str:
     }
     last = {f"last_{array}": length - 1 for array, length in lengths.items()}
     return filled("linear_programme", linear_programme=name, slots=slots, wide=slots + 2, rows=rows, **last)
+
+
+def operations(constants: PlannerConstants) -> int:
+    """Give what a cycle may spend: what is stated, but more for quick machines."""
+    period = min(constants.periods)
+    cycles = int(period / (SLOTS_PER_PERIOD * constants.cycle))
+    return max(constants.operations, QUICK_WORK // cycles) if period < QUICK else constants.operations
+
+
+def longest(constants: PlannerConstants) -> int:
+    """Give the slots of the longest programme."""
+    cycles = int(min(constants.periods) / (SLOTS_PER_PERIOD * constants.cycle))
+    return max(FEWEST, min(LONGEST, operations(constants) * cycles // SLOT_WORK))
+
+
+def planner(constants: PlannerConstants, sizes: Sizes) -> str:
+    """Write a planner of one axis, behind the blocks that it has within it."""
+    modes, swings = constants.modes, constants.modes * (1 + len(sizes.watched))
+    name = constants.name.replace("-", "_")
+    names = {part: f"{name}_{part}" for part in ("linear_programme", "account", "modes", "planner")}
+    shown = [
+        *range(modes),
+        *(modes * (1 + sizes.watched.index(e)) + m for e in sizes.shown for m in range(modes)),
+    ]
+    rows, slots = sizes.rows(modes), longest(constants)
+    bounds = [constants.sway_share * share for share in sizes.shares[:modes]]
+    lengths = {
+        "live": max(1, len(constants.live)), "swing": swings, "shown": len(shown), "slot": slots,
+        "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
+        "power": max(1, len(constants.live)) * constants.degrees, "model": len(constants.model),
+        "future": slots + 4,
+    }  # fmt: skip
+    values = {
+        **names,
+        **{f"last_{array}": length - 1 for array, length in lengths.items()},
+        "swings": swings,
+        "shown": len(shown),
+        "slots": slots,
+        "bounds": initialiser([literal(v) for v in np.tile(bounds, 1 + len(sizes.watched))]),
+        "shown_swings": initialiser([str(v) for v in shown]),
+        "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
+        "modes_constants": _declared(_of_modes(constants, sizes)),
+        "planner_constants": _declared(_of_motion(constants, len(shown), slots)),
+    }
+    return "\n".join(
+        [
+            linear_programme(names["linear_programme"], slots=slots, rows=rows),
+            *(filled(part, **values) for part in ("modes", "account", "planner")),
+        ]
+    )
+
+
+def _of_modes(c: PlannerConstants, sizes: Sizes) -> dict[str, object]:
+    lives = c.live or {"": (0.0, 1.0)}
+    exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
+    return {
+        "cModes": c.modes,
+        "cSwings": c.modes * (1 + len(sizes.watched)),
+        "cLives": len(c.live),
+        "cDegrees": c.degrees,
+        "cTerms": c.model.shape[1],
+        "cModelRows": len(c.model),
+        "cSlotsPerPeriod": SLOTS_PER_PERIOD,
+        "cCycle": c.cycle,
+        "cLeastDecay": c.least_decay,
+        "cWatched": [float(e) for e in sizes.watched],
+        "cLiveLow": [low for low, _ in lives.values()],
+        "cLiveHigh": [high for _, high in lives.values()],
+        "cLiveBend": [float(v) for v in c.curvatures or (0.0, 0.0)],
+        "cExponent": [int(v) for v in exponents.ravel()],
+        "cModel": [float(v) for v in c.model.ravel()],
+    }
+
+
+def _of_motion(c: PlannerConstants, shown: int, slots: int) -> dict[str, object]:
+    (axis,) = c.axes
+    return {
+        "cModes": c.modes,
+        "cShown": shown,
+        "cSlots": slots,
+        "cFuture": slots + 4,
+        "cReserve": 100 + 8 * slots,  # operations where a plan was found
+        "cVelocity": axis.velocity,
+        "cChange": axis.acceleration / axis.velocity,
+        "cCurve": axis.jerk / axis.velocity,
+        "cTravelLow": axis.travel[0],
+        "cTravelHigh": axis.travel[1],
+        "cPolygon": float(np.cos(np.pi / SIDES)),
+    }
+
+
+def _declared(constants: Mapping[str, object]) -> str:
+    return "\n".join(f"    {name} : {_constant(value)};" for name, value in constants.items())
+
+
+def _constant(value: object) -> str:
+    if isinstance(value, Sequence):
+        whole = all(isinstance(one, int) for one in value)
+        texts = [str(one) if whole else literal(one) for one in value]
+        return f"ARRAY [0..{len(texts) - 1}] OF {'DINT' if whole else 'LREAL'} := {initialiser(texts)}"
+    if isinstance(value, int):
+        return f"DINT := {value}"
+    assert isinstance(value, float)
+    return f"LREAL := {literal(value)}"
 
 
 def filled(part: str, **values: str | int) -> str:

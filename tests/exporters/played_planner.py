@@ -1,0 +1,60 @@
+"""The planner of the folder of blocks, within one that is called as today's planner block is."""
+
+from gen_profile.planner.design import planner_constants
+from gen_profile_exporters.planner.blocks.texts import Sizes, operations, planner
+
+ISSUED = {
+    "fPosition": "LREAL", "fVelocity": "LREAL", "fAcceleration": "LREAL", "bMoving": "BOOL", "bLeads": "BOOL",
+    "nAhead": "DINT", "fEnd": "LREAL", "nProgrammes": "DINT", "nFailed": "DINT", "nUnfinished": "DINT",
+    "nIterations": "DINT", "nSpent": "DINT",
+}  # fmt: skip
+
+
+def played_text(spec, sizes=None):
+    """The planner's blocks, and one that takes commands by today's names: bStop, or an edge of bExecute."""
+    _, constants = planner_constants(spec)
+    sizes = sizes or Sizes()
+    lives = "".join(
+        f"f{name} : LREAL := {value!r}; "
+        for name, value in zip(constants.live, constants.nominal, strict=True)
+    )
+    taken = "\n".join(f"aLive[{k}] := f{name};" for k, name in enumerate(constants.live))
+    outputs = "\n".join(f"{name} : {type_};" for name, type_ in ISSUED.items())
+    given = "\n".join(f"{name} := planner.{name};" for name in ISSUED)
+    name = f"{constants.name.replace('-', '_')}_planner"
+    return f"""{planner(constants, sizes)}
+FUNCTION_BLOCK Played
+VAR_INPUT
+    bEnable : BOOL; bExecute : BOOL; fTarget : LREAL; bStop : BOOL;
+    bVelocity : BOOL; fVelocityCommand : LREAL;
+    fActPosition : LREAL; {lives}
+END_VAR
+VAR_OUTPUT
+{outputs}
+END_VAR
+VAR
+    planner : {name}; aLive : ARRAY [0..{max(1, len(constants.live)) - 1}] OF LREAL;
+    bOn : BOOL; bBegin : BOOL; bWas : BOOL; bNew : BOOL; nCommand : DINT; nBefore : DINT; fGoal : LREAL;
+END_VAR
+bBegin := bEnable AND NOT bOn;
+bOn := bEnable;
+IF bBegin THEN
+    {taken}
+    nCommand := 0;
+END_IF;
+nBefore := nCommand;
+bNew := FALSE;
+IF bStop THEN
+    nCommand := 1;
+ELSIF bExecute AND NOT bWas THEN
+    nCommand := 2;
+    fGoal := fTarget;
+    bNew := TRUE;
+END_IF;
+bWas := bExecute;
+bNew := bNew OR (nCommand <> nBefore);
+planner(bBegin := bBegin, fBeginAt := fActPosition, nOperations := {operations(constants)},
+    nCommand := nCommand, fGoal := fGoal, bNew := bNew, aLive := aLive);
+{given}
+END_FUNCTION_BLOCK
+"""

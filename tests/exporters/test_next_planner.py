@@ -1,0 +1,147 @@
+"""The planner of the folder of blocks under random targets and stops: limits, ends, and what errors leave."""
+
+import numpy as np
+import pytest
+from counted_block import CountedBlock, compile_counting, require_interpreted
+from played_planner import played_text
+
+from gen_profile.planner.design import planner_constants
+from gen_profile.planner.machine import frequencies, left_by_errors, live_modes
+from gen_profile.spec.reading import preset_spec
+from gen_profile_exporters.planner.blocks.texts import operations
+
+PAPER = (
+    "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
+    "planner.live={L1=[0.3, 0.6]}",
+    "check.residual_sway=0.01",
+)
+SLOW = ("limits={velocity=2.0, acceleration=0.2, jerk=0.5, travel=[0.0, 80.0]}",)
+MACHINES = {"bay": ("bay-crane", ()), "paper": ("paper", PAPER), "slow drive": ("bay-crane", SLOW)}
+ROUNDING = 1.0 + 1e-9
+
+
+@pytest.fixture(scope="module", params=MACHINES)
+def spec(request):
+    preset, changes = MACHINES[request.param]
+    return preset_spec(preset, list(changes))
+
+
+@pytest.fixture(scope="module")
+def compiled(spec):
+    return compile_counting(played_text(spec))
+
+
+class History:
+    """A planner at random live parameters that is given commands, and all that it issued."""
+
+    def __init__(self, spec, compiled, random):
+        self.spec, self.issued, self.limits = spec, [], spec.limits.of(0)
+        live = {name: random.uniform(*ends) for name, ends in spec.planner.live.items()}
+        self.point = [
+            (2.0 * live[n] - sum(ends)) / (ends[1] - ends[0]) for n, ends in spec.planner.live.items()
+        ]
+        inputs = {f"f{name}": value for name, value in live.items()}
+        self.place = random.uniform(*self.limits.travel)
+        self.block = CountedBlock(compiled, fActPosition=self.place, **inputs)
+        self.cycle = spec.export.cycle_time
+        self.hold(0.5)
+
+    def hold(self, seconds, **inputs):
+        self.issued.append(self.block.hold(max(2, round(seconds / self.cycle)), **inputs))
+        return self.issued[-1]
+
+    def all(self, name):
+        return np.concatenate([part[name] for part in self.issued])
+
+    def left(self):
+        """Sway in m, modes added: of the machine as given, the worse one at the errors' ends, the worst."""
+        modes = live_modes(self.spec)
+        rates = np.sort(frequencies(modes.interpolant(self.point)[: modes.modes]))
+        errors, gains = np.split(left_by_errors(self.spec, self.point), [modes.modes])
+        velocity = self.all("fVelocity")
+        times = self.cycle * np.arange(len(velocity))
+        sways = {
+            share: gains
+            @ np.abs(self.cycle * np.exp(1j * np.outer(rates * (1.0 + share * errors), times)) @ velocity)
+            for share in (0.0, -1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
+        }
+        return sways[0.0], max(sways[-1.0], sways[1.0]), max(sways.values())
+
+    def keeps(self):
+        """Limits and travel are kept, all outputs are of one motion, and each cycle is short."""
+        limits, x, v, a = self.limits, *(self.all(n) for n in ("fPosition", "fVelocity", "fAcceleration"))
+        jerk = np.diff(a) / self.cycle
+        assert np.abs(v).max() <= limits.velocity * ROUNDING
+        assert np.abs(a).max() <= limits.acceleration * ROUNDING
+        assert np.abs(jerk).max() <= limits.jerk * (1.0 + 1e-6)
+        assert limits.travel[0] - 1e-9 <= x.min() and x.max() <= limits.travel[1] + 1e-9
+        assert np.allclose(
+            np.diff(x), self.cycle * (v[1:] + v[:-1]) / 2, rtol=0, atol=limits.jerk * self.cycle**3
+        )
+        assert np.allclose(
+            np.diff(v), self.cycle * (a[1:] + a[:-1]) / 2, rtol=0, atol=1e-9 + limits.jerk * self.cycle**2 / 8
+        )
+        spent = self.all("nSpent")
+        assert np.all(self.all("operations") <= spent)
+        assert spent.max() <= operations(planner_constants(self.spec)[1])
+
+
+def random_commands(history, random, count):
+    """Give commands at random moments; the last one, a target or none where it is a stop."""
+    period = 2.0 * np.pi / 1.8
+    low, high = history.limits.travel
+    for _ in range(count):
+        while_ = random.uniform(0.05, 3.0) * period
+        if random.random() < 0.3:
+            target = None
+            history.hold(while_, bStop=1.0)
+            history.hold(2 * history.cycle, bStop=0.0)
+        else:
+            target = float(random.choice([low, high, random.uniform(low, high), random.uniform(low, high)]))
+            history.hold(while_, bExecute=1.0, fTarget=target, bStop=0.0)
+    return target
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_commands_are_obeyed_within_limits_and_promise(spec, compiled, seed):
+    random = np.random.default_rng([71, seed])
+    history = History(spec, compiled, random)
+    target = random_commands(history, random, 8)
+    last = history.hold(40.0, bStop=1.0) if target is None else history.hold(100.0)
+    assert last["fVelocity"][-1] == 0.0 and last["bMoving"][-1] == 0.0
+    if target is not None:
+        assert last["fPosition"][-1] == pytest.approx(target, abs=1e-9)
+    history.keeps()
+    nominal, ends, worst = history.left()
+    limit = min(spec.check.residual_sway.values())
+    share = spec.planner.sway_share * limit
+    assert nominal <= 0.02 * share  # which the sums of sampled velocities add
+    assert ends <= 1.02 * share
+    assert worst <= limit  # the machines between the ends are not watched yet
+
+
+def test_a_stop_ends_sooner_than_the_committed_motion_and_a_target_that_is_reached_stays(spec, compiled):
+    random = np.random.default_rng(3)
+    history = History(spec, compiled, random)
+    low, high = history.limits.travel
+    target = low + 0.2 * (high - low) if history.place > (low + high) / 2 else high - 0.2 * (high - low)
+    history.hold(2.0, bExecute=1.0, fTarget=target)
+    state = history.hold(history.cycle * 2)
+    ahead = state["nAhead"][-1]
+    stop = history.hold(60.0, bStop=1.0)
+    assert np.flatnonzero(stop["fVelocity"])[-1] > 0
+    assert stop["nAhead"].max() <= ahead
+    assert abs(stop["fPosition"][-1] - target) > 0.05 * (high - low)
+    history.hold(100.0, bExecute=1.0, fTarget=target, bStop=0.0)
+    stays = history.hold(10.0, bExecute=1.0, fTarget=target)
+    assert np.all(np.abs(stays["fPosition"] - target) < 1e-9)
+    assert stays["bLeads"][-1] == 1.0
+
+
+@pytest.mark.slow
+def test_the_interpreter_issues_the_same_bits():
+    spec = preset_spec("paper", list(PAPER))
+    block = CountedBlock(compile_counting(played_text(spec)), fActPosition=0.5)
+    require_interpreted(
+        played_text(spec), block, [(3, {}), (400, {"bExecute": 1.0, "fTarget": 0.9}), (300, {"bStop": 1.0})]
+    )
