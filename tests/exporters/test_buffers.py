@@ -354,3 +354,14 @@ def test_hostile_sizes_are_refused_at_once(name):
     assert count == 1
     with pytest.raises(ExportError):
         structured_text.read_table(text, goal_of(TWO))
+
+
+def test_no_comment_decides_what_a_block_with_buffers_is(monkeypatch):
+    goal = goal_of(ONE, tables="constants")
+    plain = structured_text.block_text(ONE, goal)
+    (words,) = re.findall(r" *\(\* A double as whole numbers.*?\*\)\n", plain)
+    bare = plain.replace(words, "")
+    both = [
+        buffers.buffered([parse_function_block(text)], goal, library=False).text() for text in (plain, bare)
+    ]
+    assert both[1] == both[0].replace(words, "") != both[0]

@@ -21,14 +21,13 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
-from gen_profile_exporters.playback.block import TEMPLATE
+from gen_profile_exporters.playback.block import CHECKSUM
 from gen_profile_exporters.text_parts import names_by_type, put_in, text_parts
 
 OURS = "OfBuffer"  # behind names that the block has already
 _WORD = re.compile(r"\w+")
 _ENABLE = re.compile(r"\bbEnable\b")
 _SHARED = text_parts("playback/text/buffers.st")
-_FRACTION = re.compile(r" *\(\* A double as whole numbers.*?(?= *nCheckRow := nCheckRow \+ 1;)", re.DOTALL)
 _ROUND = "        nCheckRow := nCheckRow + 1;"
 _NUMBER = re.compile(r"c[A-Z]\w*")
 _MEMBERS = {
@@ -145,9 +144,7 @@ def _around(
     """Write what stands ahead of the statements that plan, and behind them."""
     axes = int(_initial(numbers, "cAxes"))
     moving = "".join(f" OR (ABS(aVelocity[{axis}]) > cStill[{axis}])" for axis in range(axes))
-    check = "\n".join(
-        (_SHARED["checked_value"], _FRACTION.findall(TEMPLATE)[0].rstrip(), _ROUND, _SHARED["checked_end"])
-    )
+    check = "\n".join((_SHARED["checked_value"], CHECKSUM.rstrip(), _ROUND, _SHARED["checked_end"]))
     text = put_in(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
     text = distinct(text + put_in(f"{_SHARED['planner_check']}\n", checked=check))
     text = put_in(

@@ -18,7 +18,9 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import COMMENT, TOKEN, bare
 from gen_profile_exporters.playback.layouts import LAYOUTS
 
-TEMPLATE = (Path(__file__).with_name("text") / "template.st").read_text("ascii")
+_TEXT = Path(__file__).with_name("text")
+TEMPLATE = (_TEXT / "template.st").read_text("ascii")
+CHECKSUM = (_TEXT / "checksum.st").read_text("ascii")  # lines that take the next value in
 _CHECKED = {  # how the value of a constant enters the checksum
     "DINT": "fValue := DINT_TO_LREAL({});",
     "LREAL": "fValue := {};",
@@ -114,6 +116,7 @@ def _program(layout: str, axes: int) -> str:
     array = f"ARRAY [1..{axes}] OF " if axes > 1 else ""
     constants = LAYOUTS[layout]["constants"]
     parts = LAYOUTS[layout] | {
+        "checksum": CHECKSUM,
         "constants": "".join(map(_declaration, constants)),
         "constant_count": str(constant_count(layout, axes)),
         "checked_constant": _checked(constants, axes),

@@ -84,7 +84,7 @@ _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(
     r"(DINT_TO_LREAL\()?\bc(Power\d|First|Position|Velocity|Acceleration)\[([^\[\]]*)\](?(1)\))"
 )
-_CHECKED = re.compile(r" *fValue := 0\.0;\n.*?(?= *\(\* A double as)", re.DOTALL)
+_CHECKED = re.compile(r" *fValue := 0\.0;\n.*?(?= *(?:\(\*[^*]*\*\)\s*)?nHead := 2048;)", re.DOTALL)
 _CHECKED_END = re.compile(r" *IF nCheckRow >= nCheckRows THEN\n.*?(?= *END_FOR;\nEND_IF;)", re.DOTALL)
 _WAIT = re.compile(r"\d+ cycles after power-up")
 
