@@ -356,7 +356,7 @@ def test_hostile_sizes_are_refused_at_once(name):
         structured_text.read_table(text, goal_of(TWO))
 
 
-def test_no_comment_decides_what_a_block_with_buffers_is(monkeypatch):
+def test_no_comment_decides_what_a_block_with_buffers_is():
     goal = goal_of(ONE, tables="constants")
     plain = structured_text.block_text(ONE, goal)
     (words,) = re.findall(r" *\(\* A double as whole numbers.*?\*\)\n", plain)
