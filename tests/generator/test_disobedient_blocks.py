@@ -19,7 +19,15 @@ from gen_profile.spec.reading import parse_spec
 pytestmark = pytest.mark.slow
 
 NO_NUMBERS = ("1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200")
-OWN = ("bExecute", "bVelocity", "bStop", "rOverride", "fTarget", "fVelocityLimit")  # what the block obeys
+OWN = (
+    "bExecute",
+    "bVelocity",
+    "bStop",
+    "rOverride",
+    "fTarget",
+    "fVelocityLimit",
+    "fVelocityCommand",
+)  # what the block obeys
 WRONG = {  # what a block does more before and after all that it does
     "half": ("fTarget := 0.5 * fTarget;", ""),
     "idle": ("bExecute := FALSE; bVelocity := FALSE;", ""),
@@ -60,12 +68,17 @@ def sound(shown):
 
 def disobedient(text):
     """A block that does what is wrong by a number, inputs being those of its own."""
+    return around(text, WRONG.values())
+
+
+def around(text, wrong, variables=""):
+    """A block around which each of some ways to do wrong, before and after it, is chosen by a number."""
     head, _, body = text.rpartition("END_VAR\n")
     before, after = (
         "\n".join(f"IF fWrong = {k}.0 THEN {one} END_IF;" for k, one in enumerate(parts, start=1) if one)
-        for parts in zip(*WRONG.values(), strict=True)
+        for parts in zip(*wrong, strict=True)
     )
-    declared, copied = "nSince : DINT; ", ""
+    declared, copied = f"nSince : DINT; {variables} ", ""
     for name in OWN:
         kind = "BOOL" if name[0] == "b" else "LREAL"
         declared, copied = declared + f"{name}Own : {kind}; ", copied + f"{name}Own := {name}; "

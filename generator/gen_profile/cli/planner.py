@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 from gen_profile.cli import options
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
-from gen_profile.cli.options import InputFile, OutputFile, PathType, SpecChoice, option
+from gen_profile.cli.options import Count, InputFile, OutputFile, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, not_written, print_outcome, print_warnings, warn
 from gen_profile.cli.progress import progress
 from gen_profile.cli.signing import sign, signing_key, signing_option
@@ -49,6 +49,7 @@ def planner() -> None:
 @options.export("Form of the block: plc, another that holds one, c, linux or openplc", "plc", _complete_forms)
 @options.folder
 @options.histories("Prove it on N histories of commands; on 200 by default, and fewer are a trial.")
+@option("--seed", "Prove it on other histories, drawn with this check.seed.", Count(0, 2**32 - 1))
 @options.scheduler("run the histories")
 @option("--no-check", "Skip the proof; the manifest then says unverified.")
 @option("--keep-failed", "Write the block even where the proof fails.")
@@ -61,13 +62,14 @@ def write(
     folder: Path,
     *,
     histories: int | None,
+    seed: int | None,
     no_check: bool,
     picture: Path | None,
     key_path: Path | None,
     **given: Any,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
-    spec = chosen.spec()
+    spec = chosen.spec() if seed is None else chosen.spec().changed({"check.seed": seed})
     if picture is not None and no_check:
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
     from gen_profile.assurance.proof.verdict import HISTORIES

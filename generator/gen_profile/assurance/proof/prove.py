@@ -24,6 +24,7 @@ from gen_profile.support.progress import Progress, no_progress
 
 BY_FMPY = 100  # of so many histories, one is judged by FMPy
 FEWEST_BY_FMPY = 2
+SEED_DIGITS = 8  # hexadecimal ones
 
 
 def prove(
@@ -35,7 +36,7 @@ def prove(
     scheduler: str | None = None,
     progress: Progress = no_progress,
 ) -> Proof:
-    """Prove a written block on many histories, which the spec's `check.seed` draws.
+    """Prove a written block on many histories, which the whole spec draws, `check.seed` among it.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ def prove(
     OutputError
         Dask is not installed.
     """
-    numbering = Numbering.of(Histories.of(spec), histories, spec.check.seed)
+    numbering = Numbering.of(Histories.of(spec), histories, seed_of(spec))
     with ExitStack() as stack:
         judge: Judge | None = None
         if scheduler is not None:  # before anything takes its time
@@ -77,6 +78,11 @@ def prove(
             numbering = numbering.after_round([one.number for one in _worst(spec, among)])
             judged += judge(numbering, numbers)
         return _verdict(spec, loop, numbering, judged, progress)
+
+
+def seed_of(spec: Spec) -> int:
+    """Give the seed of a spec's histories, from its hash: no two users' blocks meet the same ones."""
+    return int(spec.sha256()[:SEED_DIGITS], base=16)
 
 
 def replay(
