@@ -183,7 +183,7 @@ def _timed(run: Followed, order: TimedOrder) -> Iterator[Obeyed]:
         return
     takes = ((order.end if first is None else first) - since) * run.cycle
     own, legs = axes_alone(run, order, since), 0
-    if own < run.cycle:
+    if min(own, takes) < run.cycle:
         return  # it is there
     if order.kind == POSITION:
         places = zip(states(run, since), order.values, strict=True)
