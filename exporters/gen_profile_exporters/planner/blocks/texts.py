@@ -7,6 +7,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
@@ -32,13 +33,10 @@ class Sizes:
         Machines that are watched: shares of the stated errors.
     shown : tuple of float
         Those of them that every programme has rows of.
-    shares : tuple of float
-        Of what the errors may leave, of each mode.
     """
 
     watched: tuple[float, ...] = (-1.0, 1.0)
     shown: tuple[float, ...] = (-1.0, 1.0)
-    shares: tuple[float, ...] = (0.8, 0.2)
 
     def rows(self, modes: int) -> int:
         """Rows of a programme: those of the swings, and a target's way."""
@@ -93,7 +91,7 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
         *(modes * (1 + sizes.watched.index(e)) + m for e in sizes.shown for m in range(modes)),
     ]
     rows, slots = sizes.rows(modes), longest(constants)
-    bounds = [constants.sway_share * share for share in sizes.shares[:modes]]
+    bounds = [constants.sway_share * share for share in _shares(constants)]
     lengths = {
         "live": max(1, len(constants.live)), "swing": swings, "shown": len(shown), "slot": slots,
         "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
@@ -106,7 +104,7 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
         "swings": swings,
         "shown": len(shown),
         "slots": slots,
-        "bounds": initialiser([literal(v) for v in np.tile(bounds, 1 + len(sizes.watched))]),
+        "bounds": initialiser([literal(float(v)) for v in np.tile(bounds, 1 + len(sizes.watched))]),
         "shown_swings": initialiser([str(v) for v in shown]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": _declared(_of_modes(constants, sizes)),
@@ -118,6 +116,21 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
             *(filled(part, **values) for part in ("modes", "account", "planner")),
         ]
     )
+
+
+def _shares(c: PlannerConstants) -> Array:
+    """Divide what errors may leave among the modes: by the root of what they change, amid the live ranges.
+
+    By what they change itself, a mode that counts little would be bound as much as if it were to be at rest.
+    """
+    modes, lives = c.modes, len(c.live)
+    bends = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
+    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in bends])
+    exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
+    terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
+    errors, sways = (c.model @ terms)[2 * modes : 4 * modes].reshape(2, modes)
+    roots = np.sqrt(np.maximum(errors * sways, 0.0))
+    return np.asarray(roots / roots.sum()) if roots.any() else np.full(modes, 1.0 / modes)
 
 
 def _of_modes(c: PlannerConstants, sizes: Sizes) -> dict[str, object]:
