@@ -287,6 +287,7 @@ def test_nothing_is_wider_than_the_screen(page, width, language):
 def test_it_is_accessible(page, scheme, rules):
     """By the rules of axe-core, which look at names, roles, contrast and order."""
     page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+    page.wait("return document.querySelector('[aria-busy=true]') === null")
     with page.emulated(scheme):
         for view in VIEWS:
             look_at(page, view)
@@ -472,6 +473,69 @@ def test_the_full_check_gives_the_files_that_the_command_line_makes(page, tmp_pa
     assert "--export" not in page.find("#command").text
 
 
+def duration(page, typed):
+    """Type a duration, and wait until it is answered."""
+    page.find('input[type=number][aria-label="Duration"]').send_keys(
+        Keys.CONTROL, "a", Keys.NULL, f"{typed}\n"
+    )
+    page.wait(f"return document.querySelector('#command').textContent.endsWith('move.duration={typed}')")
+    page.wait(SETTLED.format("passed"))
+
+
+def test_files_of_another_design_are_withdrawn(page):
+    outcome = "return document.querySelector('#outcome')"
+    look_at(page, "take")
+    before = state(page)
+    page.find("#make").click()
+    page.wait(f"{outcome}.querySelector('a, .bad') !== null")
+    made = page.run(f"{outcome}.innerHTML")
+    assert "Passed" in made
+    duration(page, 3.05)
+    assert page.run(f"{outcome}.querySelector('a, .good')") is None
+    assert page.find("#outcome").text.startswith("The design or the formats have changed")
+    page.find("#language").click()
+    assert page.find("#outcome").text.startswith("Der Entwurf oder die Formate")
+    page.find("#language").click()
+    page.find("#undo").click()
+    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
+    assert page.run(f"{outcome}.innerHTML") == made  # it is of this state again
+    page.find("#formats input[value=plc]").click()
+    assert page.run(f"{outcome}.querySelector('a, .good')") is None
+    page.find("#formats input[value=plc]").click()
+    page.find("#make").click()
+    page.wait(f"{outcome}.querySelector('progress') !== null")
+    duration(page, 3.06)  # what is being made is not heard of any more
+    assert page.run(f"{outcome}.querySelector('a, .good, progress')") is None
+    assert not page.find("#stop").is_displayed()
+    page.find("#make").click()
+    page.wait(f"{outcome}.querySelector('a, .bad') !== null")
+    link = page.find("#outcome a").get_attribute("href")
+    manifest = page.run_async(
+        """
+        const [link, done] = arguments;
+        fetch(link).then((answer) => answer.bytes()).then((bytes) => done([...bytes]))""",
+        link,
+    )
+    with zipfile.ZipFile(io.BytesIO(bytes(manifest))) as archive:
+        assert json.loads(archive.read("manifest.json"))["spec"]["move"]["duration"] == 3.06
+    page.find("#undo").click()
+    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
+    page.wait(SETTLED.format("passed"))
+
+
+def test_no_command_line_stands_beside_a_value_that_does_not_fit(page):
+    look_at(page, "take")
+    before = state(page)
+    page.find('input[type=number][aria-label="Duration"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "-1\n")
+    page.wait(SETTLED.format("failed"))
+    assert page.find("#command").text == ""
+    assert not any(page.find(button).is_enabled() for button in ("#copy", "#spec", "#pin"))
+    page.find("#undo").click()
+    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
+    page.wait(SETTLED.format("passed"))
+    assert all(page.find(button).is_enabled() for button in ("#copy", "#spec", "#pin"))
+
+
 def test_what_cannot_be_offers_its_cure_as_a_button(page):
     page.run("document.querySelector('[data-group=limits]').open = true")
     box = page.find('[data-group=limits] .knob input[type="checkbox"]')
@@ -485,5 +549,5 @@ def test_what_cannot_be_offers_its_cure_as_a_button(page):
     assert page.run(f"return {faded}") == ["0.35", "0.35"]
     page.find("#cures button").click()
     page.wait(SETTLED.format("passed"))
-    assert page.run(f"return {faded}") == ["1", "1"]
+    page.wait(f"return {faded}.join() === '1,1'")  # the designs after their next comparison
     assert page.run("return document.querySelectorAll('#reasons li').length") == 0

@@ -157,7 +157,7 @@ def test_nothing_of_a_file_is_touched_before_the_user_agrees(tmp_path):
             state = showing(content)["state"]
             asking = [
                 showing(content),
-                {"say": "make", "state": state, "formats": [], "report": False},
+                {"say": "make", "number": 1, "state": state, "formats": [], "report": False},
                 {"say": "drive", "number": 1, "state": state, **driven},
                 dropped("bay.csv", b""),
                 {"say": "read", "number": 1, "state": state, **logged},

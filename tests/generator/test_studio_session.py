@@ -179,7 +179,7 @@ def test_a_page_that_comes_late_hears_what_was_found_before():
 def test_a_page_that_leaves_takes_its_workers_along():
     _, hands, _, session = page()
     session.show(0, "state")
-    session.make("order")
+    session.ask("files", 1, "order")
     session.close()
     assert [worker.ended for worker in hands.taken] == [True, True]
 

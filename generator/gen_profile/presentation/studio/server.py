@@ -286,7 +286,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             find_exporter(name)
         if question is not None:
             order = Order(question=question, formats=names or ("csv",), report=bool(said["report"]))
-            self._session.make(order)
+            self._session.ask("files", int(said["number"]), order)
 
     def _drop(self, said: dict[str, Any], content: bytes) -> None:
         """Take a file that was dropped on the page: a spec to start with, or a log."""
@@ -356,7 +356,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         if message.file is None:
             self._write(message.text)
         else:
-            self._tell({**json.loads(message.text), "file": self._keep(*message.file)})
+            self._write(json.dumps({**json.loads(message.text), "file": self._keep(*message.file)}))
 
     def _write(self, text: str) -> None:
         if self.ws_connection is not None:

@@ -108,7 +108,7 @@ class Session:
         self._tell: Tell = self._heard.append
         self._queues = {kind: RequestQueue(kind, workers, loop, self._take) for kind in ANSWERS}
         self._question: Any = None
-        self._newest, self._solved, self._orders = -1, -1, 0
+        self._newest = self._solved = -1
 
     def attach(self, tell: Tell) -> None:
         """Pass on what was found so far, and from now on."""
@@ -122,11 +122,6 @@ class Session:
             self._newest, self._question = number, question
             self._queues["depth"].pause()
             self.ask("picture", number, question)
-
-    def make(self, order: Any) -> None:
-        """Ask for files."""
-        self._orders += 1
-        self.ask("files", self._orders, order)
 
     def ask(self, kind: str, number: int, question: Any) -> None:
         """Ask for one of `ANSWERS`; the numbers of a kind rise."""

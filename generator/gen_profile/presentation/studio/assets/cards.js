@@ -5,8 +5,15 @@ const cards = (() => {
   // parts of an answer, and where they are shown
   const PLACES = { curves: ["#margins", "#sway", "#motion"], spectrum: ["#spectrum"], robustness: ["#robustness"], comparison: ["#designs"] };
 
+  const cardsOf = (kind) => PLACES[kind].map((place) => document.querySelector(place).closest(".card"));
+
   function say(kind, words) {
-    for (const place of PLACES[kind]) document.querySelector(place).closest(".card").querySelector(".waiting").textContent = words;
+    for (const card of cardsOf(kind)) card.querySelector(".waiting").textContent = words;
+  }
+
+  /** Mark cards whose part is of another state than that of now. */
+  function age(come, serial) {
+    for (const kind of ["spectrum", "robustness", "comparison"]) for (const card of cardsOf(kind)) card.ariaBusy = come[kind] !== undefined && come[kind].serial !== serial;
   }
 
   /** Say in the cards of parts that have not come what they wait for, or why nothing comes. */
@@ -32,7 +39,7 @@ const cards = (() => {
     document.getElementById("margins").replaceChildren(...rows);
   }
 
-  return { wait, come, margins };
+  return { wait, come, age, margins };
 })();
 
 // Maps of two parameters' errors: how much of the allowed residual sway the worst load takes, cell by cell.

@@ -30,6 +30,7 @@
     cards.wait(phrase("waiting"));
     player = null;
     logs.speak();
+    files.speak();
     driving.speak();
     watched.speak();
     for (const part of Object.values(latest)) if (!ONCE.has(part.part)) take(part);
@@ -134,7 +135,10 @@
 
   function ask() {
     const now = JSON.stringify(state);
-    if (now === asked || socket.readyState !== WebSocket.OPEN) return;
+    if (now === asked) return;
+    $("pin").disabled = true;
+    files.changed();
+    if (socket.readyState !== WebSocket.OPEN) return files.command();
     asked = now;
     turned.set(++serial, wanted);
     expect();
@@ -148,6 +152,7 @@
       document.body.classList.add("busy");
       document.body.classList.toggle("stale", pictured !== serial);
       judge("open", phrase("overdue"), [], []);
+      files.command();
       cards.wait(phrase("waiting"), latest);
     }, 250);
   }
@@ -187,8 +192,7 @@
       watched.begin(watching);
       $("preset").replaceChildren(started("", start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
       opened.forEach(offer);
-      const boxes = Object.entries(formats).map(([name, about]) => element("label", { title: about }, element("input", { type: "checkbox", value: name, checked: name === "csv" }), name));
-      if (!$("formats").querySelector("input")) $("formats").append(...boxes);
+      files.offer(formats);
       $("preset").value = state.preset;
     },
     state({ preset, edits: taken }) {
@@ -231,13 +235,14 @@
       titled();
       knobs.show(part.knobs, setting());
       knobs.blame([]);
-      showCommand();
+      if (part.serial === serial) files.state(part);
       notice(part.warnings.length ? `${phrase("warning")}: ${part.warnings.map(placed).join(" ")}` : "");
       if (latest.curves && String(handles) !== String(draggable())) take(latest.curves); // they came before their knobs
       tellAddress();
     },
     verdict(part) {
       const word = part.passed ? "passed" : "failed";
+      $("pin").disabled = part.serial !== serial;
       if (part.serial === serial) settled(false);
       else expect();
       logs.planned();
@@ -287,21 +292,7 @@
       if (!$("consent").open) $("consent").showModal();
       $("refuse").focus();
     },
-    progress({ stage, done: so, total, remark }) {
-      $("stop").hidden = false;
-      const share = total ? ` ${so} / ${total}` : "";
-      $("outcome").replaceChildren(element("progress", total ? { max: String(total), value: String(so), "aria-label": phrase("progress") } : { "aria-label": phrase("progress") }), ` ${phrase(stage)}${share} ${remark}`);
-    },
-    made({ passed, sentences, scenarios, file }) {
-      $("stop").hidden = true;
-      const link = file ? [element("a", { href: file.link, download: file.name, class: "main" }, `${file.name} (${Math.ceil(file.bytes / 1024)} kB)`)] : [];
-      const verdict = element("p", { class: passed ? "good" : "bad" }, passed ? filled("checked", { scenarios }) : phrase("unchecked"));
-      $("outcome").replaceChildren(verdict, ...sentences.map((one) => element("p", {}, phrase(one))), ...link);
-    },
   };
-
-  /** Say that files were not made, for the process that made them has ended. */
-  const unmade = ({ sentences }) => parts.made({ passed: false, sentences, scenarios: 0, file: null });
 
   function take(part) {
     parts[part.part]?.(part);
@@ -342,6 +333,7 @@
     clearTimeout(waiting);
     document.body.classList.remove("busy");
     document.body.classList.toggle("stale", stale);
+    files.command();
   }
 
   /** Let the browser draw the curves before anything else is done, and note how long it took from the hand to them. */
@@ -355,14 +347,6 @@
       else performance.measure("picture", { start: began, end: performance.now(), detail: { answered: answered - began } });
       receive();
     }));
-  }
-
-  const formats = () => [...$("formats").querySelectorAll("input:checked")].map((box) => box.value);
-
-  /** Write the command line that makes the files that are ticked; it writes a CSV where none is named. */
-  function showCommand() {
-    const named = formats().join() === "csv" ? [] : formats();
-    $("command").textContent = [latest.setting.command, ...named.map((name) => `--export ${name}`)].join(" ");
   }
 
   function listDesigns() {
@@ -416,17 +400,18 @@
 
   function hear(part) {
     const lost = part.part === "failure";
-    const elsewhere = { log: logs.show, drive: driving.show, watch: watched.show, files: lost && unmade, depth: lost && (() => {}) }[part.of];
+    const elsewhere = { log: logs.show, drive: driving.show, watch: watched.show, files: files.hear, depth: lost && (() => {}) }[part.of];
     if (elsewhere) {
       elsewhere(part);
       return;
     }
     // while a hand is on a knob, curves of a moment ago are welcome, but nothing that would take the knob back
-    if (part.serial < serial && !["hello", "progress", "made", "curves", "animation"].includes(part.part)) return;
+    if (part.serial < serial && !["hello", "curves", "animation"].includes(part.part)) return;
     latest[part.part] = part;
     if (part.part === "verdict") for (const old of ["failure", "faults"]) delete latest[old];
     if (["failure", "faults"].includes(part.part)) delete latest.verdict;
     take(part);
+    cards.age(latest, serial);
   }
 
   $("undo").addEventListener("click", () => step(done, undone));
@@ -440,7 +425,6 @@
   });
   $("preset").addEventListener("change", () => restart($("preset").value));
   $("pin").addEventListener("click", () => {
-    if (!latest.verdict) return;
     const name = `${phrase("pinned")} ${1 + Math.max(0, ...pins.map((pin) => pin.number))}`;
     pins.push({ name, number: pins.length + 1, state, point: latest.verdict.point, panels: [...latest.curves.sway, ...latest.curves.motion] });
     listDesigns();
@@ -457,21 +441,6 @@
     words.speak(words.other());
     speak();
   });
-  const order = (report) => say({ say: "make", state, report, formats: formats() });
-  $("formats").addEventListener("change", () => { if (latest.setting) showCommand(); });
-  $("make").addEventListener("click", () => order(false));
-  $("report").addEventListener("click", () => order(true));
-  $("stop").addEventListener("click", () => { say({ say: "stop" }); $("stop").hidden = true; $("outcome").replaceChildren(); });
-  $("spec").addEventListener("click", () => {
-    const link = element("a", { href: URL.createObjectURL(new Blob([latest.setting.text], { type: "application/toml" })), download: `${latest.setting.name}.toml` });
-    link.click();
-    URL.revokeObjectURL(link.href);
-  });
-  $("copy").addEventListener("click", async () => {
-    await navigator.clipboard.writeText($("command").textContent);
-    $("copy").textContent = phrase("copied");
-    setTimeout(() => { $("copy").textContent = phrase("copy"); }, 1500);
-  });
   $("trust").addEventListener("change", () => { $("agree").disabled = !$("trust").checked; });
   $("agree").addEventListener("click", () => { $("consent").close("agreed"); say({ say: "agree", files: latest.consent.files }); });
   $("refuse").addEventListener("click", () => $("consent").close());
@@ -485,6 +454,7 @@
   });
   driving.lend({ phrase, filled, placed, say, edit, begin, knob: at, state: () => state });
   watched.lend({ phrase, say });
+  files.lend({ phrase, filled, say, state: () => state });
   logs.begin({
     phrase, filled, notice, edit, drawing, say, send, state: () => state,
     mostUpload: () => latest.hello.most_upload,
