@@ -94,6 +94,16 @@ def test_the_page_on_the_paper_shows_what_the_command_finds(figures):
             assert in_table_units(figure, row[figure]) == pytest.approx(float(text), abs=1.1 * half_a_digit)
 
 
+def test_the_page_on_the_paper_shows_what_the_paper_prints():
+    """Below the row of each method; misprints as they are."""
+    page = (Path(__file__).parents[2] / "docs" / "paper.md").read_text("utf-8")
+    shown = re.findall(r"^\| (NZV|ZVD|β = \d+) \|.+\n\| printed \|(.+)\| \|$", page, re.MULTILINE)
+    assert [name.lower().replace("β = ", "optimal-beta") for name, _ in shown] == list(PRINTED)
+    for row, (_, cells_) in zip(PRINTED.values(), shown, strict=True):
+        for text, cell in zip(row, cells_.split("|"), strict=True):
+            assert text in (None, cell.strip())
+
+
 @pytest.mark.parametrize(("method", "millimetres"), SHORTER_ROPE.items())
 def test_the_worst_case_is_the_shorter_rope(figures, method, millimetres):
     assert 1e3 * figures[method]["sway_residual_worst_m"] == pytest.approx(millimetres, rel=0.005)

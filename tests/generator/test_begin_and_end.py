@@ -159,4 +159,4 @@ def test_what_is_left_out_is_told_truly(initial):
         assert "cannot be zero as well" in solution.redundancy
     else:
         assert slope < 1e-5
-        assert "zero with that to the others" in solution.redundancy
+        assert "zero whenever the others are" in solution.redundancy

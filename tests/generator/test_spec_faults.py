@@ -100,6 +100,10 @@ FAULTS = [
     ("plant.L1", "1.000,5", r"plant\.L1: .*; write a decimal point, and nothing between thousands\."),
     ("plant.L1", "6.0 m", r"plant\.L1: .*; write the number alone, in SI units \(m, s, kg, rad\)\."),
     ("robustness.uncertain.L1", "10 %", r"robustness\.uncertain\.L1: .*; write a share: 0\.1\."),
+    ("plant.L1", 6000, r"plant\.L1: must be a number .* m, found 6000; did you mean 6\?"),
+    ("plant.m1", 2e6, r"plant\.m1: must be a number .* kg, found 2000000\.0; did you mean 2000\?"),
+    ("plant.L1", 1e9, r"plant\.L1: must be a number .* m, found 1000000000\.0\."),
+    ("plant.L1", "−3", r"plant\.L1: .* text '−3'; write the minus of the keyboard: -3\."),
     ("plant.L1", ".5", r"plant\.L1: .*; write a digit on both sides of the decimal point\."),
     # numbers that are none, or too large, or too small
     ("move.target", 1e-300, r"move\.distance: must be zero, or at least 1e-12 m .or rad.\."),

@@ -43,6 +43,8 @@ def test_machines_from_the_laboratory_to_the_quay_are_in_no_doubt(name, override
         ("slosh-tank", "check.residual_sway=20", "check.residual_sway", "did you mean 0.02?"),
         ("paper", "limits.velocity=1000", "limits.velocity", "did you mean 1?"),
         (CRANE, "move.distance=8000", "move.duration", "did you mean 8 m?"),
+        (CRANE, "move.duration=0.014", "move.duration", "did you mean 14 s?"),
+        (CRANE, "move={ distance=50, duration=0.3 }", "move.duration", "allow more time, or move less."),
         (CRANE, "move.final_velocity=500", "move.final_velocity", "did you mean 0.5?"),
         (CRANE, "limits.sway=250", "limits.sway", "did you mean 0.25?"),
         ("mass-spring-chain", "limits.sway=49", "limits.sway", "did you mean 0.049?"),

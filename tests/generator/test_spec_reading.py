@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gen_profile.spec.reading import parse_spec, preset_spec, presets, read_spec, spec_from_dict
 from gen_profile.support.errors import OutputError, SpecError
+from gen_profile.support.suggestion import finite_number
 
 LEAST = """
 [plant]
@@ -146,6 +147,8 @@ def test_an_artefact_in_place_of_a_spec_is_told_where_it_belongs(text):
         ("uncertain = { L1 = 10 % }", "; write a share: 0.1."),
         ("L1 = 6.0 m  # rope", "; write the number alone, in SI units (m, s, kg, rad)."),
         ("L1 = .5", "; write a digit on both sides of the decimal point."),
+        ("g = −9.81", "; write the minus of the keyboard: -9.81."),
+        ("travel = [−1.0, 2.0]", "; write the minus of the keyboard, -."),
         ("L1: 6.0", "; write = between a key and its value."),
         ("L1 = 6.0;", "; a comment begins with #."),
         ("L1 = 6.0 // rope", "; a comment begins with #."),
@@ -157,6 +160,25 @@ def test_what_was_taken_for_toml_is_told(line, hint):
     with pytest.raises(SpecError) as caught:
         parse_spec(f"[plant]\n{line}\n")
     assert re.sub(r".*\(at [^)]*\)", "", str(caught.value)) == hint
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[move]\ndistance = 1.0\ndistance = 2.0", "move.distance is stated twice"),
+        ("name = 'a'\nname = 'b'\n", "name is stated twice"),
+        (
+            "[limits.axis.x]\ntravel = [0.0,\n 1.0]\ntravel = [0.0,\n 2.0]\n",
+            "limits.axis.x.travel is stated twice",
+        ),
+        ("[move]\nduration = 1.0\n[ move ]\ndistance = 2.0", r"\[move\] is stated twice"),
+        ("name = 'a'\n[name.b]\n", "Cannot overwrite a value"),  # not twice, but otherwise
+        ("move = { duration = 1.0, duration = 2.0 }", "Duplicate inline table key 'duration'"),
+    ],
+)
+def test_what_is_stated_twice_is_named(text, said):
+    with pytest.raises(SpecError, match=rf"^spec: not valid TOML: {said} \(at .*line \d, column \d+\)\.$"):
+        parse_spec(text)
 
 
 def test_a_mistyped_file_is_told(tmp_path):
@@ -325,3 +347,7 @@ def test_the_hash_does_not_hang_on_pythons_hash_seed(seed):
         check=True,
     )
     assert printed.stdout.strip() == preset_spec("paper").sha256()
+
+
+def test_numbers_of_typeset_tables_are_read():
+    assert finite_number("\N{MINUS SIGN}3.5e\N{MINUS SIGN}2") == -0.035

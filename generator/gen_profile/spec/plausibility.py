@@ -29,6 +29,8 @@ FAST = {
 }
 LONG_WAY = 1000.0  # m, longer than the runways of cranes
 MANY_TURNS = 4.0 * math.pi  # rad
+SHORT_IN_SMALL_UNITS = {"m": 100.0, "rad": 10.0}  # moves that may be in mm, or in degrees
+HASTE = 0.1  # s, within which no crane moves: a duration that lost a factor of 1000
 LONG_TIME, SLOW = 1000.0, 5e-3  # s, and m/s (or rad/s): a duration in ms rather than so slow a move
 LARGE_SWING = 0.8  # rad: sin and tan are 10 % and 29 % off the angle
 RESIDUAL_OF_ROPE = 0.5  # a load that hangs by 30° after the move
@@ -129,9 +131,7 @@ def _move(spec: Spec) -> Iterator[Implausibility]:
     ways, speeds = map(abs, move.distance), map(abs, move.final_velocity)
     for axis, distance, speed in zip(axes, ways, speeds, strict=True):
         unit = axis.unit
-        meant = distance / 1e3 if unit == "m" else math.radians(distance)
-        template = "distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"
-        cure = Phrase(template, unit=unit, meant=meant)
+        cure = _move_meant(distance, move.duration, unit)
         said = Phrase("{name} moves {distance:g} {unit}", name=axis.name, distance=distance, unit=unit)
         if not move.shortest:
             mean = distance / move.duration
@@ -156,6 +156,19 @@ def _move(spec: Spec) -> Iterator[Implausibility]:
         cure = _thousandth(move.duration, "durations are in s")
         template = "{duration:g} s for {longest:g} m (or rad) is slow; {cure}"
         yield _odd("move.duration", template, duration=move.duration, longest=longest, cure=cure)
+
+
+def _move_meant(distance: float, duration: float, unit: str) -> Phrase:
+    """End a sentence on a move that is too fast by the slip that explains it: mm, degrees, or a lost 1000."""
+    slow_enough = FAST[unit, "velocity"][0] * duration
+    meant = distance / 1e3 if unit == "m" else math.radians(distance)
+    if distance >= SHORT_IN_SMALL_UNITS[unit] and meant <= slow_enough:
+        template = "distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"
+        return Phrase(template, unit=unit, meant=meant)
+    if duration < HASTE and distance <= 1e3 * slow_enough:
+        template = "distances are in {unit} and durations in s; did you mean {meant:.4g} s?"
+        return Phrase(template, unit=unit, meant=1e3 * duration)
+    return Phrase("distances are in {unit} and durations in s; allow more time, or move less.", unit=unit)
 
 
 def _limits(spec: Spec, scale: Scale) -> Iterator[Implausibility]:

@@ -16,7 +16,7 @@ from gen_profile.spec.tables import Table, structure
 from gen_profile.support.bounded_file import DOCUMENT, is_folder, read_bounded
 from gen_profile.support.errors import OutputError, SpecError, UnknownProgram
 from gen_profile.support.private_folder import is_agreed
-from gen_profile.support.suggestion import found, listed, meant, number_meant, suggestion
+from gen_profile.support.suggestion import DASHES, found, listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
 Given = TypeVar("Given")
@@ -27,7 +27,10 @@ LONG_KEY = re.compile(
     r"(?<![\w-])(?:(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
     rf"{{{MOST_PARTS}}}"
 )
+HEADER = re.compile(r"\s*\[+([^\[\]=]+)\]")
+KEY = re.compile(r"\s*([\w.\"'-]+)\s*=")
 SLIPS = {
+    rf"[=\[,]\s*{DASHES.pattern}\s*\.?\d": "; write the minus of the keyboard, -",
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
     r"=\s*[A-Za-z_]": "; a text stands in quotes",
@@ -329,7 +332,7 @@ def _document(text: str, source: str) -> Table:
     except tomllib.TOMLDecodeError as error:
         last = text.split("\n")
         end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
-        problem = re.sub(r"[(]at end of document[)]", end, str(error))
+        problem = _doubled(text, re.sub(r"[(]at end of document[)]", end, str(error)))
         _refuse_other(source)
         raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
 
@@ -362,6 +365,19 @@ def parse_toml(text: str) -> Table:
         raise tomllib.TOMLDecodeError("arrays or tables nested too deeply") from error
     except ValueError as error:
         raise tomllib.TOMLDecodeError("a whole number of thousands of digits") from error
+
+
+def _doubled(text: str, problem: str) -> str:
+    """Name the key or table that is stated twice, where that is the problem, which tells only its line."""
+    twice = re.match(r"Cannot (?:overwrite a value|declare .* twice) (?=.*line (\d+))", problem)
+    lines = text.split("\n")[: int(twice[1])] if twice else []
+    backwards = [(KEY.match(line), HEADER.match(line)) for line in reversed(lines)]
+    header = next((header[1].strip() for _, header in backwards if header), "")
+    stated = next((one for one in backwards if any(one)), None)
+    if twice is None or stated is None or (stated[1] and "overwrite" in twice[0]):
+        return problem
+    key = stated[0] and ".".join(filter(None, (header, stated[0][1])))
+    return f"{key or f'[{header}]'} is stated twice {problem[twice.end() :]}"
 
 
 def _slip(text: str, problem: str) -> str:

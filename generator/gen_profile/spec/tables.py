@@ -177,14 +177,24 @@ def _plant(table: Table, file: MachineFile | None, plant: Plant | None, structur
     given = structurer.known(stated, ["type", *plant.nominal()], "plant")
     values = {}
     for parameter in plant.parameters:
-        name, low, high = parameter.name, parameter.lower, parameter.upper
-        template = "must be a number from {low:g} to {high:g} {unit}, found {found}"
-        words = Words(template, low=low, high=high, unit=parameter.unit)
-        kind = Annotated[float, Bounds(least=low, most=high), words]
-        value = given.get(name, parameter.nominal)
+        name, value = parameter.name, given.get(parameter.name, parameter.nominal)
+        bounds = Bounds(least=parameter.lower, most=parameter.upper)
+        kind = Annotated[float, bounds, _bounds_in_words(parameter, value)]
         values[name] = structurer.fit(value, kind, f"plant.{name}", parameter.nominal)
     defaults = tuple(name for name in values if name not in given)
     return PlantSpec(type=plant.type, file=file, parameters=values, defaults=defaults)
+
+
+def _bounds_in_words(parameter: Parameter, value: object) -> Words:
+    """Say what a parameter may be, and of a length in mm, or a mass in g, what it is in SI units."""
+    low, high, unit = parameter.lower, parameter.upper, parameter.unit
+    if unit in {"m", "kg"} and type(value) in {int, float} and high < value <= 1e3 * high:
+        template = (
+            "must be a number from {low:g} to {high:g} {unit}, found {found}; did you mean {meant:.4g}?"
+        )
+        return Words(template, low=low, high=high, unit=unit, meant=value / 1e3)
+    template = "must be a number from {low:g} to {high:g} {unit}, found {found}"
+    return Words(template, low=low, high=high, unit=unit)
 
 
 def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec:

@@ -10,6 +10,7 @@ from pathlib import Path
 from gen_profile.support.phrase import Phrase
 
 MOST = 3  # names to suggest
+DASHES = re.compile("[\N{HYPHEN}-\N{EM DASH}\N{MINUS SIGN}\N{FULLWIDTH HYPHEN-MINUS}]")  # for a minus
 MIN_SIMILARITY = 0.65  # difflib's ratio from which on a word is a misspelling of another
 
 
@@ -73,9 +74,9 @@ def _misspelt(word: str, names: Iterable[str]) -> list[str]:
 
 
 def finite_number(text: str) -> float:
-    """Read a number; NaN where a text is none, or is infinite."""
+    """Read a number, of a typographic minus, too; NaN where a text is none, or is infinite."""
     try:
-        value = float(text)
+        value = float(text.replace("\N{MINUS SIGN}", "-"))
     except ValueError:
         return math.nan
     return value if math.isfinite(value) else math.nan
@@ -84,6 +85,8 @@ def finite_number(text: str) -> float:
 def number_meant(text: str) -> str:
     """Continue a sentence about a text in a number's place: ``; write a decimal point: 6.0``."""
     text = text.strip()
+    if (typed := DASHES.sub("-", text)) != text and math.isfinite(finite_number(typed)):
+        return Phrase("; write the minus of the keyboard: {number}", number=typed)
     if comma := re.fullmatch(r"([+-]?[0-9]+),([0-9]+)", text):
         return Phrase("; write a decimal point: {number}", number=f"{comma[1]}.{comma[2]}")
     if re.fullmatch(r"[+-]?[0-9.]+,[0-9]+|[+-]?[0-9,]+\.[0-9]+", text) and "," in text:

@@ -135,7 +135,7 @@ class Solution(Summarised):
         """Say what leaving out the sensitivities to the redundant parameters means."""
         if any(self.problem.initial.values()):
             return "cannot be zero as well where the load swings at the start"
-        return "zero with that to the others, to first order"
+        return "zero whenever the others are, for small angles"
 
     def raise_for_status(self) -> Optimum:
         """Return the optimum.
