@@ -185,7 +185,7 @@ def _plant(table: Table, file: MachineFile | None, plant: Plant | None, structur
     return PlantSpec(type=plant.type, file=file, parameters=values, defaults=defaults)
 
 
-def _bounds_in_words(parameter: Parameter, value: object) -> Words:
+def _bounds_in_words(parameter: Parameter, value: Any) -> Words:
     """Say what a parameter may be, and of a length in mm, or a mass in g, what it is in SI units."""
     low, high, unit = parameter.lower, parameter.upper, parameter.unit
     if unit in {"m", "kg"} and type(value) in {int, float} and high < value <= 1e3 * high:
