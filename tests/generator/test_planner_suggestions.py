@@ -12,8 +12,20 @@ from gen_profile.spec.reading import parse_spec
 from gen_profile.support.errors import SpecError
 
 
-def proof(fraction, faults=(), broken=()):
-    judged = SimpleNamespace(faults=broken)
+def history(faults=(), promise=True, came=(), takes=1.0, **rest):
+    """A history, whose command could be obeyed in 1 s."""
+    kinds = ("brakes", "disturbed", "misinformed")
+    return SimpleNamespace(
+        faults=faults,
+        promise=promise,
+        exercised=dict.fromkeys(came, 1),
+        obeyed=(SimpleNamespace(is_late=lambda lateness: takes > lateness),),
+        history=SimpleNamespace(**{kind: kind in rest for kind in kinds}),
+    )
+
+
+def proof(fraction, faults=(), judged=None):
+    judged = judged or history()
     return SimpleNamespace(
         fraction=lambda _: fraction, faults=faults, judged=(judged,), worst=judged, passed=fraction <= 1.0
     )
@@ -51,7 +63,25 @@ def test_nothing_is_named_that_does_not_help_or_cannot_be():
         ["check.residual_sway"]
     ]
     assert planner_suggestions(spec, proof(5.0, faults=("altered",)), lambda _: proof(0.5)) == ()
-    assert planner_suggestions(spec, proof(5.0, broken=("a limit is broken",)), lambda _: proof(0.5)) == ()
+
+
+@pytest.mark.parametrize(
+    ("values", "tried"),
+    [
+        ({}, False),
+        ({"promise": False}, True),
+        ({"promise": False, "brakes": True}, False),  # after which nothing is promised
+        ({"promise": False, "misinformed": True}, False),
+        ({"came": [("nErrorId 9", "standing")]}, True),
+        ({"came": [("nErrorId 3", "standing"), ("nPromise 1", "position")]}, False),
+        ({"takes": 100.0}, True),
+    ],
+)
+def test_whether_faults_may_come_of_sway_is_told_by_values(values, tried):
+    """Whatever the words of a fault are."""
+    spec = parse_spec(HOIST, ["check.uncertain={}"])
+    failed = proof(0.5, judged=history(faults=("by and by, at times",), **values))
+    assert bool(planner_suggestions(spec, failed, lambda _: proof(0.5))) == tried
 
 
 @pytest.mark.slow

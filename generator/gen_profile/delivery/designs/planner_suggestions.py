@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 import attrs
 
-from gen_profile.assurance.proof.obedience import WORDS
-from gen_profile.assurance.proof.verdict import TAKEN_BACK, Proof, kind_of
+from gen_profile.assurance.proof.followed import LATENESS
+from gen_profile.assurance.proof.orders import NO_MOTION
+from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
 from gen_profile.methods.solvers.search import Search, least
 from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.model import Spec
@@ -16,14 +17,13 @@ from gen_profile.support.units import RATES
 # the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 UNKNOWN = 1.25  # times the limit: at least so much a block counts that shows one of the next
-# the block waits, too, where a plan would break its promise
-OF_SWAY = {TAKEN_BACK, WORDS["given up"], kind_of(WORDS["idle"])}
+GIVEN_UP = f"nErrorId {NO_MOTION:.0f}"  # a command, as any motion might leave more sway than allowed
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 
 
 def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Suggestion, ...]:
-    """Look for changes that help, where sway is too much, a promise was taken back, or an axis stands for it.
+    """Look for changes that help, where sway is too much, or faults may come of it.
 
     What is wrong besides these may come of it: whatever is named is tried in full.
 
@@ -35,11 +35,19 @@ def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
     prove : Spec → Proof
         Of the block of a changed spec, on as many histories.
     """
-    faults = {kind_of(fault) for judged in proof.judged for fault in judged.faults}
-    if proof.faults or (faults and not faults & OF_SWAY):
+    faulty = [judged for judged in proof.judged if judged.faults]
+    if proof.faults or (faulty and not any(map(_may_come_of_sway, faulty))):
         return ()
     suggestions = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
     return tuple(suggestion for suggestion in suggestions if suggestion is not None)
+
+
+def _may_come_of_sway(judged: JudgedHistory) -> bool:
+    """Tell whether a history lost its promise, or a command was given up, or late: the block waits for it."""
+    history = judged.history
+    owed = not (history.brakes or history.disturbed or history.misinformed)
+    given_up = any(output == GIVEN_UP for output, _ in judged.exercised)
+    return (owed and not judged.promise) or given_up or any(one.is_late(LATENESS) for one in judged.obeyed)
 
 
 def _tried(
