@@ -160,6 +160,21 @@ def test_a_reason_that_more_time_does_not_mend_is_one_line():
     assert any(line.startswith("zvd: move.final_velocity: a shaper moves") for line in table.splitlines())
 
 
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_the_table_is_as_wide_as_the_terminal(monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    compared = compare(preset_spec("paper", ["move.duration=2", "robustness={}"]))
+    lines = words.comparison(compared).splitlines()
+    rows = [line.split() for line in lines if line.split()[:1] == [compared.rows[0].method]]
+    heads = " ".join(" ".join(lines).split())
+    assert all(head in heads for head in words.COLUMNS)
+    figures = [word for row in rows for word in row[1:] if word != "●"]
+    assert len(figures) == len(words.COLUMNS)  # each once, whatever the number of tables
+    assert (len(rows) > 1) == (width < 100)
+    tables = [line for line in lines if line.startswith(" ")]
+    assert max(map(len, tables)) <= width
+
+
 @pytest.mark.slow
 def test_the_spec_s_own_weight_is_compared_too():
     methods = [

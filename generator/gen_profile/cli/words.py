@@ -6,11 +6,12 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
+from shutil import get_terminal_size
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.table import Table
 
 from gen_profile.assurance.certificate.document import certificate_path
@@ -44,11 +45,14 @@ RESTS = 0.5  # of a half-range, from which on 1 % of another parameter is worth 
 _TABLES = tomllib.loads((Path(__file__).parents[1] / "lists" / "figures.toml").read_text("utf-8"))
 # head → unit, figure, how many of the unit make one of the figure's
 COLUMNS: dict[str, tuple[str, str, float]] = _TABLES["terminal"]
+WIDEST = 200  # characters of a table, wherever no terminal says how many it has
 # what the names of a comparison are
 METHODS = (
     "optimal-betaN: the optimal motion with cost.sway_weight = N; -orderN, -range: with another robustness.\n"
     "All others are input shapers, which --method NAME takes."
 )
+
+_Column = tuple[str, JustifyMethod, Sequence[str]]  # its head, where its cells stand, and they
 
 
 def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingProxyType({})) -> str:
@@ -221,18 +225,17 @@ def _wind(check: Check) -> list[tuple[str, str]]:
 
 def comparison(compared: Comparison) -> str:
     """Lay the methods out side by side, below the recommendation."""
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("method\n")
-    for head, (unit, _, _) in COLUMNS.items():
-        table.add_column(f"{head}\n{unit.replace('m/', f'{compared.unit}/')}", justify="right")
-    table.add_column("limit\nkept", justify="center")
-    table.add_column("Pareto\nfront", justify="center")
-    for row in compared.rows:
-        cells = (number(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
-        marks = ("●" if mark else "" for mark in (row.safe, row.method in compared.efficient))
-        table.add_row(row.method, *cells, *marks)
-    title = f"{compared.spec.name}: {_move(compared.spec)}"
-    return "\n".join([title, "", *compared.advice(), _text(table), METHODS, *compared.missing()])
+    rows = compared.rows
+    columns: list[_Column] = [("method\n", "left", [row.method for row in rows])]
+    for head, (unit, key, factor) in COLUMNS.items():
+        cells = [number(factor * row.figures[key]) for row in rows]
+        columns.append((f"{head}\n{unit.replace('m/', f'{compared.unit}/')}", "right", cells))
+    kept, front = [row.safe for row in rows], [row.method in compared.efficient for row in rows]
+    for head, marks in (("limit\nkept", kept), ("Pareto\nfront", front)):
+        columns.append((head, "center", ["●" if mark else "" for mark in marks]))
+    title, width = f"{compared.spec.name}: {_move(compared.spec)}", get_terminal_size((WIDEST, 0)).columns
+    tables = _fitting(columns, width)
+    return "\n".join([title, "", *compared.advice(), *tables, METHODS, *compared.missing()])
 
 
 def robustness(curves: Robustness) -> str:
@@ -453,7 +456,28 @@ def _block(title: str, rows: Sequence[tuple[str, str]]) -> str:
     return f"{title}\n{_text(table)}"
 
 
+def _fitting(columns: Sequence[_Column], width: int) -> Iterator[str]:
+    """Lay columns out side by side, in several tables that all have the first one where they are too wide."""
+    first, *left = columns
+    while left:
+        for count in range(len(left), 0, -1):
+            text = _columns([first, *left[:count]])
+            if max(map(len, text.splitlines())) <= width:
+                break
+        yield text
+        left = left[count:]
+
+
+def _columns(columns: Sequence[_Column]) -> str:
+    table = Table(box=box.SIMPLE_HEAD)
+    for head, justify, _ in columns:
+        table.add_column(head, justify=justify)
+    for row in zip(*(cells for _, _, cells in columns), strict=True):
+        table.add_row(*row)
+    return _text(table)
+
+
 def _text(table: Table) -> str:
     buffer = StringIO()
-    Console(file=buffer, width=200).print(table, markup=False, highlight=False)
+    Console(file=buffer, width=WIDEST).print(table, markup=False, highlight=False)
     return "\n".join(line.rstrip() for line in buffer.getvalue().rstrip().splitlines())
