@@ -1,6 +1,7 @@
 """From a tape measure to a controller in one command, with answers by options and from a keyboard."""
 
 import json
+import re
 import subprocess
 
 import numpy as np
@@ -49,6 +50,7 @@ def test_options_answer_everything(site):
         assert outcome.code == 0, outcome.err
         again = run_here("commission", "hall.toml", *deployed, "--export", "plc", "--yes")
         assert again.code == 0, again.err
+        assert re.findall(r"^(\d)\. ", again.err, re.MULTILINE) == ["1", "2", "3", "4"]  # none left out
     spec = read_spec("hall.toml")
     assert spec.plant.parameters["L1"] == pytest.approx(ROPE, rel=2e-3)
     assert spec.plant.parameters["c1"] == pytest.approx(DAMPING, rel=0.1)

@@ -65,15 +65,15 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
     options.require_formats(given["formats"])
     run.require_log(given["swing"] or "")
     with redirect_stdout(sys.stderr) if as_json() else nullcontext():
-        _announce("1. The machine, by tape, scale and data sheet")
+        run.announce("The machine, by tape, scale and data sheet")
         overrides, readings = run.measured(path)
         run.write(path, overrides)  # what was answered so far is not asked again
-        _announce("2. A swing, which tells where the rope's pendulum really ends")
+        run.announce("A swing, which tells where the rope's pendulum really ends")
         log, signal = run.logged(path)
         url = run.answer("url", "Controller to deploy to, as opc.tcp://HOST:PORT; nothing for none", "")
         run.write(path, ('export.plc_tables="variables"',) * bool(url))
         if log is not None or readings or given["periods"]:
-            _announce("3. What that tells of the machine")
+            run.announce("What that tells of the machine")
             run.call(
                 identify,
                 spec_path=path,
@@ -82,7 +82,7 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
                 readings=readings,
                 **signal,
             )
-        _announce("4. The motion, proved on every machine of the ranges")
+        run.announce("The motion, proved on every machine of the ranges")
         formats = given["formats"] or run.answer("", "Formats (gen-profile formats)", "plc").split()
         run.call(design, spec_path=path, formats=formats)
         files = run.files()
@@ -91,7 +91,7 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
         record = None
         question = f"Does the axis stand still, and may {files[0]} be put to use?"
         if url and (yes or click.confirm(question, err=True)):
-            _announce("5. Into the controller")
+            run.announce("Into the controller")
             run.call(deploy, artefact=files[0], url=url)
             record = files[0].parent / "deployments.json"
     document = {
@@ -107,15 +107,17 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
 commission.params += [one for other, names in TAKEN.items() for one in other.params if one.name in names]
 
 
-def _announce(step: str) -> None:
-    click.secho(f"\n{step}", bold=True, err=True)
-
-
 class _Guide:
     """Answers by options, or else by who is asked, and the commands that are called with them."""
 
     def __init__(self, context: click.Context, options: dict[str, Any], yes: bool) -> None:
         self._context, self._options, self._yes, self._preset = context, options, yes, ""
+        self._steps = 0
+
+    def announce(self, step: str) -> None:
+        """Say what is done next; steps that are left out are not counted."""
+        self._steps += 1
+        click.secho(f"\n{self._steps}. {step}", bold=True, err=True)
 
     def answer(self, name: str, question: str, default: str) -> str:
         """Take an option, or ask."""
