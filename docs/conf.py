@@ -33,6 +33,9 @@ MENDED = {
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
 }
 
+# a browser reads no other page of a folder for a script, so results found there have no excerpts
+OFFLINE = ("SHOW_SEARCH_SUMMARY: true", 'SHOW_SEARCH_SUMMARY: location.protocol !== "file:"')
+
 project = "gen-profile"
 author = "the gen-profile contributors"
 copyright = f"{author}, Apache-2.0"  # noqa: A001
@@ -102,6 +105,8 @@ def mend_pages(app: Sphinx, error: Exception | None) -> None:
             for wrong, right in MENDED.items():
                 text = text.replace(wrong, right)
             page.write_text(text, "utf-8")
+        options = Path(app.outdir, "_static", "documentation_options.js")
+        options.write_text(options.read_text("utf-8").replace(*OFFLINE), "utf-8")
         entrance = f'<meta http-equiv="refresh" content="0; url={root_doc}.html">'
         Path(app.outdir, "index.html").write_text(
             f"<!doctype html><title>{project}</title>{entrance}", "utf-8"
