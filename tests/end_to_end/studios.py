@@ -19,6 +19,7 @@ from headless import Browser
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
+SETTLED = "return document.querySelector('#pill').classList.contains('{}')"
 HANG = 300.0  # s without any answer
 
 
@@ -140,3 +141,15 @@ def workers_of(server: int) -> list[int]:
         if int(parent) == server and state != "Z" and b"spawn_main" in command:
             found.append(int(entry.name))
     return found
+
+
+def look_at(page: Browser, view: str) -> None:
+    """Go to a view by its link, as a reader does."""
+    page.find(f"#places a[data-view={view}]").click()
+    page.wait(f"return document.body.dataset.show === '{view}'")
+
+
+def state(page: Browser) -> list[str]:
+    """Give the command line that the page shows, and its address."""
+    shown: list[str] = page.run("return [document.querySelector('#command').textContent, location.hash]")
+    return shown

@@ -1,18 +1,13 @@
 """The studio in a headless Chromium: knobs turned by keys and mouse, and what is then to be seen."""
 
-import io
 import json
 import random
-import shlex
-import subprocess
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import PROGRAM
 from end_to_end.simulated_controllers import free_port, serving
-from end_to_end.studios import studio
+from end_to_end.studios import SETTLED, look_at, state, studio
 from headless import COLOURS
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
@@ -27,7 +22,6 @@ from gen_profile.spec.reading import preset_spec, preset_text
 pytestmark = pytest.mark.slow
 
 OWN = Path(__file__).parents[2] / "examples" / "inclined_crane.py"
-SETTLED = "return document.querySelector('#pill').classList.contains('{}')"
 DURATION = 'input[type=range][aria-label="Duration"]'
 DROP = """
     const files = new DataTransfer();
@@ -59,12 +53,6 @@ def page(browser, controller):
         browser.wait(SETTLED.format("passed"))
         yield browser
         assert browser.complaints() == []
-
-
-def look_at(page, view):
-    """Go to a view by its link, as a reader does."""
-    page.find(f"#places a[data-view={view}]").click()
-    page.wait(f"return document.body.dataset.show === '{view}'")
 
 
 @pytest.fixture(autouse=True)
@@ -208,10 +196,6 @@ def test_on_a_phone_nothing_of_the_plan_covers_a_drive(page):
     assert page.run("return document.querySelector('#drive').getBoundingClientRect().top") < 120
 
 
-def state(page):
-    return page.run("return [document.querySelector('#command').textContent, location.hash]")
-
-
 def test_a_knob_turned_by_a_key_is_solved_and_drawn(page):
     before = page.run(
         "return [...document.querySelectorAll('.strip polyline')].map((line) => line.outerHTML)"
@@ -222,21 +206,6 @@ def test_a_knob_turned_by_a_key_is_solved_and_drawn(page):
     page.wait("return document.querySelector('#command').textContent.includes('move.duration=3.0')")
     after = page.run("return [...document.querySelectorAll('.strip polyline')].map((line) => line.outerHTML)")
     assert all(one != other for one, other in zip(before, after, strict=True))
-
-
-def test_undo_redo_and_the_address_bring_a_state_back(page):
-    page.find('input[type=number][aria-label="Duration"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "2.9\n")
-    page.wait("return document.querySelector('#command').textContent.endsWith('move.duration=2.9')")
-    changed = state(page)
-    page.find("#undo").click()
-    page.wait("return !document.querySelector('#command').textContent.endsWith('move.duration=2.9')")
-    page.find("#redo").click()
-    page.wait("return document.querySelector('#command').textContent.endsWith('move.duration=2.9')")
-    assert state(page) == changed
-    page.run("location.reload()")
-    page.wait("return document.querySelector('#command')?.textContent.endsWith('move.duration=2.9')")
-    page.wait(SETTLED.format("passed"))
-    assert state(page) == changed
 
 
 def test_the_end_of_the_move_is_dragged_and_undone_in_one_step(page):
@@ -442,98 +411,12 @@ def test_it_speaks_german_of_what_is_shown(page):
     assert "Dauer" in words and "Duration" not in words
     boxes = page.run("return [...document.querySelectorAll('#formats input')].map((box) => box.value)")
     assert len(boxes) == len(set(boxes))
-    page.find('input[type=number][aria-label="Weg"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "0.2\n")
+    page.find('input[inputmode=decimal][aria-label="Weg"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "0.2\n")
     page.wait("return document.querySelector('#command').textContent.includes('move.distance=')")
     assert "move.duration=3.1" in state(page)[0]
     page.find("#undo").click()
     page.find("#undo").click()
     page.find("#language").click()
-
-
-def test_the_full_check_gives_the_files_that_the_command_line_makes(page, tmp_path):
-    look_at(page, "take")
-    page.run("document.querySelector('#formats').scrollIntoView()")
-    page.find("#formats input[value=plc]").click()
-    page.find("#make").click()
-    page.wait("return document.querySelector('#outcome a, #outcome .bad') !== null")
-    link = page.find("#outcome a").get_attribute("href")
-    content = page.run_async(
-        """
-        const [link, done] = arguments;
-        fetch(link).then((answer) => answer.bytes()).then((bytes) => done([...bytes]))""",
-        link,
-    )
-    command = shlex.split(page.find("#command").text)
-    subprocess.run([PROGRAM, *command[1:], "--out", tmp_path / "same"], check=True, capture_output=True)
-    with zipfile.ZipFile(io.BytesIO(bytes(content))) as archive:
-        made = {name: archive.read(name) for name in archive.namelist()}
-    assert made == {path.name: path.read_bytes() for path in (tmp_path / "same").iterdir()}
-    assert {Path(name).suffix for name in made} == {".csv", ".st", ".json"}
-    page.find("#formats input[value=plc]").click()
-    assert "--export" not in page.find("#command").text
-
-
-def duration(page, typed):
-    """Type a duration, and wait until it is answered."""
-    page.find('input[type=number][aria-label="Duration"]').send_keys(
-        Keys.CONTROL, "a", Keys.NULL, f"{typed}\n"
-    )
-    page.wait(f"return document.querySelector('#command').textContent.endsWith('move.duration={typed}')")
-    page.wait(SETTLED.format("passed"))
-
-
-def test_files_of_another_design_are_withdrawn(page):
-    outcome = "return document.querySelector('#outcome')"
-    look_at(page, "take")
-    before = state(page)
-    page.find("#make").click()
-    page.wait(f"{outcome}.querySelector('a, .bad') !== null")
-    made = page.run(f"{outcome}.innerHTML")
-    assert "Passed" in made
-    duration(page, 3.05)
-    assert page.run(f"{outcome}.querySelector('a, .good')") is None
-    assert page.find("#outcome").text.startswith("The design or the formats have changed")
-    page.find("#language").click()
-    assert page.find("#outcome").text.startswith("Der Entwurf oder die Formate")
-    page.find("#language").click()
-    page.find("#undo").click()
-    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
-    assert page.run(f"{outcome}.innerHTML") == made  # it is of this state again
-    page.find("#formats input[value=plc]").click()
-    assert page.run(f"{outcome}.querySelector('a, .good')") is None
-    page.find("#formats input[value=plc]").click()
-    page.find("#make").click()
-    page.wait(f"{outcome}.querySelector('progress') !== null")
-    duration(page, 3.06)  # what is being made is not heard of any more
-    assert page.run(f"{outcome}.querySelector('a, .good, progress')") is None
-    assert not page.find("#stop").is_displayed()
-    page.find("#make").click()
-    page.wait(f"{outcome}.querySelector('a, .bad') !== null")
-    link = page.find("#outcome a").get_attribute("href")
-    manifest = page.run_async(
-        """
-        const [link, done] = arguments;
-        fetch(link).then((answer) => answer.bytes()).then((bytes) => done([...bytes]))""",
-        link,
-    )
-    with zipfile.ZipFile(io.BytesIO(bytes(manifest))) as archive:
-        assert json.loads(archive.read("manifest.json"))["spec"]["move"]["duration"] == 3.06
-    page.find("#undo").click()
-    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
-    page.wait(SETTLED.format("passed"))
-
-
-def test_no_command_line_stands_beside_a_value_that_does_not_fit(page):
-    look_at(page, "take")
-    before = state(page)
-    page.find('input[type=number][aria-label="Duration"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "-1\n")
-    page.wait(SETTLED.format("failed"))
-    assert page.find("#command").text == ""
-    assert not any(page.find(button).is_enabled() for button in ("#copy", "#spec", "#pin"))
-    page.find("#undo").click()
-    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
-    page.wait(SETTLED.format("passed"))
-    assert all(page.find(button).is_enabled() for button in ("#copy", "#spec", "#pin"))
 
 
 def test_what_cannot_be_offers_its_cure_as_a_button(page):

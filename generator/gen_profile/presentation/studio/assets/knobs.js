@@ -49,12 +49,33 @@ const knobs = (() => {
     return made((at) => at * step, (value, round) => round(digits(value / step, 9)));
   }
 
+  /** Whether a hand has typed what it has not yet entered. */
+  const typing = (field) => field.matches("[type=text], [type=number]") && document.activeElement === field && field.value !== field.defaultValue;
+
+  /** Show a value, unless a hand is typing another one. */
+  function write(field, text) {
+    if (!typing(field)) field.value = field.defaultValue = text;
+  }
+
+  /** A field that tells the number that is entered; what is none leaves the value out where that may be, or else as it is. */
+  function entry(label, tell, optional = false) {
+    const field = element("input", { ...numbers.kind(), "aria-label": label });
+    field.addEventListener("change", () => {
+      const value = numbers.typed(field.value);
+      const known = field.defaultValue;
+      if (Number.isFinite(value)) field.defaultValue = field.value;
+      else field.value = known;
+      if (Number.isFinite(value)) tell(value);
+      else if (optional) tell(null);
+    });
+    return field;
+  }
+
   /** A number's field and its slider, which tell a value in SI units. */
   function number(knob, label, tell) {
-    const field = element("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": label });
+    const field = entry(label, (value) => tell(value === null ? null : value / factor, true), knob.optional && knob.kind === "number");
     const slider = element("input", { type: "range", step: "1", "aria-label": label });
     const factor = knob.factor ?? 1;
-    field.addEventListener("change", () => field.value !== "" && tell(Number(field.value) / factor, true));
     const slid = (done) => tell(scale(row.knob).value(Number(slider.value)), done);
     slider.addEventListener("input", () => slid(false));
     slider.addEventListener("change", () => slid(true));
@@ -63,7 +84,7 @@ const knobs = (() => {
       show(next, value) {
         row.knob = next;
         const known = typeof value === "number";
-        if (document.activeElement !== field) field.value = known ? digits(value * factor) : "";
+        write(field, known ? local(digits(value * factor)) : "");
         slider.hidden = !next.span || !known;
         if (slider.hidden) return;
         const { least, most, place } = scale(next);
@@ -119,16 +140,13 @@ const knobs = (() => {
       };
     },
     pair(knob, label, turn) {
-      const fields = ["from", "to"].map((end) => element("input", { type: "number", step: "any", "aria-label": `${label}, ${knob.phrase(end)}` }));
-      for (const field of fields) field.addEventListener("change", () => turn(fields.map((one) => Number(one.value)), true));
+      const fields = ["from", "to"].map((end) => entry(`${label}, ${knob.phrase(end)}`, () => turn(fields.map((one) => numbers.typed(one.value)), true)));
       const value = element("div", { class: "value" }, fields[0], "–", fields[1], element("span", { class: "unit" }, knob.unit));
       return {
         parts: [value],
         show(next) {
           value.hidden = !next.value;
-          fields.forEach((field, which) => {
-            if (document.activeElement !== field && next.value) field.value = digits(next.value[which]);
-          });
+          if (next.value) fields.forEach((field, which) => write(field, local(digits(next.value[which]))));
         },
       };
     },
@@ -145,8 +163,11 @@ const knobs = (() => {
     },
     text(knob, label, turn) {
       const field = element("input", { type: "text", maxlength: "64", "aria-label": label });
-      field.addEventListener("change", () => turn(field.value, true));
-      return { parts: [field], show: (next) => { if (document.activeElement !== field) field.value = next.value; } };
+      field.addEventListener("change", () => {
+        field.defaultValue = field.value;
+        turn(field.value, true);
+      });
+      return { parts: [field], show: (next) => write(field, next.value) };
     },
   };
 
@@ -216,5 +237,5 @@ const knobs = (() => {
     return left;
   }
 
-  return { show, blame, element, draw, scale };
+  return { show, blame, typing, element, draw, scale };
 })();

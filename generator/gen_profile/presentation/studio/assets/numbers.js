@@ -10,6 +10,12 @@ const numbers = (() => {
   /** Write the decimal signs in a sentence; values of a spec (= 1.5, [0.1, 2.5]) stay as they are typed. */
   const sentence = (text) => (german() ? text.replace(/\[[^\]]*\]|(?<![\w.])(?<!= ?-?)\d+\.\d+/g, (found) => (found[0] === "[" ? found : found.replace(".", ","))) : text);
 
+  /** Attributes of a field for numbers as its reader writes them: number fields have the decimal sign of the browser's own language. */
+  const kind = () => (german() ? { type: "text", inputmode: "decimal" } : { type: "number", step: "any", inputmode: "decimal" });
+
+  /** The number that was typed; NaN where there is none. */
+  const typed = (text) => (text.trim() === "" ? NaN : Number(text.replace(",", ".")));
+
   const digits = (value, count = 5) => Number(Number(value).toPrecision(count));
 
   /** Three digits of any size, as an axis of a picture needs them. */
@@ -51,5 +57,5 @@ const numbers = (() => {
     put(decimals);
   });
 
-  return { local, sentence, digits, short, millimetres, ticks };
+  return { kind, typed, local, sentence, digits, short, millimetres, ticks };
 })();

@@ -417,7 +417,7 @@
   $("undo").addEventListener("click", () => step(done, undone));
   $("redo").addEventListener("click", () => step(undone, done));
   addEventListener("keydown", (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.target.matches("input[type=text], input[type=number]")) return;
+    if (!(event.ctrlKey || event.metaKey) || knobs.typing(event.target)) return;
     if (event.key === "z" && !event.shiftKey) step(done, undone);
     else if (event.key === "y" || (event.key === "Z" && event.shiftKey)) step(undone, done);
     else return;
