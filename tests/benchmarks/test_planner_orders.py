@@ -14,7 +14,7 @@ from exporters.played_planner import played_text
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.left_swinging import GivenModes
 from gen_profile.methods.quickest.axis_alone import AxisLimits
-from gen_profile.methods.quickest.motion import AxisState, Goal, Promise, motion, quickest
+from gen_profile.methods.quickest.motion import AxisGoal, AxisState, Promise, motion, quickest
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import preset_spec
 
@@ -100,7 +100,7 @@ def _orders(axis, random, sticks):
     if sticks and abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
         axis.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
         starts = axis.hold(3.0 * period, fVelocityCommand=speed)
-        soonest = axis.soonest(state, Goal(speed=speed))
+        soonest = axis.soonest(state, AxisGoal(speed=speed))
         if soonest and starts["bInVelocity"].any():
             reached = np.argmax(starts["bInVelocity"] > 0.0) * axis.cycle
             yield f"stick to {speed / limits.velocity:.0%}", reached / soonest[0], 1.0
@@ -111,7 +111,7 @@ def _orders(axis, random, sticks):
     state = axis.state()
     if random.integers(2):
         time, place = _rests(axis.hold(12.0 * period, bStop=1.0, bVelocity=0.0), axis.cycle)
-        soonest = axis.soonest(state, Goal())
+        soonest = axis.soonest(state, AxisGoal())
         if soonest:
             yield (
                 "stop",
@@ -124,7 +124,7 @@ def _orders(axis, random, sticks):
         time, place = _rests(
             axis.hold(30.0 * period, bExecute=1.0, fTarget=target, bVelocity=0.0), axis.cycle
         )
-        soonest = axis.soonest(state, Goal(place=target))
+        soonest = axis.soonest(state, AxisGoal(place=target))
         assert abs(place - target) < 1e-9
         if soonest:
             yield "new target", time / soonest[0], 1.0

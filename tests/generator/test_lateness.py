@@ -6,7 +6,7 @@ import pytest
 from generator.test_proof_obedience import CYCLE, MOVE, REST, STICKS, STOPS, obedient, with_orders
 
 from gen_profile.assurance.proof.followed import LATENESS, PLANNING
-from gen_profile.assurance.proof.lateness import Lateness, chosen
+from gen_profile.assurance.proof.lateness import Promptness, chosen
 from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
 from gen_profile.assurance.proof.promptness import FIRST, WAY, Obeyed, obeyed
 from gen_profile.spec.reading import preset_spec
@@ -46,18 +46,18 @@ def test_what_takes_longer_than_so_many_times_the_quickest_and_a_second_is_late(
 
 def test_a_late_block_is_refused_only_where_the_spec_demands_it():
     quick = attrs.evolve(SLOW, takes=4.0)
-    told = Lateness(demanded=None, commands=[(7, SLOW), (8, quick)])
-    assert told.reasons() == []
-    assert told.words().startswith(
+    lateness = Promptness(demanded=None, commands=[(7, SLOW), (8, quick)])
+    assert lateness.reasons() == []
+    assert lateness.words().startswith(
         "1 of 2 commands take more than 1.5 times the quickest and 1 s; the latest:"
     )
-    (reason,) = Lateness(demanded=1.2, commands=[(7, SLOW), (8, quick)]).reasons()
+    (reason,) = Promptness(demanded=1.2, commands=[(7, SLOW), (8, quick)]).reasons()
     assert reason.startswith(
         "In history 7 one of the stops (at 1 m, 1 m/s) takes 9 s at 3.00 s, where 4 s are possible, "
         "and 1.2 times that and 1 s are demanded (planner.lateness)"
     )
-    assert Lateness(demanded=2.0, commands=[(7, SLOW)]).reasons() == []
-    (row,) = told.table()
+    assert Promptness(demanded=2.0, commands=[(7, SLOW)]).reasons() == []
+    (row,) = lateness.table()
     assert (row["commands"], row["late"], row["compared"]) == (2, 1, 2)
     assert row["by_quickest"] == {"0.5": 1.625, "0.9": pytest.approx(2.125), "1": 2.25}
     assert (row["worst"]["history"], row["worst"]["takes_s"], row["worst"]["quickest_s"]) == (7, 9.0, 4.0)

@@ -1,4 +1,4 @@
-"""What stated errors leave of each mode, as a block is told."""
+"""What stated errors leave of each mode, as a block states it."""
 
 from itertools import product
 

@@ -271,7 +271,7 @@ def test_jumps_are_no_steep_swings():
 # ── signals ──────────────────────────────────────────────────────────────────────────────────────────────
 
 
-def turned(signal, *angles):
+def rotated(signal, *angles):
     """Put a signal about one axis onto a sensor's three axes, which lie askew."""
     axis = np.array(
         [np.cos(angles[0]), np.sin(angles[0]) * np.cos(angles[1]), np.sin(angles[0]) * np.sin(angles[1])]
@@ -285,7 +285,7 @@ def test_a_gyroscope_that_lies_askew_shows_the_rope_by_all_its_axes(tmp_path, co
     """From one axis alone a wide swing looks small, and its longer period was taken for a longer rope."""
     times, _, rates = swing(angle=0.6)
     head = ",".join(f"Gyroscope {axis} (rad/s)" for axis in "xyz")
-    path = written(tmp_path, times, *turned(rates, 1.1, 0.7), head=f"Time (s),{head}")
+    path = written(tmp_path, times, *rotated(rates, 1.1, 0.7), head=f"Time (s),{head}")
     log = read_swing(path, SPEC, columns=(1, column), signal="rate")
     assert "the swing's own is taken" in notes(log)
     assert np.abs(log.values).max() == pytest.approx(np.abs(rates).max(), rel=0.01)
@@ -294,7 +294,7 @@ def test_a_gyroscope_that_lies_askew_shows_the_rope_by_all_its_axes(tmp_path, co
 
 def test_axes_of_a_gantry_are_not_mixed(tmp_path):
     times, _, rates = swing()
-    path = written(tmp_path, times, *turned(rates, 1.1, 0.7), head="t,gyro_x,gyro_y,gyro_z")
+    path = written(tmp_path, times, *rotated(rates, 1.1, 0.7), head="t,gyro_x,gyro_y,gyro_z")
     log = read_swing(path, preset_spec("gantry-crane"), columns=("t", "gyro_y"), signal="rate")
     assert log.notes == () and np.std(log.values) < 0.9 * np.std(rates)
 
@@ -304,7 +304,7 @@ def test_accelerations_of_a_phone(tmp_path):
     times, _, rates = swing()
     pulls = np.gradient(rates, times, edge_order=2) * (ROPE + HOISTED)
     head = ",".join(f"Linear Acceleration {axis} (m/s^2)" for axis in "xyz")
-    path = written(tmp_path, times, *turned(pulls, 0.6, 0.2), head=f"Time (s),{head}")
+    path = written(tmp_path, times, *rotated(pulls, 0.6, 0.2), head=f"Time (s),{head}")
     log = read_swing(path, SPEC, signal="acceleration")
     assert holds(rope_of(log), widest=0.1)
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gen_profile.methods.quickest.axis_alone import AxisLimits, to_place, to_velocity
-from gen_profile.methods.quickest.motion import AxisState, Goal, Promise, alone, motion, quickest
+from gen_profile.methods.quickest.motion import AxisGoal, AxisState, Promise, alone, motion, quickest
 
 LIMITS = AxisLimits(velocity=1.0, acceleration=0.5, jerk=2.0)
 PERIOD = 4.0
@@ -30,7 +30,7 @@ def test_an_axis_alone_is_as_quick_as_by_its_polynomials():
     assert overshoots == pytest.approx(stops + to_place(0.1 - 0.5 * 0.8 * stops, 0.0, 0.0, LIMITS), rel=0.1)
 
 
-@pytest.mark.parametrize("goal", [Goal(place=3.0), Goal(place=0.2), Goal(speed=0.8)])
+@pytest.mark.parametrize("goal", [AxisGoal(place=3.0), AxisGoal(place=0.2), AxisGoal(speed=0.8)])
 def test_a_load_that_may_swing_as_it_likes_changes_nothing(goal):
     free = promise(left=1e3, gain=1e-9)
     free = Promise(poles=free.poles[1:], gains=free.gains[1:], exact=0, left=1e3, limits=LIMITS)
@@ -42,21 +42,21 @@ def test_a_load_that_may_swing_as_it_likes_changes_nothing(goal):
 @pytest.mark.parametrize("place", [0.5, 2.0, 8.0])
 def test_a_period_more_than_the_axis_alone_is_enough_for_any_error(place):
     """The shaper that leaves nothing to first order is a period long; exact machines need half of one."""
-    time = quickest(promise(left=1e-6, error=1e-3), REST, Goal(place=place), 60.0)
+    time = quickest(promise(left=1e-6, error=1e-3), REST, AxisGoal(place=place), 60.0)
     assert to_place(place, 0.0, 0.0, LIMITS) <= time <= to_place(place, 0.0, 0.0, LIMITS) + PERIOD + 0.4
-    sloppy = quickest(promise(left=1.0), REST, Goal(place=place), 60.0)
+    sloppy = quickest(promise(left=1.0), REST, AxisGoal(place=place), 60.0)
     assert sloppy <= min(time, to_place(place, 0.0, 0.0, LIMITS) + 0.5 * PERIOD + 0.4)
 
 
 def test_more_may_be_left_where_it_is_quicker_and_none_is_found_in_less():
-    times = [quickest(promise(left), REST, Goal(place=1.0), 60.0) for left in (0.3, 1e-2, 1e-4)]
+    times = [quickest(promise(left), REST, AxisGoal(place=1.0), 60.0) for left in (0.3, 1e-2, 1e-4)]
     assert times[0] < times[1] <= times[2]
     one = promise(1e-2)
-    assert motion(one, REST, Goal(place=1.0), round(times[1] / one.piece)) is not None
-    assert motion(one, REST, Goal(place=1.0), round(times[1] / one.piece) - 1) is None
+    assert motion(one, REST, AxisGoal(place=1.0), round(times[1] / one.piece)) is not None
+    assert motion(one, REST, AxisGoal(place=1.0), round(times[1] / one.piece) - 1) is None
 
 
-@pytest.mark.parametrize("goal", [Goal(place=2.0), Goal(), Goal(speed=-0.5)])
+@pytest.mark.parametrize("goal", [AxisGoal(place=2.0), AxisGoal(), AxisGoal(speed=-0.5)])
 def test_loads_on_a_motion_end_as_promised_on_the_way_from_any_state(goal):
     """Each machine is integrated from what it was moved before, by a general method."""
     kept, begin = promise(0.02), 1.3
@@ -98,4 +98,4 @@ def test_travel_that_is_used_up_leaves_no_motion():
         poles=1j * RATE * np.ones((1, 1)), gains=np.ones((1, 1)), left=1.0, limits=LIMITS, travel=(0.0, 1.0)
     )
     state = AxisState(place=0.99, velocity=0.9, acceleration=0.0, moved=np.zeros((1, 1)))
-    assert quickest(short, state, Goal(), 30.0) is None
+    assert quickest(short, state, AxisGoal(), 30.0) is None

@@ -9,7 +9,7 @@ from generator.test_disobedient_blocks import around
 
 from gen_profile.assurance.proof.habits import Change
 from gen_profile.assurance.proof.histories import Histories
-from gen_profile.assurance.proof.lateness import Lateness
+from gen_profile.assurance.proof.lateness import Promptness
 from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
 from gen_profile.assurance.proof.promptness import FIRST, WAY
 from gen_profile.planner.commands import Command
@@ -96,7 +96,7 @@ def late():
         number = 0.0 if name is None else 1.0 + list(SLOW).index(name)
         change = Change(time=0.0, lasts=np.inf, inputs={"fWrong": number})
         ((_, found),) = judged(spec, text, histories, [attrs.evolve(plain, changes=(change,))])
-        verdict = Lateness(demanded=1.5, commands=[(0, one.asked(1.5)) for one in found.obeyed])
+        verdict = Promptness(demanded=1.5, commands=[(0, one.asked(1.5)) for one in found.obeyed])
         assert bool(verdict.reasons()) == bool(verdict.late)
         return {one.kind for _, one in verdict.late}
 

@@ -124,8 +124,8 @@ def _shares(c: PlannerConstants) -> Array:
     By what they change itself, a mode that counts little would be bound as much as if it were to be at rest.
     """
     modes, lives = c.modes, len(c.live)
-    bends = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
-    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in bends])
+    middles = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
+    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in middles])
     exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
     terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
     errors, sways = (c.model @ terms)[2 * modes : 4 * modes].reshape(2, modes)

@@ -25,7 +25,7 @@ from gen_profile.assurance.proof.orders import (
 )
 from gen_profile.methods.quickest.axis_alone import AxisLimits
 from gen_profile.methods.quickest.modes import Complex
-from gen_profile.methods.quickest.motion import AxisState, Goal, alone
+from gen_profile.methods.quickest.motion import AxisGoal, AxisState, alone
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import UNPROVEN, BlockAxis
 
@@ -312,16 +312,16 @@ def runs_of(flags: Flags) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def goals(followed: Followed, order: TimedOrder) -> list[Goal]:
+def goals(followed: Followed, order: TimedOrder) -> list[AxisGoal]:
     """Give each axis's goal of a command; a stick's velocity only as far as the limits let it."""
     usable = 1.0 - followed.reserve
     match order.kind:
         case "position":
-            return [Goal(place=place) for place in order.values]
+            return [AxisGoal(place=place) for place in order.values]
         case "velocity":
             tops = [usable * top for top in order.tops]
-            return [Goal(speed=min(max(v, -top), top)) for v, top in zip(order.values, tops, strict=True)]
-    return [Goal() for _ in followed.axes]
+            return [AxisGoal(speed=min(max(v, -top), top)) for v, top in zip(order.values, tops, strict=True)]
+    return [AxisGoal() for _ in followed.axes]
 
 
 def limits_of(followed: Followed, order: TimedOrder) -> list[AxisLimits]:

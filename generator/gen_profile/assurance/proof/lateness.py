@@ -14,7 +14,7 @@ QUANTILES = (0.5, 0.9)
 
 
 @attrs.frozen(kw_only=True)
-class Lateness:
+class Promptness:
     """How late commands are carried out, and what the spec demands.
 
     Attributes

@@ -91,8 +91,8 @@ class GivenModes:
     @property
     def skew(self) -> float:
         """How much more an error may change a frequency one way than the other, at most."""
-        turned = self.modes.poles.imag / self.modes.poles[0].imag - 1.0
-        up, down = turned.max(axis=0), -turned.min(axis=0)
+        lead = self.modes.poles.imag / self.modes.poles[0].imag - 1.0
+        up, down = lead.max(axis=0), -lead.min(axis=0)
         least = np.minimum(up, down)
         both = least > ONE_SIDED * np.maximum(up, down)
         return float((np.maximum(up, down)[both] / least[both]).max(initial=1.0))

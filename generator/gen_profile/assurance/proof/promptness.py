@@ -39,7 +39,7 @@ from gen_profile.assurance.proof.orders import (
     Flags,
     TimedOrder,
 )
-from gen_profile.methods.quickest.motion import AxisState, Goal, Promise, motion, quickest
+from gen_profile.methods.quickest.motion import AxisGoal, AxisState, Promise, motion, quickest
 
 FIRST, WAY = "first position", "position on the way"
 KINDS = {
@@ -56,10 +56,10 @@ LONGEST = 1.5  # times the closed form, up to which the linear programme looks f
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Case:
+class ComparedCommand:
     """What the linear programme is asked: a promise, state and goal of each axis that moves."""
 
-    axes: Sequence[tuple[Promise, AxisState, Goal]]
+    axes: Sequence[tuple[Promise, AxisState, AxisGoal]]
 
     def is_possible(self, seconds: float) -> bool:
         """Tell whether every axis can be where it is to be in so much time."""
@@ -92,7 +92,7 @@ class Obeyed:
         s, of the slowest swing.
     state : str
         Of the axes as it came, in words.
-    case : Case or None
+    case : ComparedCommand or None
         Where the machine and its past are known.
     possible : float or None
         s, by the linear programme, where it was asked.
@@ -105,7 +105,7 @@ class Obeyed:
     bounded: float
     period: float
     state: str
-    case: Case | None = None
+    case: ComparedCommand | None = None
     possible: float | None = None
 
     @property
@@ -224,7 +224,7 @@ def _words(run: Followed, cycle: int) -> str:
 
 
 def _fulfilled(run: Followed, order: TimedOrder) -> tuple[int, int | None]:
-    """Tell from when an order counts, and when it is obeyed; −1 of one that nobody can time."""
+    """Tell from when an order counts, and when it is obeyed; −1 of one that cannot be timed."""
     begin, end = order.begin, order.end
     if order.kind in (QUICK_STOP, DISABLED) or run.gives_up(end) or not min(order.tops) > 0.0:
         return -1, None
@@ -282,7 +282,7 @@ def _left(run: Followed, cycles: tuple[int, int], arriving_again: float) -> Iter
             yield Allowance("left", first + begin, float(away[begin:end].max()), EXACT)
 
 
-def _case(run: Followed, order: TimedOrder) -> Case | None:
+def _case(run: Followed, order: TimedOrder) -> ComparedCommand | None:
     """Put a command to the linear programme, where all that swings has come of what is known."""
     if run.modes is None or order.begin >= run.unknown_from or not order.begin or run.zones:
         return None
@@ -305,4 +305,4 @@ def _case(run: Followed, order: TimedOrder) -> Case | None:
             travel=(low - margin, high + margin),
         )
         own.append((promise, attrs.evolve(state, moved=state.moved[np.ix_(rows, shown)]), targets[axis]))
-    return Case(axes=own) if own else None
+    return ComparedCommand(axes=own) if own else None

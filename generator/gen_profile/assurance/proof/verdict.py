@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.assurance.proof.exercised import Pairs, never, table
 from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.histories import History
-from gen_profile.assurance.proof.lateness import Lateness
+from gen_profile.assurance.proof.lateness import Promptness
 from gen_profile.assurance.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
 from gen_profile.assurance.proof.obedience import LATE, WORDS
 from gen_profile.assurance.proof.promptness import Obeyed
@@ -191,9 +191,9 @@ class Proof(Summarised, Examination):
         return max(self.judged, key=self.fraction)
 
     @property
-    def lateness(self) -> Lateness:
+    def lateness(self) -> Promptness:
         """How prompt the block is."""
-        return Lateness(
+        return Promptness(
             demanded=self.demanded,
             commands=[(one.number, command) for one in self.judged for command in one.obeyed],
         )

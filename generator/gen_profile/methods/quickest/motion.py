@@ -75,21 +75,21 @@ class AxisState:
 
 
 @attrs.frozen(kw_only=True)
-class Goal:
+class AxisGoal:
     """Where a motion ends: at a place at rest, at a speed, or, without both, at rest anywhere."""
 
     place: float | None = None
     speed: float = 0.0
 
 
-def alone(limits: AxisLimits, state: AxisState, goal: Goal) -> float:
+def alone(limits: AxisLimits, state: AxisState, goal: AxisGoal) -> float:
     """Find the least time in s of an axis without a load."""
     if goal.place is None:
         return to_velocity(state.velocity, state.acceleration, goal.speed, limits)
     return to_place(goal.place - state.place, state.velocity, state.acceleration, limits)
 
 
-def quickest(promise: Promise, state: AxisState, goal: Goal, most: float) -> float | None:
+def quickest(promise: Promise, state: AxisState, goal: AxisGoal, most: float) -> float | None:
     """Find the least time in s in which a goal is reached, the promise kept; none within the most."""
     low = int(alone(promise.limits, state, goal) / promise.piece)
     high, last = low + 2, int(np.ceil(most / promise.piece))
@@ -104,7 +104,7 @@ def quickest(promise: Promise, state: AxisState, goal: Goal, most: float) -> flo
 
 
 def motion(
-    promise: Promise, state: AxisState, goal: Goal, pieces: int, *, shortest: bool = False
+    promise: Promise, state: AxisState, goal: AxisGoal, pieces: int, *, shortest: bool = False
 ) -> Array | None:
     """Find a motion to a goal in so many pieces, the one of the shortest way where that is asked for.
 
@@ -171,7 +171,7 @@ def _waves(promise: Promise, state: AxisState, pieces: int) -> tuple[Complex, Co
     return shares[:, None] * waves, shares * np.exp(turn * pieces) * state.moved.ravel()
 
 
-def _bounds(promise: Promise, state: AxisState, goal: Goal, pieces: int) -> Iterator[tuple[float, float]]:
+def _bounds(promise: Promise, state: AxisState, goal: AxisGoal, pieces: int) -> Iterator[tuple[float, float]]:
     """Bound accelerations, velocities and places; what is already beyond a limit may come back."""
     own, (low, high) = promise.limits, promise.travel
     speed = max(own.velocity, abs(state.velocity))

@@ -77,7 +77,7 @@ class MeasuredLog:
 
 @attrs.frozen(kw_only=True)
 class _Column:
-    """What a column holds, and what its numbers are divided by; None for times whose unit nobody says."""
+    """What a column holds, and what its numbers are divided by; None for times whose unit is not stated."""
 
     quantity: str
     owner: str

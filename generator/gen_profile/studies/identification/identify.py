@@ -40,7 +40,7 @@ from gen_profile.support.progress import Progress, no_progress, require_progress
 from gen_profile.support.suggestion import finite_number, suggestion
 from gen_profile.support.summary import Drawable
 
-RELATIVE = 3.0  # of a value: what is known no better is told in its own unit
+RELATIVE = 3.0  # of a value: what is known no better is stated in its own unit
 NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 
 

@@ -53,7 +53,7 @@ def _of_day(match: re.Match[str]) -> float:
 
 
 def unit_of(times: Array) -> tuple[float, str, bool]:
-    """Tell what a clock counts in of which nobody says it.
+    """Find the unit of a clock whose log states none.
 
     Parameters
     ----------

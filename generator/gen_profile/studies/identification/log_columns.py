@@ -32,7 +32,7 @@ AT_ONCE = 4096  # rows that are read together where all hold plain numbers
 SHUFFLED = 0.125  # backward steps per row, from which on rows are in no order
 LATE = 2.0  # usual steps, within which a clock goes on that was set back
 FAR = 20.0  # usual steps that a gap between runs has at least
-LONGEST_GAP = 0.5  # of what was logged: over a longer one nobody can count the swings
+LONGEST_GAP = 0.5  # of what was logged: over a longer one the swings cannot be counted
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -106,7 +106,7 @@ def read_columns(
         Row of the columns' names.
     places : sequence of int
     per_second : float or None
-        How many of the clock's units make a second, if anybody says it.
+        How many of the clock's units make a second, if it is known.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def _no_number(table: LogTable, head: int, row: int, place: int) -> str:
 
 
 def _clock(log: _Log, *, dated: bool, said: float | None) -> _Log:
-    """Give times in s, by the unit that somebody says or that they show."""
+    """Give times in s, by the unit that is stated or that they show."""
     times, begins_anew = unwrapped(log.times, of_day=dated)
     notes = list(log.notes)
     if begins_anew:
@@ -232,7 +232,7 @@ def _evenly_told(log: _Log) -> _Log:
     apart = (log.times[first[-1]] - log.times[first[1]]) / len(kept)
     numbers = log.numbers[kept].copy()
     numbers[:, 0] = log.times[first[1]] + apart * np.arange(len(kept))
-    template = "times are told to {step:.3g} s only, so samples are taken to be {apart:.4g} s apart"
+    template = "times are given to {step:.3g} s only, so samples are taken to be {apart:.4g} s apart"
     note = Phrase(template, step=float(np.median(np.diff(log.times[first]))), apart=float(apart))
     return attrs.evolve(log, numbers=numbers, rows=log.rows[kept], notes=(*log.notes, note))
 

@@ -22,7 +22,7 @@ NAMES = {  # what columns are called that hold a quantity
     "acceleration": re.compile(r".*(acc|beschl).*", re.IGNORECASE),
 }
 ALONE = 0.9  # of a swing, which a sensor shows about one axis where the load swings in one direction
-NEIGHBOURS = 51  # samples, among which one that jumps is told
+NEIGHBOURS = 51  # samples, among which one that jumps stands out
 JUMP = 12.0  # times as far beside the middle of its neighbours as most are around it
 ROUNDS = 3
 GAP = 3.5  # usual steps, over which nothing tells where a swing would be

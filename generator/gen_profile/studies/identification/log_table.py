@@ -155,8 +155,8 @@ class LogTable:
             return ""
         name = self.cell(head, place)
         match = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
-        told = match[1] if match else name if name.lower() in TIMES else self.cell(head + 1, place)
-        unit = _spelt(told)
+        named = match[1] if match else name if name.lower() in TIMES else self.cell(head + 1, place)
+        unit = _spelt(named)
         return unit if _UNIT.fullmatch(unit) and not unit[0].isdecimal() else ""
 
     def is_head(self, row: int) -> bool:
