@@ -105,7 +105,7 @@ class BlockContainer(Exporter, Protocol):
 def target_of(spec: Spec) -> Target:
     """Pick from a spec what exporters need."""
     return Target(
-        name=spec.name,
+        name=spec.ascii_name,
         axes=spec.axis_scales(),
         start=spec.move.start,
         export=spec.export,

@@ -181,6 +181,7 @@ def test_a_sensitivity_that_the_others_imply_is_said_to_be_left_out(tmp_path):
         (("bay", "bay Axis"), "plc", "fb_bay_axis"),
         (("Bay", "bay"), "csv", "bay.csv"),
         (("bay-3", "bay_3"), "rockwell-l5x", "fb_bay_3"),
+        (("Brücke", "Bruecke"), "csv", "bruecke.csv"),
         (("bay-3", "bay_3"), "csv", None),
         (("bay-3", "bay-4"), "plc", None),
     ],

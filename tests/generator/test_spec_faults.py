@@ -251,7 +251,10 @@ NAMES += [
     "back\\slash",
     "quo'te",
     'quo"te',
-    "Brücke",
+    "½ t",  # 1/2 in ASCII
+    "ＣＯＮ",  # a device's name in ASCII
+    "Bru\u0308cke",
+    "三" * 40,  # longer in ASCII
     "\x1b[31mred",
     "name\n",
     "con",
@@ -266,9 +269,19 @@ def test_names_that_could_break_out_of_a_comment_a_path_or_a_page(name):
     assert fault.isprintable()
 
 
-@pytest.mark.parametrize("name", ["a", "bay-3", "Bay 3.1_new", "7", "a" * 64, "console", "com-1"])
+FINE = ["a", "bay-3", "Bay 3.1_new", "7", "a" * 64, "console", "com-1", "Halle 3 Brücke", "三号桥"]
+
+
+@pytest.mark.parametrize("name", FINE)
 def test_names_that_are_fine(name):
     assert spec_from_dict(with_value("name", name)).name == name
+
+
+@pytest.mark.parametrize(
+    ("name", "plain"), [("Halle 3 Brücke", "Halle 3 Bruecke"), ("Grúa 2", "Grua 2"), ("Bay 3", "Bay 3")]
+)
+def test_files_and_blocks_are_named_in_ascii(name, plain):
+    assert spec_from_dict(with_value("name", name)).ascii_name == plain
 
 
 def test_all_faults_are_told_at_once():

@@ -81,7 +81,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         problems = {name: Phrase("the block has an {own} of its own", own=f"f{name}") for name in taken}
         raise SpecError(*(placed(f"planner.live.{name}", problem) for name, problem in problems.items()))
     return PlannerBlock(
-        filename=f"{spec.name}.st",
+        filename=f"{spec.ascii_name}.st",
         text=text,
         modes=modes_of_live.modes,
         frequency_error=modes_of_live.error,
@@ -111,7 +111,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
     parts = [modes_of_live.interpolant, modes_of_live.others, *([sensed[1]] if sensed else [])]
     exponents, coefficients = same_terms(*parts)
     return modes_of_live, PlannerConstants(
-        name=spec.name,
+        name=spec.ascii_name,
         machine=spec.machine().type,
         axes=axes,
         cycle=spec.export.cycle_time,

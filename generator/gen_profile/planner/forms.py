@@ -96,7 +96,7 @@ def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tupl
 def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
     """Write the block, then its wrappers, each into files of its own."""
     if format_ in PROGRAMS:
-        return PROGRAMS[format_](block.text, spec.name)
+        return PROGRAMS[format_](block.text, spec.ascii_name)
     container, target = find_container(format_), target_of(spec)
     units = {axis.suffix: target.axes[number].factor for number, axis in planned_axes(spec).items()}
     source = given = parse_function_block(block.text)

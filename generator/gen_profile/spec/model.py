@@ -41,6 +41,7 @@ from gen_profile.spec.values import (
     SolverName,
     Travel,
     Words,
+    ascii_name,
     example,
 )
 from gen_profile.support.summary import Drawable
@@ -457,6 +458,11 @@ class Spec(Drawable, Checked):
         own, judge = self.plant.file, self.check.foreign
         files = {} if own is None else {own.name: own.content}
         return files if judge is None else files | {judge.name: judge.path.read_bytes()}
+
+    @property
+    def ascii_name(self) -> str:
+        """Name files and program blocks, whose names are ASCII."""
+        return ascii_name(self.name)
 
     def sha256(self) -> str:
         """Hash of the whole spec, defaults included, in hexadecimal."""

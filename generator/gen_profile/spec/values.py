@@ -104,9 +104,32 @@ def require_whole(value: object, least: int, place: str) -> None:
         raise SpecError(f"{place}: must be a whole number of at least {least}, found {found(value)}.")
 
 
+GERMAN = str.maketrans({"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ä": "ae", "ö": "oe", "ü": "ue"})
+
+
+def ascii_name(name: str) -> str:
+    """Write a name as files and blocks of controllers have it, such as Bruecke for Brücke."""
+    if name.isascii():
+        return name
+    from anyascii import anyascii  # noqa: PLC0415  (whose tables few names need)
+
+    return anyascii(name.translate(GERMAN))
+
+
+@attrs.frozen
+class NamePattern(Pattern):
+    """Names of letters of any script, as long as what they are in ASCII fits the expression."""
+
+    def problem(self, value: str, written: object) -> str:
+        """Say what a name must be; nothing where it is."""
+        of_letters = re.fullmatch(r"[\w. -]*", value)
+        fits = of_letters and not super().problem(ascii_name(value), written)
+        return "" if fits else Phrase("must be {form}, found {found}", form=self.meaning, found=found(value))
+
+
 Name = Annotated[
     str,
-    Pattern(
+    NamePattern(
         r"(?!(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\.|$))"
         r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,62}[A-Za-z0-9_-])?",
         "1 to 64 letters, digits, dots, underscores, hyphens and spaces, beginning with a letter or digit, "

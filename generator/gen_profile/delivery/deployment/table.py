@@ -132,7 +132,7 @@ class BlockTable:
         held = with_buffer(self.source, list(map(literal, values.tolist())))
         judgements = []
         with TemporaryDirectory() as folder:
-            path = Path(folder) / f"{self.spec.name}.st"
+            path = Path(folder) / f"{self.spec.ascii_name}.st"
             for block, spec in zip(constant_sources(held, target_of(self.spec)), self.specs, strict=True):
                 path.write_text(block.text(), encoding="ascii", newline="\n")
                 judgements.append(check_artefact(path, spec, progress=progress))

@@ -24,6 +24,7 @@ from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
+from gen_profile.spec.values import ascii_name
 from gen_profile.support.artefacts.manifest import (
     FILENAME,
     Artefact,
@@ -316,5 +317,5 @@ def _taken(manifest: Manifest) -> set[str]:
     blocks: tuple[str, ...] = ()
     if any(known.format not in WITHOUT_BLOCKS for known in manifest.artefacts):
         blocks = BLOCKS
-    files = [known.path for known in manifest.artefacts]
-    return {name.casefold() for name in (*files, *(block_name(manifest.name) + end for end in blocks))}
+    files, block = [known.path for known in manifest.artefacts], block_name(ascii_name(manifest.name))
+    return {name.casefold() for name in (*files, *(block + end for end in blocks))}

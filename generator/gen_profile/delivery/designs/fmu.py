@@ -115,8 +115,8 @@ def export_fmu(
     spec = as_spec(spec)
     if kind not in KINDS:
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
-    systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}
-    identifier = c_name(systems.get(kind, f"{spec.name} {kind}"))
+    systems = {"ssp": spec.ascii_name, "planned-ssp": f"{spec.ascii_name} planned"}
+    identifier = c_name(systems.get(kind, f"{spec.ascii_name} {kind}"))
     suffix = ".ssp" if kind in LEADERS else ".fmu"
     path = as_path(path or f"{identifier}{suffix}")
     if path.suffix.lower() != suffix:
@@ -157,7 +157,7 @@ def platform_names(choice: str) -> tuple[str, ...]:
 
 
 def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> Model:
-    name = c_name(f"{spec.name} {kind}")
+    name = c_name(f"{spec.ascii_name} {kind}")
     if kind in ("profile", "system"):
         evaluation = plan(spec, progress=progress).evaluation
         if kind == "profile":

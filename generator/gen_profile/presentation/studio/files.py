@@ -44,12 +44,12 @@ def _made(order: Order, tell: Progress) -> Part:
     spec, check, file = order.question.spec(), None, None
     if order.report:
         made = report(spec, order.formats, progress=tell)
-        check, file = made.check, (f"{spec.name}.html", made.content)
+        check, file = made.check, (f"{spec.ascii_name}.html", made.content)
     else:
         with temporary_folder(Path(gettempdir()), "gen-profile-studio-") as parent:
             outcome = design(spec, order.formats, parent / "out", progress=tell)
             check = outcome.check
-            file = (f"{spec.name}.zip", _zipped(parent / "out")) if outcome.artefacts else None
+            file = (f"{spec.ascii_name}.zip", _zipped(parent / "out")) if outcome.artefacts else None
     return {
         "part": "made",
         "passed": check is not None and check.passed,

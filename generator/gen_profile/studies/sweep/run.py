@@ -74,7 +74,7 @@ def prepare(
     spec = recipe.spec({})
     for axis in grid.axes:
         _require_some(recipe, axis.key, axis.values)
-    return Store(folder=folder, name=spec.name, grid=grid, recipe=recipe, spec_sha256=spec.sha256())
+    return Store(folder=folder, name=spec.ascii_name, grid=grid, recipe=recipe, spec_sha256=spec.sha256())
 
 
 def _require_some(recipe: Recipe, key: str, values: Sequence[Any]) -> None:
