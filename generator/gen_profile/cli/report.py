@@ -102,7 +102,7 @@ def _of_design(spec: Spec, formats: tuple[str, ...], **given: Any) -> _Subject:
     from gen_profile.cli import words
     from gen_profile.presentation.report.build import report as run
 
-    return spec.name, partial(run, spec, formats, **given), words.report
+    return spec.ascii_name, partial(run, spec, formats, **given), words.report
 
 
 def _of_block(path: Path) -> _Subject:
