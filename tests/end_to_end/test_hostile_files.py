@@ -173,7 +173,8 @@ def test_control_characters_of_files_do_not_reach_the_terminal(tmp_path):
     key = "".join(f"\\u{ord(one):04x}" for one in OBEYED)
     spec.write_text(f'plant.type = "slosh-tank"\n[limits]\n"{key}" = 1\n')
     rows = "".join(f"{0.1 * k:.1f},{k % 2},{k % 2}\n" for k in range(50))
-    log.write_text(f"time_s,angle,{OBEYED}\n{rows}5.0,{OBEYED},0\n", "utf-8")
+    garbled = "".join(f"{0.1 * k:.1f},{OBEYED},0\n" for k in range(50, 60))  # too many to be left out
+    log.write_text(f"time_s,angle,{OBEYED}\n{rows}{garbled}", "utf-8")
     for words in ((spec,), ("identify", "--preset", "paper", "--swing", log, "--free", "L1")):
         refused = run_here(*words)
         assert refused.code == 2 and "\\x1b]0;mine" in refused.err

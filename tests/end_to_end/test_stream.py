@@ -169,7 +169,7 @@ def test_dry_run_touches_no_bus(deployed):
     assert {
         "node": 1,
         "object": "60C2h:01",
-        "value": 2,
+        "value": 20,
         "meaning": "interpolation period: digits",
     } in document["startup"]
     words = run_here("stream", deployed / "paper.log", "--dry-run").out
