@@ -223,7 +223,7 @@ class Proof(Summarised, Examination):
         if failed or not drawn:
             return f"{failed} of {drawn} drawn by chance fail, with the seed {self.seed}"
         return (
-            f"none of {drawn} drawn by chance fails: fewer than {100.0 * share:.2g} % of such would (at 95 %)"
+            f"none of {drawn} drawn by chance fails: fewer than {100.0 * share:.3g} % of such would (at 95 %)"
         )
 
     def unsafe(self) -> tuple[str, ...]:
