@@ -25,7 +25,7 @@ OLD = 0.02  # s, at most, that a measured position is old
 SPIKE = 5.0  # times the greatest velocity, in one cycle
 OFTEN = 3  # so often some habits are taken
 
-MORE = 0.6180339887  # turns one choice into others
+GOLDEN_RATIO = 0.6180339887  # steps by it spread evenly over 0 to 1, however many there are
 
 
 @attrs.frozen(kw_only=True)
@@ -151,7 +151,7 @@ def between(ends: tuple[float, float], fraction: float) -> float:
 
 
 def _fraction(fraction: float, number: int) -> float:
-    return (fraction + MORE * (number + 1)) % 1.0
+    return (fraction + GOLDEN_RATIO * (number + 1)) % 1.0
 
 
 def _log(low: float, high: float, fraction: float) -> float:

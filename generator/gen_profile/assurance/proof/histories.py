@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.proof import habits
-from gen_profile.assurance.proof.habits import MORE, Change, Manner, Surroundings, between
+from gen_profile.assurance.proof.habits import GOLDEN_RATIO, Change, Manner, Surroundings, between
 from gen_profile.assurance.proof.rhythms import rhythm
 from gen_profile.assurance.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.dynamics.evaluation import phrases
@@ -400,7 +400,7 @@ class Histories:
         if not self.spec.planner.zones:
             return
         for k, start in enumerate(starts):
-            place, width = ((fraction + MORE * (k + 1)) % 1.0 for fraction in shares)
+            place, width = ((fraction + GOLDEN_RATIO * (k + 1)) % 1.0 for fraction in shares)
             zone = around.zone(
                 k, 0.8 + 0.15 * place if start < 0.5 else 0.05 + 0.1 * place, 0.3 * width, 0, slow=False
             )
@@ -461,7 +461,7 @@ def written(value: float) -> float | str:
 def _turned(rows: Array, lasts: float) -> Array:
     """Repeat rows of choices, other ones each time, so many that each may last a second."""
     times = ceil(lasts / len(rows))
-    return (np.tile(rows, (times, 1)) + MORE * np.repeat(np.arange(times), len(rows))[:, None]) % 1.0
+    return (np.tile(rows, (times, 1)) + GOLDEN_RATIO * np.repeat(np.arange(times), len(rows))[:, None]) % 1.0
 
 
 def _widened(fraction: float, margin: float = 0.05) -> float:

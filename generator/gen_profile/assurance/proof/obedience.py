@@ -21,7 +21,7 @@ from gen_profile.assurance.proof.followed import (
 from gen_profile.assurance.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
 from gen_profile.assurance.proof.promptness import lost
 
-MORE = 0.1  # of the greatest velocity, which an operator takes for the stick's own, or for standing
+MISJUDGED = 0.1  # of the greatest velocity, which an operator takes for the stick's own, or for standing
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 _LINES = (Path(__file__).parents[2] / "lists" / "obedience.txt").read_text("utf-8").splitlines()
@@ -120,10 +120,10 @@ def _sticks(run: Followed) -> Iterator[Allowance]:
             if not way:
                 yield from greatest("unasked", np.abs(velocity), 0.0, begin)
             elif order.kind == VELOCITY:
-                top = abs(way) + MORE * run.limits[k].velocity
+                top = abs(way) + MISJUDGED * run.limits[k].velocity
                 yield from greatest("beyond", velocity * np.sign(way), top, begin)
             elif not run.issued["bBusy"][begin - 1]:
-                back = MORE * run.limits[k].velocity
+                back = MISJUDGED * run.limits[k].velocity
                 yield from greatest("back", -velocity * np.sign(way), back, begin)
 
 

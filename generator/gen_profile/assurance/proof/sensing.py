@@ -46,7 +46,7 @@ SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's 
 STRONG = 1.5  # own motions by what else swings, root mean square of a period, at which that is known
 KNOWN_TO = 0.4  # (0.35)
 LEAKY = 0.3  # damping ratio by which what is shown of them is forgotten
-ONCE, AS_OFTEN = 1, 3  # that an axis moves on at rest, where a load seems to swing by just too much
+AGAIN, AGAIN_WITH_FAULT = 1, 3  # motions at rest, where a load seems to swing by just too much
 TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
 
 
@@ -204,7 +204,7 @@ class SensedHistory:
             valid=valid,
             cycles=np.stack(rows, axis=1),
             pushed=pushed,
-            again=AS_OFTEN if self.fault else ONCE,
+            again=AGAIN_WITH_FAULT if self.fault else AGAIN,
         )
 
     def _told(self, sensor: SensorSpec, place: int, cycle: float, cycles: int) -> Array:

@@ -14,7 +14,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.support.errors import GenProfileError, Suggestion, rounded_down, rounded_up
 from gen_profile.support.units import RATES
 
-# the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
+# stops at the first change that passes, and aims at 0.8 of the limit, as other histories may sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 UNKNOWN = 1.25  # times the limit: at least so much a block counts that shows one of the next
 GIVEN_UP = f"nErrorId {NO_MOTION:.0f}"  # a command, as any motion might leave more sway than allowed

@@ -21,7 +21,7 @@ from gen_profile.support import errors
 from gen_profile.support.cluster import require_versions
 from gen_profile.support.one_thread import one_thread
 
-_ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
+_ALONE = threading.Lock()  # compiled FMUs hold global state, and a Dask worker may have several threads
 EVERY = 50  # case is co-simulated by FMPy, too, which must agree with the compiled loop
 PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
 STATUSES: dict[type[errors.GenProfileError], str] = {
