@@ -352,7 +352,9 @@ def test_a_variant_of_a_motion_with_hoist_is_judged_as_the_block_would_play_it(t
     assert done.code == 0
     (block,) = tmp_path.glob("*.st")
     assert re.search(
-        r"Axis 1, cart: [^.]*\.[^;]*; allows fScale from 0, bMirror, fStartOffset\.", block.read_text()
+        r"Axis 1, cart: [^.]*\.[^;]*; on the way 0 to 12000 mm; allows fScale from 0, bMirror, "
+        r"fStartOffset\.",
+        block.read_text(),
     )
     assert "allows no variants." in block.read_text()
     found = {}

@@ -315,7 +315,7 @@ def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
     arm.run(0.094, **sound, random=random, bVelocity=1.0, fVelocityCommand=-0.191)
     arm.run(0.04, **sound, random=random, sensor=lambda *_: None)
     moves = arm.run(1.0, **sound, random=random)
-    assert not moves["nSensorFault"].any()
+    assert {*moves["nSensorFault"]} <= {0.0, 8.0}  # it has not shown a motion yet
     issued = arm.run(2.0, **sound, random=random, fVelocityCommand=0.0)
     assert issued["bDamping"].any() and issued["bPromise"][-1] and not issued["bBusy"][-1]
     assert np.abs(issued["sway"][-500:]).max() < 0.005
@@ -332,7 +332,7 @@ def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes():
         tank.run(0.4, noise=0.0002, delay=0.005, random=random)
     issued = tank.run(6.0, noise=0.0002, delay=0.005, random=random)
     assert issued["bDamping"][-3000:].any() and issued["bDone"][-1] and issued["bPromise"][-1]
-    assert not issued["nSensorFault"].any()
+    assert {*issued["nSensorFault"]} <= {0.0, 8.0}
     assert np.abs(issued["sway"][-1000:]).max() < 0.004
     assert np.abs(issued["fSwayEstimated"] - issued["sway"])[-1000:].max() < 0.001
 

@@ -13,7 +13,7 @@ from gen_profile.methods.solvers.direct.relaxation import Relaxation
 from gen_profile.methods.solvers.direct.set_up import DirectOptions
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.spec.reading import overridden, spec_from_dict
-from gen_profile.support.errors import InfeasibleProblem
+from gen_profile.support.errors import NoMotion
 
 SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum, tower, chain, tank, gantry
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
@@ -46,7 +46,7 @@ def test_efforts_that_do_not_see_the_highest_derivative_have_programs_that_can_b
 @pytest.mark.parametrize(("index", "passing"), [(28, None), (36, [True, False])])
 def test_what_is_refused_is_told_values_that_work_and_whether_the_check_will_pass(index, passing):
     document = random_spec(f"now-{index}")
-    with pytest.raises(InfeasibleProblem) as refusal:
+    with pytest.raises(NoMotion) as refusal:
         plan(spec_from_dict(document))
     if passing is not None:
         assert [one.passes for one in refusal.value.suggestions] == passing
