@@ -30,13 +30,13 @@ def test_builds_and_can_be_searched_offline(tmp_path):
         page.visit((tmp_path / "index.html").as_uri())
         page.wait("return document.querySelector('h1') !== null")
         assert page.violations() == []
+        page.complaints()  # of axe-core, which may not read style sheets, are left behind
         page.find(".sidebar-search").send_keys("freeboard\n")
         page.wait("return document.querySelectorAll('#search-results li').length > 0")
         found = page.run(
             "return [...document.querySelectorAll('#search-results li a')].map((link) => link.href)"
         )
         assert any("docs/machines.html" in address for address in found)
-        unread = [one for one in page.complaints() if ".css" not in one]  # which axe-core reads
-        assert unread == []  # no page reads another one
+        assert page.complaints() == []  # of a page that may not read another one
         page.visit((tmp_path / "docs" / "plc.html").as_uri())
         assert page.violations() == []
