@@ -64,6 +64,7 @@ def run_here(*arguments: str | Path) -> Outcome:
     code: Any = 0
     with (
         patch.object(sys, "argv", ["gen-profile", *map(str, arguments)]),
+        patch.object(sys, "unraisablehook", sys.unraisablehook),
         redirect_stdout(out),
         redirect_stderr(err),
     ):

@@ -219,3 +219,28 @@ def test_an_output_that_takes_nothing_is_told_in_a_sentence(arguments, monkeypat
         )
     assert done.returncode == 2
     assert done.stderr == "Error: Cannot print the outcome: No space left on device.\n"
+
+
+INTERRUPTED_IN_A_FINALIZER = """
+import signal, sys, time
+from gen_profile.cli import entry, main
+
+class Dropped:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+def working(**_):
+    del Dropped.last
+    time.sleep(600)
+
+Dropped.last = Dropped()
+entry.cli.main = working
+main()
+"""
+
+
+def test_an_interrupt_that_python_drops_comes_again():
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED_IN_A_FINALIZER], capture_output=True, encoding="utf-8", check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "Error: Interrupted.\n")

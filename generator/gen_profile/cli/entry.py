@@ -5,6 +5,7 @@ import gc
 import os
 import signal
 import sys
+import threading
 from io import TextIOWrapper
 from typing import Any
 
@@ -102,4 +103,14 @@ def _interruptible() -> list[int]:
     signal.signal(signal.SIGTERM, interrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # and not ignored, as in the background
         signal.signal(signal.SIGINT, interrupt)
+    unraisable = sys.unraisablehook
+
+    def come_again(ignored: "sys.UnraisableHookArgs") -> None:
+        if signals and ignored.exc_type is KeyboardInterrupt:  # in a finalizer, which Python lets go on
+            threading.Timer(0.1, os.kill, (os.getpid(), signals[-1])).start()
+        else:
+            unraisable(ignored)
+
+    if sys.platform != "win32":
+        sys.unraisablehook = come_again
     return signals
