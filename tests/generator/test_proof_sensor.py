@@ -1,5 +1,6 @@
 """The proof of a block with a sensor, and what gives it the sensor's values."""
 
+import re
 from itertools import pairwise
 
 import attrs
@@ -144,19 +145,28 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     dead = attrs.evolve(sound, fault="dead", fails=1.0)
     swings = 0.3 * np.sin(2.0 * np.pi / 3.0 * np.arange(5000) * CYCLE)
 
-    def faults(one, resets=(), **given):
+    def faults(one, resets=(), nSensorFault=0.0, **given):
         known = {"cycle": CYCLE, "period": 3.0, "last": 1.0, "estimation_error": 0.15, "resets": resets}
-        return [*sensor_faults(spec, one, *followed(0.0, **given), **known)]
+        return [*sensor_faults(spec, one, *followed(0.0, fault=nSensorFault, **given), **known)]
 
     assert not faults(sound, fSensorScale=1.3, fAcceleration=swings)
     assert "fSensorScale is wrong by 0.5" in faults(sound, fSensorScale=1.5, fAcceleration=swings)[0]
     assert not faults(sound, fSensorScale=1.5, fAcceleration=0.1 * swings)  # too little to tell
     assert not faults(sound, range(1, 20, 5), fSensorScale=1.5, fAcceleration=swings)  # forgotten by resets
-    assert not faults(dead, fSensorScale=0.3, fAcceleration=swings)
-    assert "fSensorScale is wrong by 0.99" in faults(dead, fAcceleration=swings)[0]
+    assert not faults(dead, nSensorFault=7.0, fSensorScale=0.3, fAcceleration=swings)
+    assert "fSensorScale is wrong by 0.99" in faults(dead, nSensorFault=7.0, fAcceleration=swings)[0]
+    wrong = attrs.evolve(sound, fault="exchanged", fails=0.0)
+    (vouching,) = [one for one in faults(wrong, fAcceleration=swings) if "vouches" in one]
+    assert float(re.search(r"too long by ([\d.]+) s", vouching)[1]) == pytest.approx(
+        20.0 - (1 + 1 + 2) * 3.0,
+        abs=0.5,  # first used, until the swing has built up, allowed
+    )
+    for shown in ({"nSensorFault": 8.0}, {"bSensorUsed": 0.0}):
+        assert not any("vouches" in one for one in faults(wrong, fAcceleration=swings, **shown))
+    assert not any("vouches" in one for one in faults(wrong, fAcceleration=0.1 * swings))
     stronger = np.where(np.arange(5000) * CYCLE < dead.fails, 30.0, 1.0) * swings  # which is still remembered
-    assert not faults(dead, fSensorScale=0.6, fAcceleration=stronger)
-    assert faults(dead, fSensorScale=0.6, fAcceleration=swings)
+    assert not faults(dead, nSensorFault=7.0, fSensorScale=0.6, fAcceleration=stronger)
+    assert faults(dead, nSensorFault=7.0, fSensorScale=0.6, fAcceleration=swings)
     swung = followed(np.where(np.arange(5000) * CYCLE < dead.fails, 0.5, 0.0), fAcceleration=swings)
     assert not [*sensor_faults(spec, dead, *swung, cycle=CYCLE, period=3.0, last=1.0, estimation_error=0.15)]
     assert not faults(sound, fSwayEstimated=0.2, fSwayUncertainty=0.06)

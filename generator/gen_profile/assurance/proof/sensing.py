@@ -12,7 +12,7 @@ from gen_profile.planner.interface import SENSOR, UNPROVEN, BlockAxis
 from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
 from gen_profile.planner.sensor import damping_room, largest_innovation
 from gen_profile.spec.model import Spec
-from gen_profile.spec.planner import DisturbanceSpec, GustSpec, SensorSpec
+from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile_fmu.running.block_run import BlockRun, Measurement
 
 CHOICES = 14
@@ -43,6 +43,7 @@ JUMP = 2.2  # by the greatest difference from what is expected that counts as a 
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
+TO_NOTICE = 2.0  # longest periods of own motion stronger than what else swings, within which a fault shows
 STRONG = 1.5  # own motions by what else swings, root mean square of a period, at which that is known
 KNOWN_TO = 0.4  # (0.35)
 LEAKY = 0.3  # damping ratio by which what is shown of them is forgotten
@@ -291,18 +292,16 @@ def sensor_faults(
         sway = run.trace[:, len(outputs) + direction.end_load]
         if not one.fault:
             yield from _misestimated(axis, issued, sway, estimation_error, cycle)
-        if fault in SHOWS and disturbance.gust is not None:
-            yield from _misread(
-                axis,
-                issued,
-                sway,
-                fault=fault,
-                since=one.fails if fault else 0.0,
-                gust=disturbance.gust,
-                cycle=cycle,
-                period=period,
-                resets=resets,
+        if fault in (*SHOWS, EXCHANGED):
+            moved = OwnMotion.of(
+                axis, issued, sway, disturbance, since=one.fails if fault else 0.0, cycle=cycle, period=period
             )
+            if fault in SHOWS and disturbance.gust is not None:
+                yield from _misread(axis, issued, moved, fault=fault, resets=resets)
+            if fault:
+                yield from _unnoticed(
+                    axis, issued, moved, fault=fault, swing=min(spec.check.residual_sway.values())
+                )
         shown_faults = issued[axis.of("nSensorFault")]
         noticed = np.where(shown_faults == UNPROVEN, 0.0, shown_faults)
         at = int(np.argmax(noticed != 0.0)) * cycle
@@ -348,41 +347,98 @@ def _misestimated(
         yield f"{uncertainty} is too small by {off[at]:.3g} m, at {at * cycle:.2f} s"
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class OwnMotion:
+    """How much of a swing the axis's own motions make, since a sensor failed.
+
+    Attributes
+    ----------
+    own : (cycles, 2) Array
+        Mean square in m²/s⁴ of what swings by the motions since then, and by all of them.
+    others : float
+        m/s², what the strongest gust, and what swung as it failed, show beside it.
+    used_for : (cycles,) Array
+        s, for how long the sensor has been used.
+    since, cycle, period : float
+        s.
+    """
+
+    own: Array
+    others: float
+    used_for: Array
+    since: float
+    cycle: float
+    period: float
+
+    @classmethod
+    def of(
+        cls,
+        axis: BlockAxis,
+        issued: Mapping[str, Array],
+        sway: Array,
+        disturbance: DisturbanceSpec,
+        *,
+        since: float,
+        cycle: float,
+        period: float,
+    ) -> Self:
+        """Measure them by what a block issued, and a load's sway."""
+        from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
+
+        cycles, used = np.arange(len(sway)), issued[axis.of("bSensorUsed")] != 0.0
+        rate, used_for = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
+        swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
+        # before, what swung at first and the offset are not known yet
+        counts = (cycles * cycle > since) & (used_for * cycle > period)
+        moved = issued[axis.of("fAcceleration")][:, None] * np.transpose([counts, np.ones_like(counts)])
+        swung = rate**2 * lfilter(swings.ravel(), fades, moved, axis=0)
+        share = cycle / period
+        before = sway[max(0, round((since - period) / cycle)) : round(since / cycle)]  # shown otherwise later
+        gust = disturbance.gust.acceleration if disturbance.gust is not None else 0.0
+        return cls(
+            own=lfilter([share], [1.0, share - 1.0], swung**2, axis=0),
+            others=gust + rate**2 * np.abs(before).max(initial=0.0),
+            used_for=np.asarray(used_for * cycle, dtype=float),
+            since=since,
+            cycle=cycle,
+            period=period,
+        )
+
+
 def _misread(
-    axis: BlockAxis,
-    issued: Mapping[str, Array],
-    sway: Array,
-    *,
-    fault: str,
-    since: float,
-    gust: GustSpec,
-    cycle: float,
-    period: float,
-    resets: Sequence[float],
+    axis: BlockAxis, issued: Mapping[str, Array], moved: OwnMotion, *, fault: str, resets: Sequence[float]
 ) -> Iterator[str]:
     """Say whether what a sensor is found to show of the axis's own motions is wrong since it has a fault."""
-    used = issued[axis.of("bSensorUsed")] != 0.0
-    from scipy.signal import cont2discrete, lfilter  # noqa: PLC0415  (half of what the command line takes to start)
-
-    cycles = np.arange(len(used))
-    rate, used_for = 2.0 * np.pi / period, cycles - np.maximum.accumulate(np.where(used, -1, cycles))
-    swings, fades, _ = cont2discrete(([1.0], [1.0, 2.0 * LEAKY * rate, rate**2]), cycle)
-    # before, what swung at first and the offset are not known yet
-    counts = (cycles * cycle > since) & (used_for * cycle > period)
-    moved = issued[axis.of("fAcceleration")][:, None] * np.transpose([counts, np.ones_like(counts)])
-    share = cycle / period
-    own = lfilter([share], [1.0, share - 1.0], lfilter(swings.ravel(), fades, moved, axis=0) ** 2, axis=0)
-    before = sway[max(0, round((since - period) / cycle)) : round(since / cycle)]  # shown otherwise later
-    others = gust.acceleration + rate**2 * np.abs(before).max(initial=0.0)
-    strength = rate**2 * np.sqrt(own[:, 0]) / others
-    strength *= (used_for * cycle > 2.0 * period) & (cycles * cycle > since + 2.0 * period)
-    strength *= cycles < min((round(time / cycle) for time in resets), default=len(used))  # when it forgets
+    cycle, period, cycles = moved.cycle, moved.period, np.arange(len(moved.own))
+    strength = np.sqrt(moved.own[:, 0]) / moved.others
+    strength *= (moved.used_for > 2.0 * period) & (cycles * cycle > moved.since + 2.0 * period)
+    strength *= cycles < min((round(time / cycle) for time in resets), default=len(cycles))  # when it forgets
     at = int(np.argmax(strength))
     scale = axis.of("fSensorScale")
-    remembered = max(0.0, 1.0 - own[at, 0] / max(own[at, 1], 1e-300))  # of what it showed before it failed
+    # of what it showed before it failed
+    remembered = max(0.0, 1.0 - moved.own[at, 0] / max(moved.own[at, 1], 1e-300))
     wrong = abs(issued[scale][at] - SHOWS[fault] - remembered * (1.0 - SHOWS[fault]))
     if strength[at] > STRONG and wrong > KNOWN_TO:
         yield f"{scale} is wrong by {wrong:.3g}, at {at * cycle:.2f} s"
+
+
+def _unnoticed(
+    axis: BlockAxis, issued: Mapping[str, Array], moved: OwnMotion, *, fault: str, swing: float
+) -> Iterator[str]:
+    """Say whether a faulty sensor vouches for more of the axis's own motion than is stated.
+
+    Swings below `swing` in m do no harm.
+    """
+    vouches = (issued[axis.of("bSensorUsed")] != 0.0) & (issued[axis.of("nSensorFault")] == 0.0)
+    others = max(moved.others, (2.0 * np.pi / moved.period) ** 2 * swing)
+    strong = vouches & (moved.own[:, 0] > others**2)
+    seconds = moved.cycle * np.cumsum(strong)
+    allowed = TO_NOTICE * moved.period
+    if seconds[-1] > allowed:
+        yield (
+            f"a faulty sensor ({fault}) vouches for strong motions of its axis for too long by "
+            f"{seconds[-1] - allowed:.3g} s, at {np.argmax(seconds > allowed) * moved.cycle:.2f} s"
+        )
 
 
 def _faults_of_a_faulty_one(
