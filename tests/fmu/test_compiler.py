@@ -24,7 +24,11 @@ from gen_profile_fmu.running.cosimulation import PlantCosimulation
 from gen_profile_fmu.running.instances import loop_sources
 
 CRANE = find_plant("double-pendulum-crane")
-STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+STRICT = (
+    *("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"),
+    *("-Wanon-enum-enum-conversion", "-Wmissing-prototypes", "-Wdouble-promotion", "-Wunreachable-code"),
+)
+TARGETS = "x86_64-linux-gnu", "x86_64-windows-gnu"
 SMALL_STACK = "-Wframe-larger-than=4000"  # bytes; a page, beyond which Windows wants a runtime's probes
 
 
@@ -70,7 +74,9 @@ def zig_cc(tmp_path, cache):
 def test_no_source_has_a_warning(written, zig_cc, plant, kind, version):
     """By Clang's front end; GNU's is asked where importers' compilers are."""
     written(plant, kind, version)
-    zig_cc(*STRICT, SMALL_STACK, "-isystem", str(HEADERS), "-c", SOURCE_FILE, "-o", "object.o")
+    for target in TARGETS:
+        words = ("-target", target, SMALL_STACK, "-isystem", str(HEADERS))
+        zig_cc(*STRICT, *words, "-c", SOURCE_FILE, "-o", "object.o")
 
 
 def test_no_compiled_loop_has_a_warning(tmp_path, zig_cc):

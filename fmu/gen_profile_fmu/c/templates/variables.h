@@ -4,10 +4,9 @@
 
 #include <float.h>
 
-enum { $counts };
-
-/* First value reference of every block. */
+/* Counts, and the first value reference of every block. */
 enum {
+    $counts,
 $offsets
 };
 
