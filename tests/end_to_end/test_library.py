@@ -64,6 +64,23 @@ def test_one_file_gives_the_same_library(swept, library, tmp_path):
     assert (tmp_path / "bay 3.st").read_bytes() == library[0].read_bytes()
 
 
+def test_a_library_and_a_motion_of_its_names_are_kept_apart(swept, tmp_path):
+    one = ("--preset", "paper-beta0", "--set", CYCLE, "--export", "plc", "--no-check", "--out")
+    assert run_here(*one, tmp_path / "first", "--set", "name=bay 3").code == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()}
+    done = run_here("library", swept, "--out", tmp_path / "first/bay_3.st")
+    assert done.code == 2 and "The folder holds 'bay 3', and the library would share fb_bay_3" in done.err
+    assert {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()} == before
+    (tmp_path / "second").mkdir()
+    for _ in range(2):  # its own files are no other's
+        assert run_here("library", swept, "--out", tmp_path / "second/bay 3.st").code == 0
+    done = run_here(*one, tmp_path / "second", "--set", "name=bay 3")
+    assert (
+        done.code == 2 and "The folder holds the library of bay 3.json, and 'bay 3' would share" in done.err
+    )
+    assert run_here(*one, tmp_path / "second", "--set", "name=bay 4").code == 0
+
+
 def test_holds_the_profiles_that_passed_in_their_order(swept, library):
     path, document = library
     rows = [row for row in read_table(swept, grid_of(swept)).to_pylist() if row["status"] == "passed"]

@@ -16,6 +16,7 @@ from gen_profile.assurance.verification.judging import verdict
 from gen_profile.assurance.verification.monte_carlo import CHECKING
 from gen_profile.assurance.verification.verdict import Check
 from gen_profile.assurance.verification.worst_machines import worst_machines
+from gen_profile.delivery.designs.names import names_of, require_own_names
 from gen_profile.dynamics.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.dynamics.evaluation.simulation import Response, Sway
 from gen_profile.dynamics.problem.held_axes import held_axes
@@ -24,31 +25,24 @@ from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
-from gen_profile.spec.values import ascii_name
 from gen_profile.support.artefacts.manifest import (
     FILENAME,
     Artefact,
     Manifest,
     artefact_of,
-    parse_manifest,
     versions,
 )
 from gen_profile.support.artefacts.writing import Kept, Staging, staged
-from gen_profile.support.errors import OutputError, SpecError
+from gen_profile.support.errors import SpecError
 from gen_profile.support.progress import Progress, no_progress, require_progress
 from gen_profile.support.summary import Drawable
 from gen_profile_exporters.exporter import Exporter, target_of
-from gen_profile_exporters.playback.structured_text import block_name
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
 if TYPE_CHECKING:
     from gen_profile.assurance.proof.verdict import (
         Proof,  # SciPy's statistics take longer to load than the main job
     )
-
-WITHOUT_BLOCKS = {"csv", "can"}  # formats that name nothing in a controller after the motion
-# what names of blocks end in beside the motion's own: wrappers, and planner blocks with theirs
-BLOCKS = ("", "_Axis", "_Velocity", "_planner", "_planner_Axis", "_planner_Velocity")
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -248,7 +242,8 @@ def deliver_judged(
         artefacts=artefacts,
         check=None if judged is None else judged.to_dict(),
     )
-    staging.write(FILENAME, _after_earlier_ones(manifest, staging.earlier(FILENAME)).to_json())
+    previous = require_own_names(spec.name, names_of(manifest), staging.earlier)
+    staging.write(FILENAME, (manifest.after(previous) if previous else manifest).to_json())
     if judged is not None and not judged.passed and not keep_failed:
         return ()
     staging.deliver()
@@ -293,29 +288,3 @@ def _continuous(
     times, evaluation = responses[0].times, planned.evaluation
     compared = times[times >= judged_from(planned.spec, setpoints)]
     return evaluation.followed(compared, machines[len(evaluation.machines) :])
-
-
-def _after_earlier_ones(manifest: Manifest, earlier: bytes | None) -> Manifest:
-    """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
-    if earlier is None:
-        return manifest
-    try:
-        previous = parse_manifest(earlier, FILENAME)
-    except OutputError:
-        return manifest
-    for one in (previous, *previous.earlier):
-        if one.name != manifest.name and (shared := _taken(manifest) & _taken(one)):
-            raise OutputError(
-                f"The folder holds {one.name!r}, and {manifest.name!r} would share {min(shared)} with it; "
-                "give it another name, or another folder. Nothing was written."
-            )
-    return manifest.after(previous)
-
-
-def _taken(manifest: Manifest) -> set[str]:
-    """List the names of an export's files and blocks; neither Windows nor IEC 61131-3 tells case apart."""
-    blocks: tuple[str, ...] = ()
-    if any(known.format not in WITHOUT_BLOCKS for known in manifest.artefacts):
-        blocks = BLOCKS
-    files, block = [known.path for known in manifest.artefacts], block_name(ascii_name(manifest.name))
-    return {name.casefold() for name in (*files, *(block + end for end in blocks))}

@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 
+from gen_profile.delivery.designs.names import names_of_library, require_own_names
 from gen_profile.dynamics.evaluation.phrases import named
 from gen_profile.spec.reading import as_path
 from gen_profile.studies.sweep.case import PASSED
@@ -74,7 +75,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
     SpecError
         The sweep exported no playback blocks, no case passed, or no format with the block has that suffix.
     OutputError
-        The sweep's files were altered, or the library cannot be written.
+        The sweep's files were altered, or the library cannot be written, as where a motion has its names.
     ExportError
         The profiles do not fit into one block.
 
@@ -92,7 +93,9 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
     library = library_source(entries, target)
     first, *others = container.wrap(library, target)
     index = path.with_name(f"{stem}.json")
+    names = names_of_library(library.name, path.name, index.name, *(file.filename for file in others))
     with staged(path.parent) as staging:
+        require_own_names(None, names, staging.earlier)
         written = staging.write(path.name, first.content)
         _require_same(container.unwrap(written, target), target, profiles)
         for file in others:
