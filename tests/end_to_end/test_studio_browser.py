@@ -292,6 +292,13 @@ def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
     page.find("#tells button").click()
     page.wait("return /plant.L1=0.5[12]/.test(document.querySelector('#command').textContent)")
     assert page.run("return document.querySelectorAll('#logged canvas').length") == 3
+    page.find("#language").click()
+    page.find("#reading .after input").send_keys(Keys.CONTROL, "a", Keys.NULL, "0,5", Keys.TAB)
+    built_anew = """
+        for (const use of ['move', 'swing']) document.querySelector(`input[name=use][value=${use}]`).click();
+        return document.querySelector('#reading .after input').value"""
+    assert page.run(built_anew) == "0,5"
+    page.find("#language").click()
     (tmp_path / "bay.toml").write_text(preset_text("paper").replace('"paper"', '"bay 9"', 1), "utf-8")
     page.find("#undo").click()
     page.find("#file").send_keys(str(tmp_path / "bay.toml"))

@@ -67,7 +67,7 @@ const logs = (() => {
     const [held, step, unit] = split(meaning);
     const meanings = element("select", { "aria-label": label }, element("option", { value: "" }, "–"), ...reading.meanings.map((base) => element("option", { value: base }, named(base))));
     const units = element("select", { "aria-label": `${label}, ${page.phrase("axis.unit")}` });
-    const count = element("input", { type: "number", step: "any", min: "0", value: step, placeholder: "1", title: page.phrase("field.count"), "aria-label": `${label}, ${page.phrase("field.count")}` });
+    const count = element("input", { ...numbers.kind(), min: "0", value: numbers.local(step), placeholder: "1", title: page.phrase("field.count"), "aria-label": `${label}, ${page.phrase("field.count")}` });
     const offer = (chosen) => {
       const known = UNITS[quantity(meanings.value)] ?? [];
       units.hidden = !known.length;
@@ -83,7 +83,7 @@ const logs = (() => {
       host: element("div", { class: "column" }, element("span", {}, label), meanings, element("div", { class: "value" }, count, units)),
       free: () => { meanings.value = ""; offer(""); },
       get base() { return meanings.value; },
-      get written() { return meanings.value && `${[meanings.value, `${count.hidden ? "" : count.value}${units.value}`].filter(Boolean).join("_")}=${place + 1}`; },
+      get written() { return meanings.value && `${[meanings.value, `${count.hidden || !(numbers.typed(count.value) > 0) ? "" : numbers.typed(count.value)}${units.value}`].filter(Boolean).join("_")}=${place + 1}`; },
     };
     return row;
   }
@@ -113,8 +113,8 @@ const logs = (() => {
   }
 
   function after() {
-    const field = element("input", { type: "number", step: "any", min: "0", value: String(reading.after) });
-    field.addEventListener("change", () => { reading.after = Number(field.value) || 0; ask(); });
+    const field = element("input", { ...numbers.kind(), min: "0", value: numbers.local(reading.after) });
+    field.addEventListener("change", () => { reading.after = Math.max(0, numbers.typed(field.value) || 0); ask(); });
     return element("label", { class: "after" }, page.phrase("field.after"), " ", field, " s");
   }
 
@@ -122,8 +122,8 @@ const logs = (() => {
   function stood() {
     const fields = reading.at.map((place, axis) => {
       const { name, unit } = reading.axes[axis];
-      const field = element("input", { type: "number", step: "any", value: String(numbers.digits(place)) });
-      field.addEventListener("change", () => { reading.at[axis] = Number(field.value) || 0; ask(); });
+      const field = element("input", { ...numbers.kind(), value: numbers.local(numbers.digits(place)) });
+      field.addEventListener("change", () => { reading.at[axis] = numbers.typed(field.value) || 0; ask(); });
       return element("label", {}, page.phrase(name), field, unit);
     });
     return element("fieldset", {}, element("legend", {}, page.phrase("field.at")), ...fields);
