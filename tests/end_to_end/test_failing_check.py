@@ -32,9 +32,9 @@ check = { residual_sway = 0.3 }
 export = { cycle_time = 0.01 }
 
 [limits]
-velocity = 1.0
-acceleration = 0.15
-jerk = 0.5
+velocity = 3.0
+acceleration = 1.0
+jerk = 3.0
 axis.slew.travel = [-3.2, 3.2]
 axis.trolley.travel = [3.0, 50.0]
 """

@@ -15,6 +15,7 @@ ROPE, AGE = 4.0, 0.1
 SENSOR = f'planner.sensor={{quantity="angle", of="theta1", noise=0.002, delay=[{AGE}, {AGE}]}}'
 SWING = "planner.disturbance={swing={payload=0.5}, settle=12.0}"
 CYCLE = 0.02
+UNPROVEN = 8  # cSensorUnproven, which holds no damping off
 CHANGES = ["planner.live={}", f"plant.L1={ROPE}", SENSOR, SWING, "export.cycle_time=0.02"]
 
 
@@ -33,14 +34,14 @@ def text(spec):
 @pytest.mark.slow
 def test_damping_excites_beyond_the_margins_and_not_within(spec, text):
     margins = sensor_margins(spec, text)
-    compiled = compile_counting(re.sub("(cSensor(?:Scale|Frozen) : LREAL :=) [^;]*", r"\1 1.0E+9", text))
+    compiled = compile_counting(re.sub("((?:cSensor(?:Scale|Frozen)|cDampMost) : LREAL :=) [^;]*", r"\1 1.0E+9", text))
 
     def left(late, gain):
         """By how much the load sways after a minute, from 0.2 m."""
         crane = MeasuredCrane(CountedBlock(compiled), ROPE, swing=(0.2, 1.0), cycle=CYCLE)
         crane.inputs |= {"bEnable": 1.0, "fActPosition": 20.0}
         issued = crane.run(60.0, delay=AGE + late, sensor=lambda _, value: gain * value)
-        assert not issued["nSensorFault"].any()  # which never takes a sensor for faulty
+        assert set(issued["nSensorFault"]) <= {0, UNPROVEN}  # which never takes a sensor for faulty
         return np.abs(issued["sway"][-400:]).max()
 
     assert 0.3 < margins.delay < 2.0 and 1.5 < margins.gain < 6.0
