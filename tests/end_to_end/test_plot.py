@@ -295,3 +295,14 @@ def test_where_no_method_has_a_motion_there_is_nothing_to_draw(tmp_path):
     with pytest.raises(OutputError, match="no method has a motion for this move"):
         gp.plot(nothing, tmp_path / "picture.png")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_a_line_of_any_length_keeps_its_points(count):
+    """As a proof's picture of promptness has where few commands were compared."""
+    points = np.array([0.0, 0.1, 0.2])[:count]
+    line = Line(name="line", x=points, y=points)
+    figure = Figure(caption="caption", panels=[Panel(title="panel", x_label="x", y_label="y", lines=[line])])
+    (trace,) = figure_json(figure)["panels"][0]["data"]
+    shown = trace["x"] if "x" in trace else [trace["x0"] + trace["dx"] * number for number in range(count)]
+    assert shown == pytest.approx(points.tolist()) and trace["y"] == shown

@@ -130,8 +130,7 @@ def _trace(line: parts.Line) -> dict[str, Any]:
 
 def _abscissa(x: Array) -> dict[str, Any]:
     """Write even steps as such: most curves have them, and the page is half as large."""
-    steps = np.diff(x)
-    if np.ptp(steps) <= EVEN * np.abs(x).max():
+    if len(x) > 2 and np.ptp(np.diff(x)) <= EVEN * np.abs(x).max():
         return {"x0": float(x[0]), "dx": float(x[-1] - x[0]) / (len(x) - 1)}
     return {"x": rounded(x)}
 
