@@ -63,7 +63,7 @@ class Axis:
     def state(self):
         named = ("fPosition", "fVelocity", "fAcceleration")
         x, v, a = (np.concatenate([part[name] for part in self.issued]) for name in named)
-        (moved,) = self.modes.moved(a[None], len(a) - 1, self.cycle)
+        ((moved,),) = self.modes.modes.moved(a[None], [len(a) - 1], self.cycle)
         return AxisState(place=x[-1], velocity=v[-1], acceleration=a[-1], moved=moved[self.rows])
 
     def soonest(self, state, goal):

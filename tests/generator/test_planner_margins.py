@@ -34,7 +34,9 @@ def text(spec):
 @pytest.mark.slow
 def test_damping_excites_beyond_the_margins_and_not_within(spec, text):
     margins = sensor_margins(spec, text)
-    compiled = compile_counting(re.sub("((?:cSensor(?:Scale|Frozen)|cDampMost) : LREAL :=) [^;]*", r"\1 1.0E+9", text))
+    compiled = compile_counting(
+        re.sub("((?:cSensor(?:Scale|Frozen)|cDampMost) : LREAL :=) [^;]*", r"\1 1.0E+9", text)
+    )
 
     def left(late, gain):
         """By how much the load sways after a minute, from 0.2 m."""

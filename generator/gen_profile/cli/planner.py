@@ -221,8 +221,8 @@ def planned(
     from gen_profile.delivery.streaming.planned_motion import CommandList, Operator, PlannedMotion
     from gen_profile.delivery.streaming.stream import verified_block
     from gen_profile.planner.commands import read_commands
+    from gen_profile.planner.directions import planned_axes
     from gen_profile.planner.interface import live_inputs
-    from gen_profile.planner.machine import planned_axes
 
     operator: Operator
     if commands_path is None and not sys.stderr.isatty():

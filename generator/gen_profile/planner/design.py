@@ -9,6 +9,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.chebyshev import same_terms
+from gen_profile.planner.directions import planned_axes
 from gen_profile.planner.machine import (
     LiveModes,
     corners,
@@ -17,16 +18,14 @@ from gen_profile.planner.machine import (
     least_decay,
     live_modes,
     lowered,
-    planned_axes,
     second_order_sway,
 )
 from gen_profile.planner.sensor import between, sensor_constants
-from gen_profile.planner.stated import STEADY, quick_limits, target_range
+from gen_profile.planner.stated import STEADY, quick_limits, target_range, unstated_limits
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import SpecError
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import Phrase, placed
-from gen_profile.support.units import RATES
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, block_text
 
@@ -93,7 +92,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
     """Find what a planner block has to know of a spec's machine; raises as `planner_block`."""
     modes_of_live = live_modes(spec)
     planned = planned_axes(spec)
-    if faults := [fault for number, axis in planned.items() for fault in _faults(spec, number, axis.suffix)]:
+    if faults := unstated_limits(spec):
         raise SpecError(*faults)
     axes = tuple(_axis(spec, number, axis.suffix) for number, axis in planned.items())
     period = _shortest_period(modes_of_live)
@@ -150,27 +149,6 @@ def _shortest_period(modes_of_live: LiveModes) -> float:
     """Give that of the slowest mode in s, over the live ranges."""
     rates = (_rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live))
     return 2.0 * float(np.pi) / float(max(rates))
-
-
-def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
-    """Say which limits of an axis are not stated, or above those of its quick stop."""
-    own, quick, quick_jerk = spec.limits.of(number), spec.planner.quick_stop, spec.planner.quick_stop_jerk
-    of = Phrase(" of {axis}", axis=spec.machine().actuated[number].name) if suffix else ""
-    template = "required{of} for a planner block, which keeps it in every motion"
-    faults: list[str] = [
-        placed(f"limits.{name}", Phrase(template, of=of))
-        for name in (*RATES, "travel")
-        if getattr(own, name) is None
-    ]
-    if quick and own.acceleration and quick < own.acceleration:
-        template = "must be at least limits.acceleration{of}, {least:g}, found {found:g}"
-        problem = Phrase(template, of=of, least=own.acceleration, found=quick)
-        faults.append(placed("planner.quick_stop", problem))
-    if quick_jerk and own.jerk and quick_jerk < own.jerk:
-        template = "must be at least limits.jerk{of}, {least:g}, found {found:g}"
-        problem = Phrase(template, of=of, least=own.jerk, found=quick_jerk)
-        faults.append(placed("planner.quick_stop_jerk", problem))
-    return faults
 
 
 def _sway_share(spec: Spec) -> float:

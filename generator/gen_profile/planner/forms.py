@@ -7,7 +7,7 @@ from pathlib import Path
 import attrs
 
 from gen_profile.planner.design import PlannerBlock
-from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.directions import planned_axes
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
 from gen_profile.support.artefacts.reading import decoded, read_artefact, refusal

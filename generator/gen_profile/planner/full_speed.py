@@ -7,7 +7,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.design import PlannerBlock
-from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.directions import planned_axes
 from gen_profile.planner.planner import Planner
 from gen_profile.spec.model import AxisLimitsSpec, Spec
 from gen_profile_exporters.planner.block import FUTURE, RESERVE, SLOTS_PER_PERIOD

@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
-from gen_profile.planner.machine import (
+from gen_profile.planner.directions import (
     SensedDirection,
     linearized,
     planned_axes,

@@ -14,17 +14,16 @@ from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, 
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.chebyshev import Interpolant, interpolate
-from gen_profile.planner.machine import (
-    DEGREES,
-    MOST_TERMS,
+from gen_profile.planner.directions import (
     SensedDirection,
     driven_modes,
-    frequency_errors,
     linearized,
     planned_axes,
     sensed_directions,
     shown_of_modes,
 )
+from gen_profile.planner.machine import DEGREES, MOST_TERMS, frequency_errors
+from gen_profile.planner.stated import damping_room
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile.support.errors import SpecError
@@ -45,7 +44,6 @@ FAST = 0.1  # how much other modes are expected to be excited, by what the senso
 OFFSET_TIME = 0.35  # slow periods, in which an offset is learnt
 NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cycles are shorter
 LIGHT = 0.02  # damping that modes are taken to have at least, so that one that is not shown is no obstacle
-ROOM = 1.25  # of the stated swing: how far damping may lead
 # Of the allowed sway: where damping begins on arrival, later at rest, and after a period of that; and ends.
 BEGIN, AGAIN, ROUSED, END = 0.4, 0.7, 0.85, 0.27
 SURE = 4.0  # standard deviations of what is estimated, that lie between the first two
@@ -187,23 +185,6 @@ def _constants(
         room=damping_room(spec),
         estimation_error=estimation_error(spec),
     )
-
-
-def damping_room(spec: Spec) -> float:
-    """By how much, in m (or rad), damping may lead an axis away; 0 without a sensor."""
-    disturbance = spec.planner.disturbance
-    if spec.planner.sensor is None or disturbance is None or not disturbance.swing:
-        return 0.0
-    return ROOM * max(disturbance.swing.values())
-
-
-def largest_innovation(spec: Spec) -> float:
-    """Find what a value may differ by, at most, from what the block expects, in the sensor's unit."""
-    sensor, disturbance = spec.planner.sensor, spec.planner.disturbance
-    assert sensor is not None and disturbance is not None
-    points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
-    sensed = (_sensed(spec, point, one) for point in points for one in directions)
-    return _gate(sensor, max(_disturbed(sensor, disturbance, one) for one in sensed))
 
 
 def estimation_error(spec: Spec) -> float:

@@ -12,8 +12,10 @@ from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.assurance.proof.prove import prove, replay
 from gen_profile.assurance.proof.verdict import HISTORIES, Proof
 from gen_profile.assurance.verification.check import JudgedFile, alterations, provenance, spec_and_manifest
-from gen_profile.planner.design import planner_block
+from gen_profile.planner.directions import planned_axes, sensed_directions
 from gen_profile.planner.forms import block_in, refuse_program, refuse_wrapper
+from gen_profile.planner.interface import SENSOR, block_axes, live_inputs, sensed_axes
+from gen_profile.planner.stated import unstated_limits
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_path
 from gen_profile.support.artefacts.manifest import PLANNER, Manifest
@@ -113,7 +115,7 @@ def check_block(
     content = read_artefact(path)
     spec, manifest, digest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)
-    _require_inputs(path, text, planner_block(spec).text)
+    _require_inputs(path, text, spec)
     agreement, companions = provenance(manifest, content, digest), companions_of(manifest, path, content)
     known = _record(manifest) if agreement != "none" else {}
     count = histories or histories_of(manifest if known else None)
@@ -142,13 +144,21 @@ def check_block(
     )
 
 
-def _require_inputs(path: Path, text: str, due: str) -> None:
-    """Refuse a block of other axes or live parameters than a spec's."""
-    inputs, expected = (
-        [v.name for v in parse_function_block(block).variables if v.section == "VAR_INPUT"]
-        for block in (text, due)
-    )
-    if differing := [name for name in (*inputs, *expected) if (name in inputs) != (name in expected)]:
+def _require_inputs(path: Path, text: str, spec: Spec) -> None:
+    """Refuse a block of other axes, live parameters, sensors or zones than a spec's."""
+    if faults := unstated_limits(spec):
+        raise SpecError(*faults)
+    inputs = [v.name for v in parse_function_block(text).variables if v.section == "VAR_INPUT"]
+    zones = {name for name in inputs if name.startswith(("aBlocked", "aSlow"))}
+    axes, planned = block_axes(text), planned_axes(spec)
+    sensed = [planned[number] for number in sensed_directions(spec)] if spec.planner.sensor else []
+    known = {axis.of("fTarget") for axis in axes} | {axis.of(SENSOR[0]) for axis in sensed_axes(inputs, axes)}
+    known |= {*live_inputs([name for name in inputs if name not in zones], axes).values()}
+    due = {axis.of("fTarget") for axis in planned.values()} | {axis.of(SENSOR[0]) for axis in sensed}
+    due |= {f"f{name}" for name in spec.planner.live}
+    if bool(zones) != spec.planner.zones:
+        known ^= {*zones} or {"aBlockedLow"}
+    if differing := sorted(due ^ known):
         raise SpecError(
             f"{path} is no block of this spec: only one of them has an input {differing[0]}; name the spec "
             "that it was written of."

@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.assurance.proof.estimating import estimation_error
 from gen_profile.assurance.proof.followed import GivenMachine
 from gen_profile.assurance.proof.histories import SHIFT, SLOWEST, Histories, History
 from gen_profile.assurance.proof.judging import WatchedRun, judge_run
@@ -28,7 +29,6 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import UNPROVEN
-from gen_profile.planner.sensor import estimation_error
 from gen_profile.spec.model import Spec
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
@@ -79,7 +79,9 @@ class ClosedLoop:
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
         self._machine = histories.machine
-        self._estimation_error = estimation_error(spec) if spec.planner.sensor else 0.0
+        self._estimation_error = (
+            estimation_error(spec, text, histories.machines_of_errors) if spec.planner.sensor else 0.0
+        )
         fmu = plant_fmu(self._machine)
         for _ in range(workers):
             self._followers.put(self._open.enter_context(BlockFollower(fmu)))

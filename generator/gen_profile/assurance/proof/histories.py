@@ -23,8 +23,8 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.dynamics.problem.sampling import latin_hypercube
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
+from gen_profile.planner.directions import planned_axes
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.planner.machine import planned_axes
 from gen_profile.planner.stated import target_range
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec

@@ -11,7 +11,7 @@ from typing import Self
 import attrs
 import numpy as np
 
-from gen_profile.methods.quickest.modes import Complex, SwayModes
+from gen_profile.methods.quickest.modes import SwayModes
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 
@@ -120,7 +120,3 @@ class GivenModes:
         largest = np.abs(self.modes.gains).max(axis=1)  # of the loads
         apart = np.einsum("jam,eajm->eamj", largest, np.abs(moved)).max(axis=-1).sum(axis=(1, 2))
         return by_machine[:, 0], by_machine.max(axis=-1), apart
-
-    def moved(self, acceleration: Array, cycle_number: int, cycle: float) -> Complex:
-        """Give what axes, (axes, cycles), have made of the modes up to a cycle, (axes, machines, modes)."""
-        return np.asarray(self.modes.moved(acceleration, [cycle_number], cycle)[0])

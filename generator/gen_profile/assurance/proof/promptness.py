@@ -39,6 +39,7 @@ from gen_profile.assurance.proof.orders import (
     Flags,
     TimedOrder,
 )
+from gen_profile.methods.quickest.modes import Complex, SwayModes
 from gen_profile.methods.quickest.motion import AxisGoal, AxisState, Promise, motion, quickest
 
 FIRST, WAY = "first position", "position on the way"
@@ -64,9 +65,9 @@ class ComparedCommand:
     def is_possible(self, seconds: float) -> bool:
         """Tell whether every axis can be where it is to be in so much time."""
         return all(
-            motion(promise, state, goal, pieces) is not None
+            motion(sized, state, goal, max(int(seconds / sized.piece), 1)) is not None
             for promise, state, goal in self.axes
-            if (pieces := max(int(seconds / promise.piece), 1))
+            for sized in [promise.lasting(seconds)]
         )
 
     def quickest(self, most: float) -> float | None:
@@ -154,7 +155,8 @@ class Obeyed:
 
 def obeyed(run: Followed) -> list[Obeyed]:
     """Time every command that held long enough to be obeyed, or for longer than it may take."""
-    found = [one for order in run.orders for one in _timed(run, order)]
+    swings = _swings(run)
+    found = [one for order in run.orders for one in _timed(run, order, swings.get(order.begin))]
     latest = max(found, key=lambda one: one.overdue(LATENESS) if one.case else -np.inf, default=None)
     return [one.asked(LATENESS) if one is latest else one for one in found]
 
@@ -176,7 +178,7 @@ def lost(run: Followed) -> Iterator[Allowance]:
             yield from _left(run, (first, order.end), NEVER * in_time(run, again, 2))
 
 
-def _timed(run: Followed, order: TimedOrder) -> Iterator[Obeyed]:
+def _timed(run: Followed, order: TimedOrder, swings: Complex | None) -> Iterator[Obeyed]:
     since, first = _fulfilled(run, order)
     moves = since >= 0 and _moves(run, since)
     if since < 0 or (order.kind == STOP and not moves):
@@ -197,7 +199,7 @@ def _timed(run: Followed, order: TimedOrder) -> Iterator[Obeyed]:
         bounded=most,
         period=run.period,
         state=_words(run, since),
-        case=_case(run, order) if since == order.begin and not legs else None,
+        case=_case(run, order, swings) if since == order.begin and not legs and swings is not None else None,
     )
     if first is not None or one.is_late(LATENESS):
         yield one
@@ -282,27 +284,43 @@ def _left(run: Followed, cycles: tuple[int, int], arriving_again: float) -> Iter
             yield Allowance("left", first + begin, float(away[begin:end].max()), EXACT)
 
 
-def _case(run: Followed, order: TimedOrder) -> ComparedCommand | None:
-    """Put a command to the linear programme, where all that swings has come of what is known."""
-    if run.modes is None or order.begin >= run.unknown_from or not order.begin or run.zones:
+def _machines(run: Followed) -> SwayModes | None:
+    """Give the modes of the machines that a motion's promise is of: as given, and of stated errors."""
+    if run.modes is None:
         return None
-    moved, own = run.modes.moved(run.acceleration, order.begin - 1, run.cycle), []
-    rows = np.array([0, *([] if run.share else [run.modes.near]), *run.modes.ends])
+    rows, own = [0, *([] if run.share else [run.modes.near]), *run.modes.ends], run.modes.modes
+    return SwayModes(poles=own.poles[rows], gains=own.gains[rows])
+
+
+def _swings(run: Followed) -> dict[int, Complex]:
+    """Tell what axes have made of these modes before orders, where nothing else has made loads swing."""
+    machines = _machines(run)
+    begins = [order.begin for order in run.orders if 0 < order.begin < run.unknown_from]
+    if machines is None or run.zones or not begins:
+        return {}
+    moved = machines.moved(run.acceleration, [begin - 1 for begin in begins], run.cycle)
+    return dict(zip(begins, moved, strict=True))
+
+
+def _case(run: Followed, order: TimedOrder, swings: Complex) -> ComparedCommand | None:
+    """Put a command to the linear programme, by what swings as it comes."""
+    machines, own = _machines(run), []
+    assert machines is not None
     limits, targets = limits_of(run, order), goals(run, order)
-    for axis, state in enumerate(states(run, order.begin, moved)):
-        gains = np.abs(run.modes.modes.gains[:, :, axis]).max(axis=1)
-        most = 2.0 * limits[axis].acceleration * gains[0] / run.modes.modes.poles[0].imag
+    for axis, state in enumerate(states(run, order.begin, swings)):
+        gains = np.abs(machines.gains[:, :, axis]).max(axis=1)
+        most = 2.0 * limits[axis].acceleration * gains[0] / machines.poles[0].imag
         shown = np.flatnonzero(most > UNSHOWN * run.sway_limit)
         if not len(shown):
             continue
         (low, high), margin = run.limits[axis].targets, run.limits[axis].margin
         promise = Promise(
-            poles=run.modes.modes.poles[np.ix_(rows, shown)],
-            gains=gains[np.ix_(rows, shown)],
+            poles=machines.poles[:, shown],
+            gains=gains[:, shown],
             exact=1 if run.share else 2,
             left=run.share or run.sway_limit,
             limits=limits[axis],
             travel=(low - margin, high + margin),
         )
-        own.append((promise, attrs.evolve(state, moved=state.moved[np.ix_(rows, shown)]), targets[axis]))
+        own.append((promise, attrs.evolve(state, moved=state.moved[:, shown]), targets[axis]))
     return ComparedCommand(axes=own) if own else None

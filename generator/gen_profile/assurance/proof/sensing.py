@@ -6,11 +6,12 @@ from typing import Any, Self
 import attrs
 import numpy as np
 
+from gen_profile.assurance.proof.estimating import unknown
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.motion.profile import Array
+from gen_profile.planner.directions import driven_modes, planned_axes, sensed_directions
 from gen_profile.planner.interface import SENSOR, UNPROVEN, BlockAxis
-from gen_profile.planner.machine import driven_modes, planned_axes, sensed_directions
-from gen_profile.planner.sensor import damping_room, largest_innovation
+from gen_profile.planner.stated import damping_room
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile_fmu.running.block_run import BlockRun, Measurement
@@ -39,7 +40,7 @@ SHORTEST = 0.5  # s, of a gust
 LOST = 0.8  # of the time without news that counts as lost: how long news may fail to come
 AWAY = 2.0  # of the same time, for which one is silent that comes back
 NOISIER, GREATER, LATER = 10.0, 2.0, 3.0
-JUMP = 2.2  # by the greatest difference from what is expected that counts as a swing, at most
+JUMP = 2.2  # by what a sensor shows of stated swing and gusts, at most: a step below that is none of its own
 FAR_OUT = 1e3  # of the same
 HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 SHOWS = {"": 1.0, "sign": -1.0, "scale": GREATER, "dead": 0.0}  # of the axis's own motions
@@ -86,7 +87,7 @@ class SensedHistory:
     failing : int
         Which sensor has it.
     fails, innovation : float
-        s, when; and the greatest difference from what is expected that counts as a swing, in its unit.
+        s, when; and what the sensor shows of stated swing, gusts, offset and noise at most, in its unit.
     """
 
     starts: Mapping[str, float]
@@ -150,6 +151,8 @@ class SensedHistory:
                     )
         shares_and_phases = zip([swing, *more[0]], [phase, *more[1]], strict=True)
         swings = [(max(0.0, _stretched(a)), 2.0 * np.pi * b) for a, b in shares_and_phases]
+        failing = int(random.integers(len(directions)))
+        failing_one = list(directions.values())[failing]
         return cls(
             starts=stated_swing(spec, swings, parameters, places),
             gusts=tuple(gusts),
@@ -158,9 +161,9 @@ class SensedHistory:
             seed=int(seed * 2**32),
             lost=lost * until,
             fault=fault,
-            failing=int(random.integers(len(directions))),
+            failing=failing,
             fails=fails * until,
-            innovation=largest_innovation(spec) if fault else 0.0,
+            innovation=unknown(spec, [(parameters, places)], failing_one).shown if fault else 0.0,
         )
 
     @property

@@ -21,8 +21,8 @@ from gen_profile.assurance.verification.check import (
 )
 from gen_profile.delivery.deployment.block_state import BlockState, MotionState, PlannerState
 from gen_profile.motion.profile import Array
+from gen_profile.planner.directions import planned_axes
 from gen_profile.planner.forms import block_in
-from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import received_spec
 from gen_profile.support.artefacts.manifest import SEAL, artefact_of, seal_of, sha256

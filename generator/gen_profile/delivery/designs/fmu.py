@@ -12,7 +12,7 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
-from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.directions import planned_axes
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.support.artefacts.manifest import sha256

@@ -9,7 +9,7 @@ from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.orders import NO_MOTION
 from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
 from gen_profile.methods.solvers.search import Search, least
-from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.directions import planned_axes
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import GenProfileError, Suggestion, rounded_down, rounded_up
 from gen_profile.support.units import RATES

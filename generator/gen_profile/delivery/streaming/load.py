@@ -10,7 +10,7 @@ from gen_profile.dynamics.evaluation.residual_sway import RESIDUAL_SAMPLES, STAN
 from gen_profile.dynamics.evaluation.scenarios import scenarios
 from gen_profile.dynamics.evaluation.simulation import Response
 from gen_profile.motion.metrics import length, peak
-from gen_profile.planner.machine import shown_by_sensors
+from gen_profile.planner.directions import shown_by_sensors
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import CosimulationError
 from gen_profile.support.progress import Progress, no_progress

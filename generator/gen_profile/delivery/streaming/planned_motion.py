@@ -13,10 +13,10 @@ from gen_profile.delivery.streaming.keyboard import Keyboard
 from gen_profile.delivery.streaming.status import StatusLine
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.planner.commands import STILL, Command, inputs_of, start_cycles_of
+from gen_profile.planner.directions import planned_axes, sensed_directions
 from gen_profile.planner.events import error_words
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import ISSUED, LOST, SENSOR, BlockAxis, live_inputs
-from gen_profile.planner.machine import planned_axes, sensed_directions
 from gen_profile.planner.stated import quick_limits
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec

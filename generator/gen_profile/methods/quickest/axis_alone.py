@@ -10,7 +10,7 @@ import math
 
 import attrs
 
-BISECTIONS = 60  # of a velocity, to rounding
+BISECTIONS = 40  # of a velocity, to a millionth of a millionth
 
 
 @attrs.frozen(kw_only=True)

@@ -8,18 +8,20 @@ allows a little more. So nothing that is possible is missed but for the length o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linprog
-from scipy.sparse import csr_matrix, eye, hstack, kron, vstack
+from scipy.sparse import csc_matrix
 
 from gen_profile.methods.quickest.axis_alone import AxisLimits, to_place, to_velocity
 from gen_profile.methods.quickest.modes import Complex
 from gen_profile.motion.profile import Array
 
-PIECES = 24  # of the slowest period: the time is known to 4 % of it
+PIECES, FEWEST = 24, 8  # of the slowest period: the time is known to 4 % of it; and of the longest motions
+PERIODS = 6.0  # that a motion may take in pieces so short; in longer ones these are as many
 SHADOWS = np.exp(2j * np.pi / 8 * np.arange(8))  # which allow 8 % more
 ANYWHERE = (-np.inf, np.inf)
 
@@ -50,11 +52,22 @@ class Promise:
     left: float
     limits: AxisLimits
     travel: tuple[float, float] = ANYWHERE
+    pieces: float = PIECES
+
+    @property
+    def period(self) -> float:
+        """Of the slowest mode in s."""
+        return float(2.0 * np.pi / self.poles[0].imag.min())
 
     @property
     def piece(self) -> float:
         """Length of a piece in s."""
-        return float(2.0 * np.pi / self.poles[0].imag.min() / PIECES)
+        return self.period / self.pieces
+
+    def lasting(self, seconds: float) -> Promise:
+        """Let a motion of so many seconds be of no more pieces than can be solved for soon."""
+        pieces = PIECES * PERIODS * self.period / max(seconds, 1e-9)
+        return attrs.evolve(self, pieces=min(max(pieces, FEWEST), PIECES))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -91,7 +104,9 @@ def alone(limits: AxisLimits, state: AxisState, goal: AxisGoal) -> float:
 
 def quickest(promise: Promise, state: AxisState, goal: AxisGoal, most: float) -> float | None:
     """Find the least time in s in which a goal is reached, the promise kept; none within the most."""
-    low = int(alone(promise.limits, state, goal) / promise.piece)
+    least = alone(promise.limits, state, goal)
+    promise = promise.lasting(least)
+    low = int(least / promise.piece)
     high, last = low + 2, int(np.ceil(most / promise.piece))
     while motion(promise, state, goal, high) is None:
         if high >= last:
@@ -116,45 +131,67 @@ def motion(
     modes, machines = promise.poles.shape[1], len(promise.poles) - promise.exact
     moduli, still = modes * machines, modes * promise.exact
     waves, rests = _waves(promise, state, pieces)
-    now, then = eye(pieces, pieces + 1, k=1), eye(pieces, pieces + 1)
-    h, wide = promise.piece, 2 * (pieces + 1)
-    moves = [
-        [-0.5 * h * (now + then), now - then, 0.0 * now],
-        [-(h * h / 6.0) * (now + 2.0 * then), -h * then, now - then],
-    ]
-    equal = [
-        *(hstack([*row, csr_matrix((pieces, moduli))]) for row in moves),
-        *(_row(part, wide + moduli) for part in _parts(waves[:still])),
-    ]
-    shadows = [_row((turn * waves[still:]).real, wide, -np.eye(moduli)) for turn in SHADOWS]
-    sums = hstack([csr_matrix((machines, 3 * (pieces + 1))), kron(eye(machines), np.ones((1, modes)))])
-    jerks = hstack([now - then, csr_matrix((pieces, wide + moduli))])
+    wide, shadows, ends = 3 * (pieces + 1), len(SHADOWS) * moduli, 2 * pieces
+    total, own, mode = wide + moduli, np.arange(pieces), np.arange(moduli)
     above = [
+        *((k * moduli + mode, wide + mode, -1.0) for k in range(len(SHADOWS))),
+        (shadows + mode // modes, wide + mode, 1.0),
+        *_differences(shadows + machines, own, 1.0),
+        *_differences(shadows + machines + pieces, own, -1.0),
+    ]
+    turned = np.concatenate([(turn * waves[still:]).real for turn in SHADOWS])
+    most = [
         *(-(turn * rests[still:]).real for turn in SHADOWS),
         np.ones(machines),
-        np.full(2 * pieces, h * promise.limits.jerk),
+        np.full(ends, promise.piece * promise.limits.jerk),
     ]
-    price = np.zeros(wide + pieces + 1 + moduli)
-    price[wide + pieces] = shortest * np.sign(state.velocity or 1.0)
+    parts, past = (np.concatenate([one[:still].real, one[:still].imag]) for one in (waves, rests))
+    price = np.zeros(total)
+    price[wide - 1] = shortest * np.sign(state.velocity or 1.0)
     found = linprog(
         price,
-        A_ub=vstack([*shadows, sums, jerks, -jerks]).tocsr(),
-        b_ub=np.concatenate(above),
-        A_eq=vstack(equal).tocsr(),
-        b_eq=np.concatenate([np.zeros(2 * pieces), *(-part for part in _parts(rests[:still]))]),
+        A_ub=_matrix(above, turned, 0, (shadows + machines + ends, total)),
+        b_ub=np.concatenate(most),
+        A_eq=_matrix([*_moves(own, promise.piece)], parts, ends, (ends + len(parts), total)),
+        b_eq=np.concatenate([np.zeros(ends), -past]),
         bounds=[*_bounds(promise, state, goal, pieces), *[(0.0, None)] * moduli],
         method="highs-ds",
     )
-    return np.asarray(found.x[: wide + pieces + 1].reshape(3, -1)) if found.status == 0 else None
+    return np.asarray(found.x[:wide].reshape(3, -1)) if found.status == 0 else None
 
 
-def _row(own: Array, others: int, last: Array | None = None) -> csr_matrix:
-    """Make rows of what belongs to the accelerations, of noughts, and of what comes last."""
-    return hstack([csr_matrix(own), csr_matrix((len(own), others)), *([] if last is None else [last])])
+Numbers = NDArray[np.int64]
+Entries = tuple[Numbers, Numbers, float]  # rows, their columns, and what stands there
 
 
-def _parts(numbers: Complex) -> tuple[Array, Array]:
-    return numbers.real, numbers.imag
+def _differences(row: int, own: Numbers, sign: float) -> Iterator[Entries]:
+    """Change of each value, numbered `own`, to the next one, in rows from one on."""
+    yield row + own, own + 1, sign
+    yield row + own, own, -sign
+
+
+def _moves(own: Numbers, h: float) -> Iterator[Entries]:
+    """Let velocities be the integrals of the accelerations, and places those of the velocities."""
+    last, count = own + 1, len(own)
+    v, x = count + 1, 2 * (count + 1)  # where these begin
+    yield from ((own, own, -0.5 * h), (own, last, -0.5 * h), (own, v + own, -1.0), (own, v + last, 1.0))
+    yield from ((count + own, own, -h * h / 3.0), (count + own, last, -h * h / 6.0))
+    yield from ((count + own, v + own, -h), (count + own, x + own, -1.0), (count + own, x + last, 1.0))
+
+
+def _matrix(entries: Sequence[Entries], dense: Array, top: int, shape: tuple[int, int]) -> csc_matrix:
+    """Make a matrix of some entries and of full rows from one on, which begin in the first column."""
+    rows, columns = np.indices(dense.shape)
+    return csc_matrix(
+        (
+            np.concatenate([*(np.full(len(at), value) for at, _, value in entries), dense.ravel()]),
+            (
+                np.concatenate([*(at for at, *_ in entries), top + rows.ravel()]),
+                np.concatenate([*(at for _, at, _ in entries), columns.ravel()]),
+            ),
+        ),
+        shape,
+    )
 
 
 def _waves(promise: Promise, state: AxisState, pieces: int) -> tuple[Complex, Complex]:

@@ -17,8 +17,8 @@ from gen_profile.dynamics.evaluation.phrases import machine, place_unit
 from gen_profile.dynamics.evaluation.simulation import equations_of, swing_from
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.profile import Array
+from gen_profile.planner.directions import planned_axes, sensed_directions
 from gen_profile.planner.interface import UNPROVEN
-from gen_profile.planner.machine import planned_axes, sensed_directions
 from gen_profile.planner.planner import Planner
 from gen_profile.plants.drawing import Drawing
 from gen_profile.plants.looks import body_size, drawings, pose_of

@@ -7,7 +7,7 @@ import numpy as np
 
 from gen_profile.dynamics.evaluation.simulation import equations_of
 from gen_profile.motion.profile import Array
-from gen_profile.planner.machine import sensed_directions, shown_by_sensors
+from gen_profile.planner.directions import sensed_directions, shown_by_sensors
 from gen_profile.spec.model import Spec
 
 NOISIER, FARTHER, LATER, GREATER = 10.0, 4.0, 3.0, 2.0  # than stated, at most; a scale

@@ -19,9 +19,9 @@ from gen_profile.delivery.deployment.block_state import (
 from gen_profile.delivery.deployment.table import BlockTable
 from gen_profile.delivery.deployment.watching.judge import QUANTITIES, Judge
 from gen_profile.motion.profile import Array
+from gen_profile.planner.directions import planned_axes
 from gen_profile.planner.events import WORDS
 from gen_profile.planner.interface import LOST
-from gen_profile.planner.machine import planned_axes
 from gen_profile.planner.stated import quick_limits
 from gen_profile.support.errors import CheckFailed
 
