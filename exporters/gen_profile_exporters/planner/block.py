@@ -166,6 +166,16 @@ class PlannerConstants:
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
+    text = _filled("block", constants)
+    return narrow(with_while_loops(_without_loops(text) if len(constants.axes) == 1 else text))
+
+
+def interface(constants: PlannerConstants) -> str:
+    """Write its header and declare its inputs and outputs."""
+    return _filled("interface", constants).partition("\nVAR\n")[0] + "\n"
+
+
+def _filled(part: str, constants: PlannerConstants) -> str:
     parts = {
         "followed": bool(constants.rates),
         "zones": constants.zones,
@@ -176,10 +186,9 @@ def block_text(constants: PlannerConstants) -> str:
         "measured": constants.sensor is not None,
         "measured_varied": constants.sensor is not None and constants.stated_error > 0.0,
     }
-    text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
+    text = WHERE.sub(lambda some: some[2] if parts[some[1]] else "", _part(part))
     values = _values(constants)
-    text = re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
-    return narrow(with_while_loops(_without_loops(text) if len(constants.axes) == 1 else text))
+    return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
 
 
 @cache

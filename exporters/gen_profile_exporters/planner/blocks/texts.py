@@ -107,8 +107,8 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
         "bounds": initialiser([literal(float(v)) for v in np.tile(bounds, 1 + len(sizes.watched))]),
         "shown_swings": initialiser([str(v) for v in shown]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
-        "modes_constants": _declared(_of_modes(constants, sizes)),
-        "planner_constants": _declared(_of_motion(constants, len(shown), slots)),
+        "modes_constants": constant_lines(_of_modes(constants, sizes)),
+        "planner_constants": constant_lines(_of_motion(constants, len(shown), slots)),
     }
     return "\n".join(
         [
@@ -172,7 +172,8 @@ def _of_motion(c: PlannerConstants, shown: int, slots: int) -> dict[str, object]
     }
 
 
-def _declared(constants: Mapping[str, object]) -> str:
+def constant_lines(constants: Mapping[str, object]) -> str:
+    """Declare constants: whole and real ones, and lists of them."""
     return "\n".join(f"    {name} : {_constant(value)};" for name, value in constants.items())
 
 

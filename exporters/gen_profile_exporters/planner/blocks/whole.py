@@ -1,0 +1,115 @@
+"""The whole planner block: the shell, and before it the blocks that it has within it."""
+
+import re
+from collections.abc import Mapping
+
+from gen_profile.support.errors import ExportError
+from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants
+from gen_profile_exporters.planner.block import (
+    HOLD,
+    STILL,
+    WHERE,
+    PlannerConstants,
+    interface,
+    narrow,
+    with_while_loops,
+)
+from gen_profile_exporters.planner.blocks.texts import (
+    FOLDER,
+    Sizes,
+    constant_lines,
+    filled,
+    operations,
+    planner,
+)
+from gen_profile_exporters.playback.structured_text import block_name, literal
+
+GIVES_UP = 4.0  # slow periods in which no motion is found for a command
+SHELL_WORK, ZONES_WORK = 80, 300  # operations of every cycle: of an axis, and where it has zones
+EACH = re.compile(r"(?ms)^ *@each_axis\n(.*?)^ *@end_axis\n")
+TOLERANCE = ("is not the cycle time of this block", "is not within 0.1 % of the cycle time of this block")
+
+
+def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
+    """Write the planner block with all blocks that it has within it; the last one is its own.
+
+    Raises
+    ------
+    ExportError
+        It asks for what these blocks do not do yet.
+    """
+    if constants.rates or constants.sensor is not None or len(constants.axes) > 1:
+        raise ExportError("The blocks within blocks take one axis, without live_rate and sensor, as yet.")
+    own = block_name(constants.name)
+    names = {part: f"{own}_{part}" for part in ("motion", "quick_stop", "zones", "event_log")}
+    parts = [_renamed(planner(constants, sizes or Sizes()), constants.name, own)]
+    values = names | {"last_zone": str(ZONES - 1), "last_live": str(max(1, len(constants.live)) - 1)}
+    taken = {"quick_stop": True, "zones": constants.zones, "event_log": constants.events}
+    parts += [filled(part, **values) for part, is_taken in taken.items() if is_taken]
+    return narrow(with_while_loops("\n".join([*parts, _shell(constants, values)])))
+
+
+def _renamed(text: str, name: str, own: str) -> str:
+    """Give the blocks of a motion names that begin as the own block's does, which vendors' formats ask for."""
+    before = name.replace("-", "_")
+    text = re.sub(rf"\b{before}_planner\b", f"{own}_motion", text)
+    return re.sub(rf"\b{before}_(linear_programme|account|modes)\b", rf"{own}_\1", text)
+
+
+def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
+    stated = {"zones": c.zones, "events": c.events, "varied": c.stated_error > 0.0}
+    head = interface(c).replace(*TOLERANCE)
+    head = re.sub(r"(?m)^(\s*bStop : BOOL;.*\n)", rf"\1{PROMPT}\n", head, count=1)
+    body = WHERE.sub(
+        lambda part: part[2] if stated[part[1]] else "", (FOLDER / "shell.st").read_text("ascii")
+    )
+    body = EACH.sub(lambda part: "".join(_of_axis(part[1], n, a) for n, a in enumerate(c.axes)), body)
+    given = {
+        **values,
+        "first_suffix": c.axes[0].suffix,
+        "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
+        "shell_constants": constant_lines(_constants(c)),
+    }
+    return head + re.sub(r"@([a-z_]+)", lambda hole: given[hole[1]], body)
+
+
+PROMPT = "    bPromptStop : BOOL; (* stops are never faster than the axis is then, and may leave more sway *)"
+
+
+def _of_axis(text: str, number: int, axis: AxisConstants) -> str:
+    text = text.replace("@axis_number", str(number)).replace("@axis_velocity", literal(axis.velocity))
+    return text.replace("#", axis.suffix)
+
+
+def _constants(c: PlannerConstants) -> dict[str, object]:
+    lives = c.live or {"": (0.0, 1.0)}
+    common: dict[str, object] = {
+        "cLives": len(c.live),
+        "cCycle": c.cycle,
+        "cOperations": operations(c),
+        "cShellWork": len(c.axes) * (SHELL_WORK + (ZONES_WORK if c.zones else 0)) + 15 * len(c.live),
+        "cHoldCycles": round(HOLD / c.cycle),
+        "cGivesUpCycles": round(GIVES_UP * max(c.periods) / c.cycle),
+        "cSwayLimit": c.sway_limit,
+        "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
+        "cLiveLow": [low for low, _ in lives.values()],
+        "cLiveHigh": [high for _, high in lives.values()],
+        "cLiveDrift": list(c.drift) or [0.0],
+    }
+    for axis in c.axes:
+        own = {
+            "cVelocity": axis.velocity,
+            "cAcceleration": axis.acceleration,
+            "cJerk": axis.jerk,
+            "cQuickDeceleration": axis.quick_deceleration,
+            "cQuickJerk": axis.quick_jerk,
+            "cStill": STILL * axis.velocity,
+            "cTravelLow": axis.travel[0],
+            "cTravelHigh": axis.travel[1],
+            "cTargetLow": axis.targets[0],
+            "cTargetHigh": axis.targets[1],
+            # in which an axis comes to rest from a limit: a period, and by its acceleration
+            "cApproach": max(c.periods) + axis.velocity / axis.acceleration,
+        }
+        common |= {f"{name}{axis.suffix}": value for name, value in own.items()}
+    return common
