@@ -26,6 +26,7 @@ _ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.I
 COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed takes the rest
 _PLANNER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
+_BLOCK_END = re.compile(r"\(\*.*?(?:\*\)|\Z)|\b(END_FUNCTION_BLOCK)\b", re.DOTALL | re.IGNORECASE)
 # An array's initialiser or an index, a name or hole, a number with its sign, an operator.
 TOKEN = re.compile(
     r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S", re.ASCII
@@ -87,21 +88,26 @@ class BlockSource:
         By section, in their order.
     body : str
         Statements.
+    within : tuple of BlockSource
+        The blocks that it has instances of, and theirs, each before those that use it.
     """
 
     header: str
     name: str
     variables: tuple[BlockVariable, ...]
     body: str
+    within: tuple["BlockSource", ...] = ()
 
     def text(self) -> str:
         """Put it together as Structured Text."""
-        return f"{self.header}{self.declaration()}\n{self.body}END_FUNCTION_BLOCK\n"
+        others = "".join(f"{one.text()}\n" for one in self.within)
+        return f"{others}{self.header}{self.declaration()}\n{self.body}END_FUNCTION_BLOCK\n"
 
     def program(self) -> tuple[object, ...]:
         """Give what the block does, however its text is laid out, spelled and commented."""
         variables = [(v.section, v.name.lower(), _pieces(v.type), _pieces(v.initial)) for v in self.variables]
-        return sorted(variables), _pieces(self.body)
+        others = sorted((one.name.lower(), one.program()) for one in self.within)
+        return others, sorted(variables), _pieces(self.body)
 
     def declaration(self) -> str:
         """Everything before the statements, header excepted."""
@@ -114,13 +120,31 @@ class BlockSource:
 
 
 def parse_function_block(text: str) -> BlockSource:
-    """Split Structured Text into a block's parts.
+    """Split Structured Text into a block's parts; of a planner block, those before it are within it.
 
     Raises
     ------
     ExportError
         It is no function block, or holds more than declarations where a playback block declares.
     """
+    ends = [end.end() for end in _BLOCK_END.finditer(text) if end[1]]
+    if len(ends) < 2 or not is_planner(text):
+        return _parsed(text)
+    pieces = [text[a:b] for a, b in zip([0, *ends], [*ends[:-1], len(text)], strict=False)]
+    return with_blocks_within([*map(_parsed, pieces)])
+
+
+def place_of_own(names: Iterable[str]) -> int:
+    """Tell which of a document's blocks it is of: the first planner block, or the first of all."""
+    return next((k for k, name in enumerate(names) if name.lower().endswith("_planner")), 0)
+
+
+def with_blocks_within(blocks: Sequence[BlockSource]) -> BlockSource:
+    """Put those before the last block into it."""
+    return attrs.evolve(blocks[-1], within=tuple(blocks[:-1]))
+
+
+def _parsed(text: str) -> BlockSource:
     header = _HEADER.match(text)
     name = _NAME.match(text, header.end() if header else 0)
     if name is None:

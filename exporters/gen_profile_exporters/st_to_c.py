@@ -95,7 +95,7 @@ def translate(text: str) -> Translation:
     ExportError
         It is no function block of this subset of the language.
     """
-    *used, own = _translated(text, {}, checked=True)
+    *used, own = translate_statements(text, {}, checked=True)
     if handed := [v.name for v in own.variables if v.section == "VAR_IN_OUT"]:
         raise ExportError(f"{NO_BLOCK}: nothing hands {handed[0]} to the last block of the text.")
     inputs, outputs = (
@@ -105,8 +105,8 @@ def translate(text: str) -> Translation:
     source = filled(
         "c/block.c",
         most_turns=MOST_TURNS,
-        blocks="".join(filled("c/instance.c", **_code(block, _owner(block.name))) + "\n" for block in used),
-        **_code(own),
+        blocks="".join(filled("c/instance.c", **c_parts(block, within=True)) + "\n" for block in used),
+        **c_parts(own),
     )
     header = filled(
         "c/block.h",
@@ -117,9 +117,10 @@ def translate(text: str) -> Translation:
     return Translation(own.name, inputs, outputs, header, source)
 
 
-def _code(block: "Statements", owner: str = "") -> dict[str, str]:
-    """Give a block's functions and constants, whose names `owner` begins."""
+def c_parts(block: "Statements", *, within: bool = False) -> dict[str, str]:
+    """Give a block's functions and constants; of one within another their names begin with its own."""
     name, variables = block.name, block.variables
+    owner = _owner(name) if within else ""
     owners = dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->")
     parts = (_function(f"{name}_part_{k}", name, part) for k, part in enumerate(block.parts))
     return {
@@ -148,14 +149,17 @@ class Statements(NamedTuple):
     parts: list[list[str]]
 
 
-def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool = False) -> Statements:
-    """Translate a function block's statements, with a macro ``AT(index, length)`` for every index.
+def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool = False) -> list[Statements]:
+    """Translate function blocks' statements, with a macro ``AT(index, length)`` for every index.
+
+    The last one is the text's own; those before it are called by ``CALL(NAME_step, instance)``.
 
     Parameters
     ----------
     text : str
     owners : mapping of str to str
-        What stands before the names of a section's variables, such as ``in->``; ``fb->`` if not given.
+        What stands before the names of a section's variables of the own block, such as ``in->``; ``fb->`` if
+        not given, and in those before it.
     checked : bool
         Whether the lines use the macros by which an altered text is ended, and are divided into parts.
 
@@ -164,14 +168,6 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     ExportError
         It is no function block of this subset of the language.
     """
-    *used, own = _translated(text, owners, checked=checked)
-    if used:
-        raise ExportError(f"{NO_BLOCK}: it has other blocks in it, which this form does not take.")
-    return own
-
-
-def _translated(text: str, owners: Mapping[str, str], *, checked: bool) -> list[Statements]:
-    """Translate all blocks of a text, in their order; `owners` are those of the last one."""
     blocks: dict[str, Statements] = {}
     try:
         trees: Any = _parser().parse(text).children

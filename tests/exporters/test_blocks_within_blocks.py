@@ -9,7 +9,9 @@ from st_interpreter import StError, block_of
 
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.support.errors import ExportError
-from gen_profile_exporters.st_to_c import translate, translate_statements
+from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.planner.parameters import buffered_planner
+from gen_profile_exporters.st_to_c import translate
 
 INNERMOST = """
 FUNCTION_BLOCK Counted
@@ -145,6 +147,22 @@ def test_constants_of_the_same_name_are_each_block_s_own():
     assert "static const double cScale = -3.0;" in source
 
 
-def test_a_form_that_takes_one_block_says_so():
-    with pytest.raises(ExportError, match="other blocks in it, which this form does not take"):
-        translate_statements(TEXT, {})
+def test_a_text_is_taken_apart_and_put_together_where_it_is_a_planner_s():
+    text = TEXT.replace("FUNCTION_BLOCK Own", "(* (* END_FUNCTION_BLOCK *)\nFUNCTION_BLOCK Own_planner")
+    source = parse_function_block(text)
+    assert [one.name for one in source.within] == ["Counted", "Sorted"]
+    assert "END_FUNCTION_BLOCK" in source.header
+    again = parse_function_block(source.text())
+    assert again.program() == source.program()
+    assert translate(again.text()).inputs == translate(text).inputs
+    altered = parse_function_block(text.replace("cScale : DINT := 1", "cScale : DINT := 2"))
+    assert altered.program() != source.program()
+
+
+@pytest.mark.parametrize("text", [TEXT, INNER + INNERMOST])
+def test_other_texts_are_of_one_block(text):
+    assert parse_function_block(text).within == ()
+    with pytest.raises(ExportError, match="constants alone"):
+        buffered_planner(
+            parse_function_block(TEXT.replace("FUNCTION_BLOCK Own", "FUNCTION_BLOCK Own_planner"))
+        )

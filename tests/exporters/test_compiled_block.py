@@ -83,7 +83,8 @@ def compile_text(text, folder):
     library = Path(os.environ["MATIEC_LIB"])
     (folder / "block.st").write_text(text, encoding="ascii")
     subprocess.run(
-        [os.environ["IEC2C"], "-I", str(library), "-T", str(folder), str(folder / "block.st")],
+        # arrays of the same bounds are of one type (-l), as Beremiz and OpenPLC call it
+        [os.environ["IEC2C"], "-l", "-I", str(library), "-T", str(folder), str(folder / "block.st")],
         check=True,
         capture_output=True,
     )

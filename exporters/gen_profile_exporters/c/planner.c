@@ -22,8 +22,9 @@ static inline int32_t within(int *left, int32_t index, int32_t length)
     return beyond ? 0 : index;
 }
 #define AT(index, length) within(&left, index, length)
+#define CALL(name, instance) (left |= name(&(instance)))
 
-$constants
+$blocks$constants
 
 void ${name}_init(${name}_state *state, ${name}_inputs *in)
 {

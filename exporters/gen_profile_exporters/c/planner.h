@@ -33,7 +33,7 @@ typedef struct {
 $outputs
 } ${name}_outputs;
 
-/* Memory of the planner: to be kept from cycle to cycle, and to be changed by its functions only. */
+$structures/* Memory of the planner: to be kept from cycle to cycle, and to be changed by its functions only. */
 typedef struct {
     ${name}_outputs out;
 $memory

@@ -1,11 +1,11 @@
 """The planner block as C99: the same statements, between structures of inputs, outputs and state."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File
-from gen_profile_exporters.st_to_c import translate_statements
+from gen_profile_exporters.st_to_c import Statements, c_parts, translate_statements
 from gen_profile_exporters.st_variables import StVariable, c_constants, c_initials, c_member
 from gen_profile_exporters.text_parts import filled, indented
 
@@ -32,28 +32,40 @@ def c_files(text: str, file: str) -> tuple[File, File]:
     ExportError
         The text is no function block of the subset that is translated.
     """
-    source, statements = parse_function_block(text), translate_statements(text, OWNERS)
+    source, (*within, statements) = parse_function_block(text), translate_statements(text, OWNERS)
     names = {"file": file, "name": c_name(file), "guard": c_name(file).upper(), "block": source.name}
     by_section = {section: [v for v in statements.variables if v.section == section] for section in OWNERS}
     code = filled(
         "c/planner.c",
         **names,
+        blocks="".join(
+            filled("c/planner_within.c", **c_parts(block, within=True)) + "\n" for block in within
+        ),
         constants="\n".join(c_constants(statements.variables, statements.body)),
         initials=indented(c_initials(statements.variables, OWNERS)),
         body=indented(statements.body),
     )
     positions = [f"out.{v.name}" for v in by_section["VAR_OUTPUT"] if v.name.startswith("fPosition")]
+    sizes: dict[str, int] = {}
+    for block in (*within, statements):
+        sizes[block.name] = sum(_bytes(v, sizes) for v in block.variables if v.section != "VAR CONSTANT")
     header = filled(
         "c/planner.h",
         **names,
         positions=" and ".join(positions) + (" are the setpoints" if positions[1:] else " is the setpoint"),
-        kilobytes=f"{sum(map(_bytes, by_section['VAR'])) / 1000.0:.0f}",
+        kilobytes=f"{sizes[statements.name] / 1000.0:.0f}",
+        structures="".join(map(_structure, within)),
         words="\n".join(f" * {line}".rstrip() for line in _words(source).splitlines()),
         inputs=_members(by_section["VAR_INPUT"], source),
         outputs=_members(by_section["VAR_OUTPUT"], source),
         memory=indented(f"{c_member(v)};" for v in by_section["VAR"]),
     )
     return (File(f"{file}.c", code.encode("ascii")), File(f"{file}.h", header.encode("ascii")))
+
+
+def _structure(block: Statements) -> str:
+    members = indented(f"{c_member(v)};" for v in block.variables if v.section != "VAR CONSTANT")
+    return f"typedef struct {{\n{members}\n}} {block.name};\n\n"
 
 
 def _members(variables: Iterable[StVariable], source: BlockSource) -> str:
@@ -69,5 +81,6 @@ def _words(source: BlockSource) -> str:
     return "\n".join(line.removeprefix("    ").rstrip() for line in words.splitlines())
 
 
-def _bytes(variable: StVariable) -> int:
-    return {"BOOL": 1, "DINT": 4, "LREAL": 8}[variable.type] * max(1, variable.length)
+def _bytes(variable: StVariable, blocks: Mapping[str, int]) -> int:
+    sizes = {"BOOL": 1, "DINT": 4, "LREAL": 8, **blocks}
+    return 8 if variable.section == "VAR_IN_OUT" else sizes[variable.type] * max(1, variable.length)

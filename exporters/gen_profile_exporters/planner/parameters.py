@@ -38,7 +38,16 @@ _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 
 
 def buffered_planner(source: BlockSource) -> BlockSource:
-    """Put variables in place of a planner block's numbers."""
+    """Put variables in place of a planner block's numbers.
+
+    Raises
+    ------
+    ExportError
+        It has other blocks within it, whose numbers no buffer reaches yet.
+    """
+    if source.within:
+        words = "blocks within a block take their numbers as constants alone"
+        raise ExportError(f'export.plc_tables: {words}; take "constants".')
     numbers = [one for one in source.variables if _is_number(one)]
     own, distinct = _own(source, numbers)
     taken = {one.name for one in numbers}

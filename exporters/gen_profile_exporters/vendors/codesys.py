@@ -44,7 +44,7 @@ unwrap, replay = plcopen_xml.unwrap, plcopen_xml.replay
 
 
 def _project(source: BlockSource, target: Target, cams: list[etree._Element]) -> tuple[File, ...]:
-    blocks = (source, *axis_wrappers(source, len(target.axes), CODESYS))
+    blocks = (*source.within, source, *axis_wrappers(source, len(target.axes), CODESYS))
     pous = [*map(plcopen_xml.CODESYS.pou, blocks), *cams]
     return (File(f"{target.name}.codesys.xml", write_xml(plcopen_xml.CODESYS.project(target.name, pous))),)
 

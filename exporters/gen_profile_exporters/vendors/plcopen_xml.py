@@ -12,7 +12,13 @@ from lxml import etree
 
 from gen_profile.motion.profile import Profile
 from gen_profile.support.errors import ExportError
-from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
+from gen_profile_exporters.block_source import (
+    BlockSource,
+    BlockVariable,
+    parse_function_block,
+    place_of_own,
+    with_blocks_within,
+)
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_text, replays
 from gen_profile_exporters.text_parts import filled
@@ -137,12 +143,12 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write a project with any block in it."""
-    project = TC6.project(target.name, [TC6.pou(source)])
+    project = TC6.project(target.name, [*map(TC6.pou, (*source.within, source))])
     return (File(f"{target.name}.xml", write_xml(project)),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
-    """Read a project's first function block, whichever the dialect.
+    """Read a project's first function block, whichever the dialect; a planner block with those within it.
 
     Raises
     ------
@@ -152,7 +158,10 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     root = parse_xml(content)
     if root.tag not in [f"{{{dialect.namespace}}}project" for dialect in (TC6, CODESYS)]:
         raise ExportError("The document is no PLCopen project of TC6 version 2; export it again.")
-    return _source(child(root, "{*}types/{*}pous/{*}pou"))
+    child(root, "{*}types/{*}pous/{*}pou")  # one at least
+    pous = child(root, "{*}types/{*}pous").findall("{*}pou")
+    place = place_of_own(one.get("name", "") for one in pous)
+    return with_blocks_within([*map(_source, pous[: place + 1])])
 
 
 replay = replays(unwrap)

@@ -20,6 +20,8 @@ from gen_profile_exporters.block_source import (
     is_planner,
     ordered,
     parse_function_block,
+    place_of_own,
+    with_blocks_within,
 )
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import SIEMENS
@@ -68,7 +70,10 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     ExportError
         Its numbers are larger than a data block.
     """
-    size = sum(_bytes(variable) for variable in source.variables)
+    sizes: dict[str, int] = {}
+    for block in (*source.within, source):
+        sizes[block.name] = sum(sizes.get(v.type, _bytes(v)) for v in block.variables)
+    size = sizes[source.name]
     if size > MOST_BYTES:
         cure = 'export.plc_layout = "segments", a longer export.cycle_time, or fewer motions in a library'
         if is_planner(source.text()):
@@ -86,12 +91,12 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     if is_buffered(source):
         wrappers = tuple(_wired(wrapper, source) for wrapper in wrappers)
         others = [_mailbox(source)]
-    text = "\n".join([*map(_scl, (source, *wrappers)), *others])
+    text = "\n".join([*map(_scl, (*source.within, source, *wrappers)), *others])
     return (File(f"{target.name}.scl", text.encode("ascii")),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
-    """Read the first block, and turn it back into portable text.
+    """Read the first block, or a planner block with those within it, and turn it back into portable text.
 
     Raises
     ------
@@ -99,9 +104,14 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
         There is none.
     """
     text = content.decode("latin-1")
-    match = _BLOCK.search(text)
-    if match is None:
+    blocks = [*_BLOCK.finditer(text)]
+    if not blocks:
         raise ExportError("There is no SCL block of this export; export it again.")
+    place = place_of_own(match[2] for match in blocks)
+    return with_blocks_within([_portable(match, text, target) for match in blocks[: place + 1]])
+
+
+def _portable(match: re.Match[str], text: str, target: Target) -> BlockSource:
     header, name, declarations, body = match.groups()
     portable = body.replace("#", "")
     declarations = re.sub(r'"(FB_\w+)";', r"\1;", declarations.lstrip())

@@ -36,11 +36,11 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
     """Write any block, and the wrapper of one that plays."""
-    return (_pou(source), *map(_pou, axis_wrappers(source, len(target.axes), TWINCAT)))
+    return (*map(_pou, (source, *source.within, *axis_wrappers(source, len(target.axes), TWINCAT))),)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
-    """Read a block.
+    """Read a block; those within it are in files of their own.
 
     Raises
     ------

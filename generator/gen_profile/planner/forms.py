@@ -1,8 +1,9 @@
 """The files that a planner block is written to, and its text out of any of them."""
 
 import re
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from pathlib import Path, PurePath
 
 import attrs
 
@@ -13,8 +14,8 @@ from gen_profile.spec.model import ExportSpec, Spec
 from gen_profile.support.artefacts.reading import decoded, read_artefact, refusal
 from gen_profile.support.errors import ExportError, SpecError
 from gen_profile.support.suggestion import suggestion
-from gen_profile_exporters.block_source import is_planner, parse_function_block
-from gen_profile_exporters.exporter import File, Target, target_of
+from gen_profile_exporters.block_source import BlockSource, is_planner, parse_function_block
+from gen_profile_exporters.exporter import BlockContainer, File, Target, target_of
 from gen_profile_exporters.planner.axis_wrapper import planner_wrappers
 from gen_profile_exporters.planner.c_source import c_files
 from gen_profile_exporters.planner.linux.host import linux_files
@@ -105,12 +106,20 @@ def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
     files = list[File]()
     for ending, part in {"": given, **planner_wrappers(source, units, format_)}.items():
         written = container.wrap(part, attrs.evolve(target, name=f"{target.name}{ending}"))
-        if container.unwrap(written[0].content, target).program() != part.program():
+        back = container.unwrap(written[0].content, target)
+        if part.within:
+            parts = {PurePath(file.filename).stem: file.content for file in written}
+            back = _with_others(back, partial(_part_of, container, target, parts))
+        if back.program() != part.program():
             raise ExportError(f"{format_}: what was written reads back as another block; export {PORTABLE}.")
         files += written
     if format_ == PORTABLE and given is source:  # with its comments
         files[0] = File(filename=block.filename, content=block.text.encode("ascii"))
     return tuple(files)
+
+
+def _part_of(container: BlockContainer, target: Target, parts: Mapping[str, bytes], name: str) -> BlockSource:
+    return container.unwrap(parts[name], target)
 
 
 def read_block(path: Path) -> str:
@@ -156,4 +165,28 @@ def _text_in(path: Path, content: bytes) -> str:
     if format_ == PORTABLE:
         return decoded(content, path, WHAT)
     target = Target(name=path.stem, axes=(), start=(), export=ExportSpec(), can=CanSpec())
-    return find_container(format_).unwrap(content, target).text()
+    container = find_container(format_)
+
+    def beside(name: str) -> BlockSource:
+        return container.unwrap(read_artefact(path.with_name(f"{name}{path.suffix}"), what=WHAT), target)
+
+    source = container.unwrap(content, target)
+    return (_with_others(source, beside) if is_planner(source.text()) else source).text()
+
+
+def _with_others(source: BlockSource, read: Callable[[str], BlockSource]) -> BlockSource:
+    """Read the blocks within one by their names, where a format has a file for each."""
+    if source.within:
+        return source
+    asked, found = {source.name}, list[BlockSource]()
+
+    def add(block: BlockSource) -> None:
+        for variable in block.variables:
+            if variable.section == "VAR" and variable.type.startswith("FB_") and variable.type not in asked:
+                asked.add(variable.type)
+                add(read(variable.type))
+        if block is not source:
+            found.append(block)
+
+    add(source)
+    return attrs.evolve(source, within=tuple(found))

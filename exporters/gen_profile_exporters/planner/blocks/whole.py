@@ -50,7 +50,7 @@ def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
 
 
 def _renamed(text: str, name: str, own: str) -> str:
-    """Give the blocks of a motion names that begin as the own block's does, which vendors' formats ask for."""
+    """Begin the names of the blocks of a motion as the own block's name, as vendors' formats ask."""
     before = name.replace("-", "_")
     text = re.sub(rf"\b{before}_planner\b", f"{own}_motion", text)
     return re.sub(rf"\b{before}_(linear_programme|account|modes)\b", rf"{own}_\1", text)

@@ -1,0 +1,96 @@
+"""The whole block of the folder of blocks: its forms, and what it takes and gives."""
+
+import ctypes
+import subprocess
+
+import attrs
+import numpy as np
+import pytest
+from system_parts import program
+from test_planner_forms import Exported
+
+from gen_profile.planner.design import planner_block, planner_constants
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.forms import block_files, read_block
+from gen_profile.spec.reading import preset_spec
+from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.planner.blocks.whole import whole_block
+from gen_profile_exporters.registry import containers
+from gen_profile_exporters.st_to_c import translate
+
+SWITCHED = {
+    "bExecute": 0.5, "bVelocity": 0.1, "bStop": 0.08, "bPromptStop": 0.3, "bQuickStop": 0.04, "bReset": 0.4,
+    "bLoadAtRest": 0.3,
+}  # fmt: skip
+
+
+def whole_text(spec):
+    return whole_block(planner_constants(spec)[1])
+
+
+def random_rows(inputs, cycles, seed):
+    """Inputs of random spans of cycles: commands, stops, limits, zones, faults, ropes, another place."""
+    draw = np.random.default_rng(seed)
+    given, rows, left = inputs | {"bEnable": 1.0}, [], cycles
+    while left > 0:
+        span = min(left, int(draw.choice([1, 2, 20, 300, 1500])))
+        left -= span
+        given |= {name: float(draw.random() < share) for name, share in SWITCHED.items()}
+        given |= {"bEnable": float(draw.random() > 0.06), "fTarget": round(draw.uniform(-1.0, 21.0), 3)}
+        given["fVelocityCommand"] = round(draw.uniform(-1.3, 1.3), 2) * (draw.random() < 0.8)
+        given["rOverride"] = 1.0 - round(draw.uniform(-0.1, 1.0), 2) * (draw.random() < 0.15)
+        given["fVelocityLimit"] = round(draw.uniform(-0.1, 1.0), 2) * (draw.random() < 0.1)
+        given["fFollowingLimit"] = 0.0
+        if draw.random() < 0.1:
+            given |= {
+                "fL1": round(draw.uniform(2.9, 9.0), 2),
+                "fActVelocity": round(draw.uniform(-0.5, 0.5), 2),
+            }
+            given["fActPosition"] = round(draw.uniform(0.0, 20.0), 2)
+        if draw.random() < 0.03:
+            given["fFollowingLimit"] = 0.5
+        if "aSlowLow[0]" in inputs and draw.random() < 0.1:
+            low = round(draw.uniform(0.0, 20.0), 2)
+            kind = draw.choice(["Slow", "Blocked"])
+            given |= {f"a{kind}Low[1]": low, f"a{kind}High[1]": low + draw.choice([-1.0, 1.0, 2.5])}
+            given["aSlowLimit[1]"] = round(draw.uniform(0.05, 0.5), 2)
+        row = np.array(list(given.values()))
+        if draw.random() < 0.03:
+            row[draw.choice([k for k, name in enumerate(given) if name[0] != "b" and name[0] != "n"])] = (
+                np.nan
+            )
+        rows.append(np.tile(row, (span, 1)))
+    return np.concatenate(rows)
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return preset_spec("bay-crane", ["planner.zones=true", "planner.events=true"])
+
+
+@pytest.fixture(scope="module")
+def block(spec):
+    return attrs.evolve(planner_block(spec), text=whole_text(spec))
+
+
+@pytest.mark.parametrize("format_", containers())
+def test_every_container_reads_back_as_the_same_blocks(spec, block, format_, tmp_path):
+    files = block_files(block, spec, [format_])
+    for file in files:
+        (tmp_path / file.filename).write_bytes(file.content)
+    source = parse_function_block(block.text)
+    assert len(source.within) >= 6
+    assert parse_function_block(read_block(tmp_path / files[0].filename)).program() == source.program()
+
+
+@pytest.mark.slow
+def test_exported_c_issues_the_same_bits_without_a_warning(spec, block, tmp_path):
+    files = [tmp_path / file.filename for file in block_files(block, spec, ["c"])]
+    for path, file in zip(files, block_files(block, spec, ["c"]), strict=True):
+        path.write_bytes(file.content)
+    strict = ["-std=c99", "-O1", "-Wall", "-Wextra", "-pedantic", "-Werror", "-shared", "-fPIC"]
+    subprocess.run([program("cc", "gcc"), *strict, files[0], "-o", tmp_path / "c.so", "-lm"], check=True)
+    oracle = BlockInstance(block.text)
+    exported = Exported(translate(block.text), ctypes.CDLL(tmp_path / "c.so"), "bay_crane")
+    rows = random_rows(oracle.inputs, 20_000, seed=5)
+    assert np.array_equal([exported.call(row) for row in rows.tolist()], oracle.call(rows))
