@@ -417,9 +417,9 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
     folder = deployed[0]
     proof = json.loads((folder / "manifest.json").read_text())["check"]
     page = tmp_path / "bay.html"
-    document = run_here(
-        "report", folder / "bay 3.st", "--out", page, "--field", "Customer=ACME", "--json"
-    ).document
+    written = run_here("report", folder / "bay 3.st", "--out", page, "--field", "Customer=ACME", "--json")
+    assert written.code == 0, written.err
+    document = written.document
     assert document["proof"] == proof
     text = unescape(page.read_text("utf-8"))
     worst = proof["worst"]
@@ -433,13 +433,17 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
     assert "ACME" in text
     assert document["report"]["bytes"] == page.stat().st_size
     data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', text, re.DOTALL)[1])
-    history, mapped = data["figures"]
+    history, mapped, prompt = data["figures"]
     assert [entry["name"] for entry in history["legend"]][:3] == ["setpoint", "command", "this history"]
     position = history["panels"][0]["data"][0]["y"]
     assert position[0] == pytest.approx(worst["start_m"], abs=1e-4)
     (cells,) = mapped["panels"][0]["data"]
     found = [share for row in cells["z"] for share in row if share is not None]
     assert max(found) == pytest.approx(100.0 * proof["share"], rel=1e-4)
+    *kinds, _, _ = prompt["panels"][0]["data"]  # the quickest, and what is late
+    assert sum(len(kind["y"]) for kind in kinds) == sum(
+        one["compared"] for one in proof["prompt"]["commands"]
+    )
 
 
 @pytest.mark.slow
