@@ -40,9 +40,15 @@ def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
     """
     if constants.rates or constants.sensor is not None or len(constants.axes) > 1:
         raise ExportError("The blocks within blocks take one axis, without live_rate and sensor, as yet.")
+    motion = _renamed(planner(constants, sizes or Sizes()), constants.name, block_name(constants.name))
+    return around(motion, constants)
+
+
+def around(motion: str, constants: PlannerConstants) -> str:
+    """Write the shell around a motion, `FB_NAME_motion` with the inputs and outputs of `planner.st`."""
     own = block_name(constants.name)
     names = {part: f"{own}_{part}" for part in ("motion", "quick_stop", "zones", "event_log")}
-    parts = [_renamed(planner(constants, sizes or Sizes()), constants.name, own)]
+    parts = [motion]
     values = names | {"last_zone": str(ZONES - 1), "last_live": str(max(1, len(constants.live)) - 1)}
     taken = {"quick_stop": True, "zones": constants.zones, "event_log": constants.events}
     parts += [filled(part, **values) for part, is_taken in taken.items() if is_taken]
