@@ -35,7 +35,7 @@ class Style:
     colour : str
     dash : str
     width : float
-        In pixels.
+        In pixels; of points the radius.
     shown : bool
         Whether it is drawn before it is asked for.
     """

@@ -188,5 +188,5 @@ def _map(part: Any, axis: Any, panel: parts.Map) -> None:
 
 def _ink(style: parts.Style) -> dict[str, Any]:
     """Say in Matplotlib's words how a curve looks."""
-    points = {"marker": ".", "markersize": 3.0} if style.dash == "points" else {}
+    points = {"marker": ".", "markersize": 2.0 * style.width} if style.dash == "points" else {}
     return {"color": style.colour, "linestyle": DASHES[style.dash], "linewidth": style.width, **points}

@@ -115,7 +115,7 @@ def _trace(line: parts.Line) -> dict[str, Any]:
     style = line.style
     look: dict[str, Any] = {"line": {"color": style.colour, "width": style.width, "dash": style.dash}}
     if style.dash == "points":
-        look = {"marker": {"color": style.colour, "size": 3}}
+        look = {"marker": {"color": style.colour, "size": 2.0 * style.width}}
     return {
         "type": "scatter",
         "mode": "markers" if "marker" in look else "lines",

@@ -186,7 +186,7 @@ def lateness_figure(proof: Proof) -> Figure:
     for (kind, words), colour in zip(KINDS.items(), PALETTE, strict=False):
         own = [one for _, one in found.commands if one.kind == kind and one.possible is not None]
         possible, takes = np.array([[one.quickest, one.takes] for one in own]).reshape(-1, 2).T
-        lines.append(Line(words, possible, takes, Style(colour=colour, dash="points")))
+        lines.append(Line(words, possible, takes, Style(colour=colour, dash="points", width=3.5)))
     longest = max(one.quickest for _, one in found.commands)
     ends = np.array([0.0, longest])
     lines.append(Line("as quick as possible", ends, ends, SETPOINT))

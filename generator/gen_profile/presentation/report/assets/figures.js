@@ -60,14 +60,15 @@
   }
 
   function sample(entry) {
-    const line = { solid: "", dash: "6 3", dot: "2 2" }[entry.dash];
+    const line = { solid: "", dash: "6 3", dot: "2 2", points: "0 11" }[entry.dash]; // points: caps of nothing
     const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
     svg.setAttribute("width", 26);
     svg.setAttribute("height", 8);
     const path = svg.appendChild(document.createElementNS(svg.namespaceURI, "path"));
-    path.setAttribute("d", "M0 4H26");
+    path.setAttribute("d", "M2 4H26");
     path.setAttribute("stroke", entry.colour);
-    path.setAttribute("stroke-width", 2.5);
+    path.setAttribute("stroke-width", entry.dash === "points" ? 5 : 2.5);
+    path.setAttribute("stroke-linecap", entry.dash === "points" ? "round" : "butt");
     path.setAttribute("stroke-dasharray", line);
     return svg;
   }
