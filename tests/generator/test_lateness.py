@@ -53,7 +53,7 @@ def test_a_late_block_is_refused_only_where_the_spec_demands_it():
     )
     (reason,) = Promptness(demanded=1.2, commands=[(7, SLOW), (8, quick)]).reasons()
     assert reason.startswith(
-        "In history 7 one of the stops (at 1 m, 1 m/s) takes 9 s at 3.00 s, where 4 s are possible, "
+        "In history 7, one of the stops (at 1 m, 1 m/s) takes 9 s at 3.00 s, where 4 s are possible, "
         "and 1.2 times that and 1 s are demanded (planner.lateness)"
     )
     assert Promptness(demanded=2.0, commands=[(7, SLOW)]).reasons() == []
