@@ -49,7 +49,7 @@ def test_a_late_block_is_refused_only_where_the_spec_demands_it():
     lateness = Promptness(demanded=None, commands=[(7, SLOW), (8, quick)])
     assert lateness.reasons() == []
     assert lateness.words().startswith(
-        "1 of 2 commands take more than 1.5 times the quickest and 1 s; the latest:"
+        "1 of 2 commands takes more than 1.5 times the quickest and 1 s; the latest:"
     )
     (reason,) = Promptness(demanded=1.2, commands=[(7, SLOW), (8, quick)]).reasons()
     assert reason.startswith(
