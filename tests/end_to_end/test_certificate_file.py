@@ -114,7 +114,7 @@ TAMPERED = {
     forgeries.narrower: "does not cover all machines",
     forgeries.knots_moved: "does not belong to the file's setpoints",
     forgeries.later: "about another time",
-    forgeries.scales_singular: "does not prove what it says",
+    forgeries.scales_singular: "no bound of the payload follows from its boxes",
     forgeries.motion_altered: "does not prove what it says",
     forgeries.motion_cut: "is damaged",
     forgeries.motion_missing: "is damaged",

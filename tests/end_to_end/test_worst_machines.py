@@ -76,7 +76,7 @@ MACHINES = {
 
 
 def swaying(spec, times, accelerations, grid):
-    """Greatest sway of the worst load on every machine of a grid after the move, in m."""
+    """Greatest sway of every load on every machine of a grid after the move in m, shape (loads, machines)."""
     derivative, rest, sways = MACHINES[spec.plant.type]
     count = len(next(iter(grid.values())))
     p = {name: np.full(count, value) for name, value in spec.plant.parameters.items()} | grid
@@ -96,7 +96,7 @@ def swaying(spec, times, accelerations, grid):
         rate, (0.0, seen[-1]), began, "DOP853", seen, rtol=1e-6, atol=1e-8, max_step=times[-1] / 40
     )
     loads = np.abs(sways({k: v[:, None] for k, v in p.items()}, found.y.reshape(len(rest), count, -1)))
-    return loads[:, :, 1:].max(axis=(0, 2))
+    return loads[:, :, 1:].max(axis=2)
 
 
 CASES = {
@@ -153,8 +153,8 @@ def test_what_passes_at_nominal_and_ends_and_fails_between_is_refused(
     times, accelerations = table[::2, 0], 1e-3 * table[::2, 3::4]
     expected = swaying(spec, times, accelerations, {name: grid})
     assert max(worst["residual_peaks_m"].values()) == pytest.approx(expected.max(), rel=0.01)
-    (there,) = swaying(spec, times, accelerations, {name: np.array([worst["parameters"][name]])})
-    assert there == pytest.approx(expected.max(), rel=0.01)
+    there = swaying(spec, times, accelerations, {name: np.array([worst["parameters"][name]])})
+    assert there.max() == pytest.approx(expected.max(), rel=0.01)
 
 
 def random_case(seed):
@@ -217,9 +217,25 @@ def test_no_machine_of_a_dense_grid_is_worse_than_what_the_search_found(seed):
     grid = dict(zip(ranges, map(np.ravel, np.meshgrid(*axes)), strict=True))
     accelerations = np.diff(setpoints.position, 2, axis=0) / setpoints.cycle_time**2
     expected = swaying(spec, setpoints.times[1:-1], accelerations, grid)
-    worst = max(max(finding.residual.values()) for finding in check.findings)
     # straight lines between setpoints err by the cycle's square, the integration here by as much again
-    assert expected.max() <= 1.01 * worst + 1e-6
+    for load, dense in zip(spec.check.residual_sway, expected.max(axis=1), strict=True):
+        assert dense <= 1.01 * max(finding.residual[load] for finding in check.findings) + 1e-6
+
+
+def test_the_worst_machine_of_a_load_far_from_its_limit_is_found():
+    """The hook's, where the payload is nearer to its limit on others: 11 % less was found."""
+    spec = preset_spec("bay-crane", ["robustness.uncertain={L1=0.1, m2=0.2}", "export.cycle_time=0.01"])
+    setpoints = gp.sample(gp.plan(spec).command, spec.export.cycle_time)
+    axes = [np.linspace(low, high, 17) for low, high in spec.checked_ranges().values()]
+    dense = gp.residual_sways(
+        spec, setpoints, dict(zip(spec.checked_ranges(), map(np.ravel, np.meshgrid(*axes)), strict=True))
+    )
+    found, _ = worst_machines(spec, setpoints, ())
+    names = list(spec.checked_ranges())
+    met = gp.residual_sways(
+        spec, setpoints, {n: np.array([one.parameters[n] for one in found]) for n in names}
+    )
+    assert (met.max(axis=0) >= 0.999 * dense.max(axis=0)).all()
 
 
 @pytest.mark.slow
@@ -236,7 +252,7 @@ def test_a_maximum_on_an_edge_of_four_ranges_is_found():
     ends = {"L1": ranges["L1"][0], "m1": ranges["m1"][1], "m2": ranges["m2"][0]}
     grid = {"L2": ropes, **{name: np.full(len(ropes), end) for name, end in ends.items()}}
     accelerations = np.diff(setpoints.position, 2, axis=0) / setpoints.cycle_time**2
-    expected = swaying(spec, setpoints.times[1:-1], accelerations, grid)
+    (expected,) = swaying(spec, setpoints.times[1:-1], accelerations, grid)
     assert 1.3 < ropes[expected.argmax()] < 1.45
     found, _ = worst_machines(spec, setpoints, ())
     p = {name: np.array([row.parameters[name] for row in found]) for name in shares}

@@ -144,8 +144,8 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
             since=since,
             on_the_way=sway is not None,
         )
-        figures = [(peaks[:, : len(limits)] / limits).max(axis=1)]
-        return np.stack([*figures, peaks[:, -1] / sway] if sway is not None else figures, axis=1)
+        taken = peaks[:, : len(limits)] / limits
+        return np.column_stack([taken, peaks[:, -1] / sway]) if sway is not None else taken
 
     return worst_places(shares, begun, KEPT)
 
