@@ -84,6 +84,7 @@ def design(
     document = outcome.to_dict() | {"certificate": worst and worst.to_dict()}
     print_outcome(document, words.design(outcome, certificates))
     warn(outcome.check)
+    print_warnings(words.alone(outcome))
     if spec.move.shortest:
         print_warnings(words.abrupt(outcome))
     if not outcome.passed:

@@ -62,6 +62,9 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
     if solution is not None:
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time
         solver = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
+        for cost in solution.other_costs or ():
+            times = cost / solution.raise_for_status().cost
+            solver += f"; another start led to {times:.4g} times the cost" if times > 1.001 else ""
     nominal, worst = (mm(figures[f"sway_residual_{which}_m"]) for which in ("peak", "worst"))
     load = outcome.spec.machine().end_load_name
     rows = [
@@ -397,6 +400,16 @@ def _move(spec: Spec) -> str:
     duration = "the shortest time" if spec.move.shortest else f"{spec.move.duration:g} s"
     ranges = (f"{name} ±{100 * fraction:g} %" for name, fraction in spec.robustness.uncertain.items())
     return ", ".join([spec.plant.type, f"{distances} in {duration}", *ranges])
+
+
+def alone(outcome: Design) -> Iterator[str]:
+    """Warn of a motion that was found from one start only, where others may cost less."""
+    solution = outcome.plan.solution
+    if solution is not None and solution.other_costs == ():
+        yield (
+            "The load swings so far that there may be several optimal motions, and one start led to one; "
+            "another may cost less. Allow more time (move.duration) if this one asks for too much."
+        )
 
 
 def abrupt(outcome: Design) -> Iterator[str]:

@@ -135,6 +135,7 @@ class Design(Drawable):
             "hamiltonian_variation": optimum.hamiltonian_variation,
             "redundant": list(solution.redundant),
             "worst_case_bound_m": solution.worst_case_bound,
+            "other_costs": None if solution.other_costs is None else list(solution.other_costs),
         }
 
 

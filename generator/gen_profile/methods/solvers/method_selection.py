@@ -39,6 +39,10 @@ PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
 LEAST = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
 BLEND = 4.0  # order of the norm by which these times and the period count together
 RANGE = 2.0  # times the work for a whole range
+# rad and iterations of the solver, from which on a motion may be one of several optimal ones; limits, which
+# are begun at rest only, leave it at a warning
+FAR, MANY, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
+BETTER = 1.0 - 1e-3  # times the cost of a motion, below which another one is given in its place
 
 
 def attempt(
@@ -67,10 +71,32 @@ def attempt(
     if method == "direct":
         return in_time(directly, DIRECTLY)
     solution = in_time(partial(indirect.solve, problem), SOLVING)
-    if method == "indirect" or keeps_limits(solution) or solution.status is Status.INFEASIBLE:
+    if method == "auto" and not keeps_limits(solution) and solution.status is not Status.INFEASIBLE:
+        other = in_time(directly, DIRECTLY)
+        solution = solution if other.optimum is None and solution.optimum is None else other
+    return solution if method == "indirect" or coarse or near is not None else _compared(problem, solution)
+
+
+def _compared(problem: Problem, solution: Solution) -> Solution:
+    """Where loads swing far, begin once more at another motion, and give the better one."""
+    found = solution.optimum
+    if problem.limits.stated():
+        far = found is not None and found.angle > FAR_WITHIN_LIMITS
+        return attrs.evolve(solution, other_costs=()) if far else solution
+    if found is None and solution.status not in (Status.DIVERGED, Status.SWINGS_TOO_FAR):
         return solution
-    other = in_time(directly, DIRECTLY)
-    return solution if other.optimum is None and solution.optimum is None else other
+    if found is not None and (found.angle < FAR or solution.iterations < MANY):
+        return solution
+    settled = problem
+    if found is not None:  # so that costs compare
+        settled = attrs.evolve(problem, sway_weight=found.sway_weight, sway_scale=found.sway_scale)
+    other = afford(lambda: direct.solve(settled, direct.mirrored(settled)), SOLVING)
+    better = None if other is None else other.optimum
+    if other is None or better is None:
+        return attrs.evolve(solution, other_costs=())
+    if found is None or better.cost < BETTER * found.cost:
+        return attrs.evolve(other, problem=problem, other_costs=() if found is None else (found.cost,))
+    return attrs.evolve(solution, other_costs=(better.cost,))
 
 
 def given_up(problem: Problem) -> Solution:

@@ -104,6 +104,9 @@ class Solution(Summarised):
     worst_case_bound : float or None
         Residual sway of the end load in m below which no motion could bring the worst machine, as far as
         angles are small; None where the worst machine was not what counted.
+    other_costs : tuple of float or None
+        Of the motion to which another start led, where one was tried because loads swing far; empty where it
+        led to none, or was not tried.
     advice : str
         What to change, a sentence; empty on success.
     suggestions : tuple of Suggestion
@@ -118,6 +121,7 @@ class Solution(Summarised):
     residual: float = float("inf")
     redundant: tuple[str, ...] = ()
     worst_case_bound: float | None = None
+    other_costs: tuple[float, ...] | None = None
     advice: str = ""
     suggestions: tuple[Suggestion, ...] = ()
 

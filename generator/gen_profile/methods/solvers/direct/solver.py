@@ -188,7 +188,7 @@ def solve(
         Never raises for a problem that has none: the status says why.
     """
     setup, redundant = set_up(problem, options=options)
-    sway_cost, iterations = resolve_sway_cost(setup.problem)
+    sway_cost, iterations = resolve_sway_cost(setup.problem, near)
     setup, start = begun_at(setup, near)
 
     def attempt(sway_limit: float | None) -> Solution:
@@ -204,6 +204,18 @@ def solve(
     return attrs.evolve(within_sway(problem, attempt), problem=problem, redundant=redundant)
 
 
+def mirrored(problem: Problem) -> ProgramSequence:
+    """Find where to begin in place of rest: the optimum of the linear model, to the other side.
+
+    From rest the programs come to motions that swing little, if there are any; where swings are so great that
+    their periods grow, others that swing farther may cost less, and these are found from there.
+    """
+    setup, _ = set_up(attrs.evolve(problem, limits=LimitsSpec(), worst_case=None))
+    goal = Goal(setup=setup, sway_limit=None)
+    linear = sequence(setup.transcription.rest(), goal, np.inf)
+    return attrs.evolve(linear, iterate=linear.iterate.of_flat(-linear.iterate.flat()))
+
+
 def begun_at(setup: Setup, near: ProgramSequence | None) -> tuple[Setup, Iterate]:
     """Take over a motion with its mesh, if it is one of as many machines; else stand still."""
     if near is not None:
@@ -213,12 +225,12 @@ def begun_at(setup: Setup, near: ProgramSequence | None) -> tuple[Setup, Iterate
     return setup, setup.transcription.rest()
 
 
-def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
+def resolve_sway_cost(problem: Problem, near: ProgramSequence | None = None) -> tuple[SwayCost, int]:
     """Give β and γ their values, and count the iterations that it took."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
         return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
     unweighted = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
-    solution = solve(unweighted)
+    solution = solve(unweighted, near)
     sway = 0.0 if solution.optimum is None else sway_on_the_way(solution)
     if solution.optimum is None or not 0.0 < sway < np.inf:  # a hoist alone swings nothing
         return UNWEIGHTED, solution.iterations

@@ -1,0 +1,49 @@
+"""Moves with several motions of locally least cost: the better one is given, or a warning."""
+
+import pytest
+from command_line import run_here
+
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers.method_selection import attempt
+from gen_profile.methods.solvers.solution import Status
+from gen_profile.spec.reading import preset_spec
+
+MOVE = ["move.distance=[5.0, -9.0]", "move.duration=9.0", "robustness.order=2", "cost.sway_weight=0"]
+KNOWN = 503.0  # cost with a rope of 8 m that collocation by CasADi and IPOPT found; from rest it is 1775
+
+
+def solution_of(*changes):
+    return attempt(problem_of(preset_spec("gantry-crane", [*MOVE, *changes])))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rope", [8.0, 9.0, 11.0])
+def test_the_better_of_two_motions_is_given(rope):
+    found = solution_of(f"plant.L={rope}")
+    assert found.status is Status.CONVERGED
+    assert found.optimum.cost < KNOWN
+    if rope == 8.0:
+        assert found.other_costs == pytest.approx((1775.4,), rel=1e-3)
+    if rope == 9.0:  # from rest none is found
+        assert found.other_costs == ()
+
+
+def test_small_swings_have_one_optimum():
+    assert solution_of("plant.L=5").other_costs is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changes", "out", "err"),
+    [
+        (["plant.L=8"], "another start led to 4.6", None),
+        (["plant.L=9"], None, "one start led to one"),
+        (["plant.L=11", "limits.velocity=5"], None, "one start led to one"),
+    ],
+)
+def test_what_was_tried_is_said(tmp_path, changes, out, err):
+    words = [word for change in (*MOVE, *changes) for word in ("--set", change)]
+    done = run_here("--preset", "gantry-crane", *words, "--no-check", "--export", "csv", "--out", tmp_path)
+    assert done.code == 0
+    assert (out or "") in done.out and ("another start" in done.out) == (out is not None)
+    assert (err or "") in done.err and ("several optimal motions" in done.err) == (err is not None)
