@@ -336,7 +336,7 @@ def test_a_contradiction_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "why"),
     [
-        ([], 2, "Name what to identify"),
+        ([], 2, "Name what to identify: parameters to free (m1, m2, L1, L2, g, c1, c2), or"),
         (["--free", "L9"], 2, "--free L9: unknown parameter"),
         (["--free", "L1", "--period", "3:1±0.1"], 2, "the machine has 2 modes, found mode 3"),
         (["--free", "L1", "--period", "1±0.1", "--at", "1,2"], 2, "one position per axis (1), found 2"),

@@ -344,7 +344,7 @@ def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], ask
     beyond = [one.mode for one in readings if isinstance(one, Period) and one.mode > modes]
     faults += [f"period: the machine has {modes} modes, found mode {mode}." for mode in beyond]
     if not asked:
-        what = "parameters to free, or a direct reading, NAME=VALUE±UNCERTAINTY"
+        what = f"parameters to free ({', '.join(known)}), or a direct reading, NAME=VALUE±UNCERTAINTY"
         faults.append(f"Name what to identify: {what}.")
     if faults:
         raise SpecError(*faults)
