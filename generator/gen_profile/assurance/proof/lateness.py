@@ -68,7 +68,8 @@ class Promptness:
         within = f"{self.factor:g} times the quickest and {PLANNING:g} s"
         number, one = self.latest
         worst = f"the latest: {_sentence((number, one))[3:]}"
-        return f"{found} {('takes' if late == 1 else 'take') + ' more than' if late else 'within'} {within}; {worst}"
+        take = f"take{'s' * (late == 1)} more than" if late else "within"
+        return f"{found} {take} {within}; {worst}"
 
     def table(self) -> list[dict[str, Any]]:
         """Give plain values by kind of command, for JSON: shares that are late, and times by the quickest."""
@@ -104,13 +105,12 @@ class Promptness:
         }
 
 
-def _sentence(one: tuple[int, Obeyed]) -> str:
-    number, command = one
+def _sentence(numbered: tuple[int, Obeyed]) -> str:
+    number, command = numbered
     how = "possible" if command.possible is not None else "possible by the closed form"
-    return (
-        f"In history {number}, one of the {KINDS[command.kind]} ({command.state}) takes {command.takes:.3g} s "
-        f"at {command.begin:.2f} s, where {command.quickest:.3g} s are {how}"
-    )
+    one = f"one of the {KINDS[command.kind]} ({command.state}) takes {command.takes:.3g} s"
+    possible = f"where {command.quickest:.3g} s are {how}"
+    return f"In history {number}, {one} at {command.begin:.2f} s, {possible}"
 
 
 def chosen(commands: Sequence[Obeyed], seed: int) -> list[int]:
