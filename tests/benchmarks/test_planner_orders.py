@@ -4,6 +4,7 @@ Times from the command on, planning included, and ways, as ratios: stops and new
 moments, and sticks from rest to a speed.
 """
 
+import os
 from collections import defaultdict
 
 import numpy as np
@@ -18,7 +19,7 @@ from gen_profile.methods.quickest.motion import AxisGoal, AxisState, Promise, mo
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import preset_spec
 
-STATES, LITTLE = 60, 0.02
+STATES, LITTLE = int(os.environ.get("ORDERS", "60")), 0.02
 PAPER = (
     "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
     "planner.live={L1=[0.3, 0.6]}",
@@ -74,11 +75,11 @@ class Axis:
         pieces = round(time / self.promise.piece)
         return time, motion(self.promise, state, goal, pieces, shortest=True)[2, -1]
 
-    def moves(self, random, sticks):
+    def moves(self, random):
         """Move in some way for a while; whether it goes then."""
         low, high = self.spec.limits.of(0).travel
         while_ = random.uniform(0.2, 2.5) * self.period
-        if random.integers(2) or not sticks:
+        if random.integers(2):
             self.hold(while_, bExecute=1.0, fTarget=random.uniform(low, high))
         else:
             self.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
@@ -92,21 +93,22 @@ def _rests(issued, cycle):
     return cycle * (moving[-1] + 1), issued["fPosition"][-1]
 
 
-def _orders(axis, random, sticks):
+def _orders(axis, random):
     """Give an order at a random moment: by name the ratios of its time and way."""
     limits, period = axis.spec.limits.of(0), axis.period
     speed = limits.velocity * random.choice([0.2, 1.0])
     state = axis.state()
-    if sticks and abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
+    if abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
         axis.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
         starts = axis.hold(3.0 * period, fVelocityCommand=speed)
         soonest = axis.soonest(state, AxisGoal(speed=speed))
-        if soonest and starts["bInVelocity"].any():
-            reached = np.argmax(starts["bInVelocity"] > 0.0) * axis.cycle
+        has = starts["bInVelocity" if "bInVelocity" in starts else "bSteady"]
+        if soonest and has.any():
+            reached = np.argmax(has > 0.0) * axis.cycle
             yield f"stick to {speed / limits.velocity:.0%}", reached / soonest[0], 1.0
         axis.hold(6.0 * period, bVelocity=0.0, bStop=1.0)
         axis.hold(0.0, bStop=0.0)
-    if not axis.moves(random, sticks):
+    if not axis.moves(random):
         return
     state = axis.state()
     if random.integers(2):
@@ -136,11 +138,11 @@ def test_orders_at_random_moments(name, block):
     preset, changes = MACHINES[name]
     spec = preset_spec(preset, list(changes))
     random, found = np.random.default_rng(26), defaultdict(list)
-    text = planner_block(spec).text if block == "today" else played_text(spec)  # that one takes no sticks yet
+    text = planner_block(spec).text if block == "today" else played_text(spec)
     histories, compiled = Histories.of(spec), compile_counting(text)
     for _ in range(STATES):
         axis = Axis(spec, histories, compiled, random)
-        for order, *ratios in _orders(axis, random, sticks=block == "today"):
+        for order, *ratios in _orders(axis, random):
             found[order].append(ratios)
     for order, ratios in sorted(found.items()):
         times, ways = np.transpose(ratios)

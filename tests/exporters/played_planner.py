@@ -5,15 +5,18 @@ from gen_profile_exporters.planner.blocks.texts import Sizes, operations, planne
 
 ISSUED = {
     "fPosition": "LREAL", "fVelocity": "LREAL", "fAcceleration": "LREAL", "bMoving": "BOOL", "bLeads": "BOOL",
-    "nAhead": "DINT", "fEnd": "LREAL", "nProgrammes": "DINT", "nFailed": "DINT", "nUnfinished": "DINT",
+    "bReady": "BOOL", "bSteady": "BOOL", "fTimeToGo": "LREAL", "fSwayLeft": "LREAL", "bPromise": "BOOL",
+    "fStopLow": "LREAL", "fStopHigh": "LREAL", "bVoid": "BOOL", "nAhead": "DINT", "fEnd": "LREAL", "nProgrammes": "DINT", "nFailed": "DINT", "nUnfinished": "DINT",
     "nIterations": "DINT", "nSpent": "DINT",
 }  # fmt: skip
 
 
 def played_text(spec, sizes=None):
-    """The planner's blocks, and one that takes commands by today's names: bStop, or an edge of bExecute."""
+    """The planner's blocks, and one that takes commands by today's names: bStop, bVelocity, or an edge of bExecute."""
     _, constants = planner_constants(spec)
     sizes = sizes or Sizes()
+    (axis,) = constants.axes
+    low, high = axis.travel
     lives = "".join(
         f"f{name} : LREAL := {value!r}; "
         for name, value in zip(constants.live, constants.nominal, strict=True)
@@ -27,6 +30,7 @@ FUNCTION_BLOCK Played
 VAR_INPUT
     bEnable : BOOL; bExecute : BOOL; fTarget : LREAL; bStop : BOOL;
     bVelocity : BOOL; fVelocityCommand : LREAL;
+    bPrompt : BOOL; rOverride : LREAL := 1.0; fLowest : LREAL := {low!r}; fHighest : LREAL := {high!r};
     fActPosition : LREAL; {lives}
 END_VAR
 VAR_OUTPUT
@@ -46,6 +50,10 @@ nBefore := nCommand;
 bNew := FALSE;
 IF bStop THEN
     nCommand := 1;
+    IF bPrompt THEN nCommand := 4; END_IF;
+ELSIF bVelocity THEN
+    nCommand := 3;
+    fGoal := fVelocityCommand;
 ELSIF bExecute AND NOT bWas THEN
     nCommand := 2;
     fGoal := fTarget;
@@ -53,8 +61,9 @@ ELSIF bExecute AND NOT bWas THEN
 END_IF;
 bWas := bExecute;
 bNew := bNew OR (nCommand <> nBefore);
-planner(bBegin := bBegin, fBeginAt := fActPosition, nOperations := {operations(constants)},
-    nCommand := nCommand, fGoal := fGoal, bNew := bNew, aLive := aLive);
+planner(bBegin := bBegin, bForget := TRUE, fBeginAt := fActPosition, nOperations := {operations(constants)},
+    nCommand := nCommand, fGoal := fGoal, bNew := bNew, fLimit := rOverride * {axis.velocity!r},
+    fLowest := fLowest, fHighest := fHighest, aLive := aLive);
 {given}
 END_FUNCTION_BLOCK
 """

@@ -87,18 +87,23 @@ class History:
 
 
 def random_commands(history, random, count):
-    """Give commands at random moments; the last one, a target or none where it is a stop."""
+    """Give commands at random moments; the last one, a target or none where it is a stop or a speed."""
     period = 2.0 * np.pi / 1.8
     low, high = history.limits.travel
     for _ in range(count):
         while_ = random.uniform(0.05, 3.0) * period
-        if random.random() < 0.3:
+        kind = random.random()
+        if kind < 0.2:
             target = None
-            history.hold(while_, bStop=1.0)
+            history.hold(while_, bStop=1.0, bVelocity=0.0)
             history.hold(2 * history.cycle, bStop=0.0)
+        elif kind < 0.5:
+            target = None
+            speed = float(history.limits.velocity * random.choice([-1.0, 1.0, random.uniform(-1.0, 1.0)]))
+            history.hold(while_, bVelocity=1.0, fVelocityCommand=speed)
         else:
             target = float(random.choice([low, high, random.uniform(low, high), random.uniform(low, high)]))
-            history.hold(while_, bExecute=1.0, fTarget=target, bStop=0.0)
+            history.hold(while_, bExecute=1.0, fTarget=target, bVelocity=0.0)
     return target
 
 
@@ -107,7 +112,7 @@ def test_random_commands_are_obeyed_within_limits_and_promise(spec, compiled, se
     random = np.random.default_rng([71, seed])
     history = History(spec, compiled, random)
     target = random_commands(history, random, 8)
-    last = history.hold(40.0, bStop=1.0) if target is None else history.hold(100.0)
+    last = history.hold(40.0, bStop=1.0, bVelocity=0.0) if target is None else history.hold(100.0)
     assert last["fVelocity"][-1] == 0.0 and last["bMoving"][-1] == 0.0
     if target is not None:
         assert last["fPosition"][-1] == pytest.approx(target, abs=1e-9)

@@ -10,7 +10,7 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.planner.blocks.texts import Sizes, planner
 
 SLOTS = 64  # of the longest programme
-SIZES = Sizes(watched=(-1.0, -0.5, 0.5, 1.0), shown=(-1.0, 1.0))
+SIZES = Sizes(watched=(-1.0, -0.5, 0.5, 1.0))
 SWINGS = 10
 
 
@@ -27,7 +27,7 @@ def spec():
 @pytest.fixture(scope="module")
 def modes(spec):
     """What the block of modes gives at live parameters: cycles of a slot, and turns, fades and gains."""
-    arrays = ("aTurnRe", "aTurnIm", "aFade", "aGain")
+    arrays = ("aTurnRe", "aTurnIm", "aFade", "aGain", "aTickRe", "aTickIm")
     own = "\n".join(f"{name} : ARRAY [0..{SWINGS - 1}] OF LREAL;" for name in arrays)
     block = BlockInstance(f"""{blocks_before_planner(spec)}
 FUNCTION_BLOCK Called
@@ -45,7 +45,7 @@ END_FUNCTION_BLOCK
     def given(rope, load):
         issued = block.call(np.array([[rope, load, start] for start in [1.0] + SWINGS * [0.0]]))
         assert issued[-2, 0] == 1.0 and issued[-1, 0] == 0.0
-        return int(issued[-1, 1]), *issued[-1, 2:].reshape(4, SWINGS)
+        return int(issued[-1, 1]), *issued[-1, 2:].reshape(6, SWINGS)
 
     return given
 
@@ -58,13 +58,15 @@ def test_modes_are_those_of_the_linearised_machine(spec, modes, rope, load):
     decays = fitted.interpolant(point)[2:4]
     errors, sways = np.split(fitted.others(point), [2])
     assert np.all(fitted.others(point) > 0.999 * left_by_errors(spec, point))
-    cycles, real, imaginary, fade, gain = modes(rope, load)
+    cycles, real, imaginary, fade, gain, tick_real, tick_imaginary = modes(rope, load)
     slot = cycles * spec.export.cycle_time
     assert abs(slot * rates[0] * 20 / (2 * np.pi) - 1.0) < 0.03
     for machine, share in enumerate((0.0, *SIZES.watched)):
         omega = rates * (1.0 + share * errors)
         at = slice(2 * machine, 2 * machine + 2)
         assert np.allclose(real[at] + 1j * imaginary[at], np.exp(1j * omega * slot), rtol=0, atol=1e-9)
+        tick = tick_real[at] + 1j * tick_imaginary[at]
+        assert np.allclose(tick, np.exp(1j * omega * spec.export.cycle_time), rtol=0, atol=1e-12)
         assert np.allclose(fade[at], np.exp(-decays * slot), rtol=0, atol=1e-9)
         # the sway of one coefficient by an integral over its spline
         at_times = (np.arange(3000) + 0.5) / 1000.0
@@ -78,88 +80,151 @@ def test_modes_are_those_of_the_linearised_machine(spec, modes, rope, load):
             assert gain[2 * machine + mode] == pytest.approx(sways[mode] * abs(wave), rel=1e-5)
 
 
-ORDERS = {"nOrder": "DINT", "fTaken": "LREAL", "nSlots": "DINT", "nMet": "DINT", "nGap": "DINT"}
+ORDERS = {
+    "nOrder": "DINT", "fTaken": "LREAL", "nBefore": "DINT", "nSlots": "DINT", "nMet": "DINT", "nGap": "DINT",
+    "fAfter": "LREAL", "fPart": "LREAL", "bWeighs": "BOOL",
+}  # fmt: skip
+ROWS, PLAN = 13, 2 * SLOTS + 4
 
 
-@pytest.fixture(scope="module")
-def account(spec):
-    """An account of ten swings whose turns, fades and gains are given, called with an order and a plan."""
-    arrays = {
-        "aTurnRe": SWINGS,
-        "aTurnIm": SWINGS,
-        "aFade": SWINGS,
-        "aGain": SWINGS,
-        "aBound": SWINGS,
-        "aPlan": SLOTS,
-    }
-    rows = 13 * SLOTS
-    given = "\n".join(f"g{name} : ARRAY [0..{size - 1}] OF LREAL;" for name, size in arrays.items())
-    own = "\n".join(f"{name} : ARRAY [0..{size - 1}] OF LREAL;" for name, size in arrays.items())
-    copies = "\n".join(
-        f"FOR i := 0 TO {size - 1} DO {name}[i] := g{name}[i]; END_FOR;" for name, size in arrays.items()
-    )
-    orders = "\n".join(f"{name} : {type_};" for name, type_ in ORDERS.items())
-    handed = ", ".join(f"{name} := {name}" for name in (*ORDERS, *arrays, "aShown", "aRow", "aValue"))
-    return BlockInstance(f"""{blocks_before_planner(spec)}
+class Account:
+    """An account of ten swings whose turns, fades and gains are given, called with an order and a trial."""
+
+    def __init__(self, spec, machine):
+        arrays = dict.fromkeys(("aTurnRe", "aTurnIm", "aTickRe", "aTickIm", "aFade", "aGain", "aBound"), SWINGS)
+        arrays["aTrial"] = PLAN
+        given = "\n".join(f"g{name} : ARRAY [0..{size - 1}] OF LREAL;" for name, size in arrays.items())
+        own = "\n".join(f"{name} : ARRAY [0..{size - 1}] OF LREAL;" for name, size in arrays.items())
+        copies = "\n".join(
+            f"FOR i := 0 TO {size - 1} DO {name}[i] := g{name}[i]; END_FOR;" for name, size in arrays.items()
+        )
+        orders = "\n".join(f"{name} : {type_};" for name, type_ in ORDERS.items())
+        handed = ", ".join(f"{name} := {name}" for name in (*ORDERS, *arrays, "aRow", "aValue", "aRadius"))
+        self.machine = machine
+        self.block = BlockInstance(f"""{blocks_before_planner(spec)}
 FUNCTION_BLOCK Called
 VAR_INPUT {orders} {given} END_VAR
 VAR_OUTPUT
-    bBusy : BOOL; fWorst : LREAL; nSpent : DINT; aLevel : ARRAY [0..{SWINGS - 1}] OF LREAL;
-    aValue : ARRAY [0..12] OF LREAL; aRow : ARRAY [0..{rows - 1}] OF LREAL;
+    bBusy : BOOL; fWorst : LREAL; fLeft : LREAL; nSpent : DINT;
+    aRadius : ARRAY [0..5] OF LREAL; aValue : ARRAY [0..{ROWS - 1}] OF LREAL;
+    aRow : ARRAY [0..{ROWS * SLOTS - 1}] OF LREAL;
 END_VAR
-VAR account : bay_crane_account; i : DINT; {own} aShown : ARRAY [0..5] OF DINT := [0, 1, 2, 3, 8, 9]; END_VAR
+VAR account : bay_crane_account; i : DINT; {own} END_VAR
 {copies}
-account(nOperations := 700, fUnit := 2.0, {handed});
+account(nOperations := 900, fUnit := 2.0, {handed});
 bBusy := account.bBusy;
 fWorst := account.fWorst;
+fLeft := account.fLeft;
 nSpent := account.nSpent;
-FOR i := 0 TO {SWINGS - 1} DO aLevel[i] := account.aLevel[i]; END_FOR;
 END_FUNCTION_BLOCK
 """)
 
-
-def test_the_account_sums_up_what_was_taken_and_what_is_planned(account):
-    draw = np.random.default_rng(5)
-    phases, fades = draw.uniform(0.1, 1.5, SWINGS), draw.uniform(0.98, 1.0, SWINGS)
-    gains, bounds = draw.uniform(0.5, 2.0, SWINGS), draw.uniform(0.1, 0.3, SWINGS)
-    machine = np.concatenate([np.cos(phases), np.sin(phases), fades, gains, bounds])
-
-    def call(order, taken=0.0, slots=0, plan=()):
-        places = np.r_[np.cumsum(plan), np.zeros(SLOTS - len(plan))]
-        row = np.r_[order, taken, slots, 2, 1, machine, places]
+    def call(self, order, trial=(), **given):
+        """Worst share, what is left, radii, values and rows, when it is done."""
+        orders = [order, *(given.get(name, 0.0) for name in list(ORDERS)[1:])]
+        row = np.r_[orders, self.machine, trial, np.zeros(PLAN - len(trial))]
         for _ in range(100):
-            found = account.call(row[None])[0]
-            assert found[2] <= 700
-            if not found[0]:
-                return found
+            busy, worst, left, spent, *arrays = self.block.call(row[None])[0]
+            assert spent <= (900 if order in (2, 3) else 100 * SWINGS)
+            if not busy:
+                radii, values, rows = np.split(np.array(arrays), [6, 6 + ROWS])
+                return worst, left, radii, values, rows.reshape(ROWS, SLOTS)
         raise AssertionError("never done")
 
+
+@pytest.fixture(scope="module")
+def swings():
+    """Turns in a slot, and the share of a cycle, fades, gains and bounds."""
+    draw = np.random.default_rng(5)
+    phases, fades = draw.uniform(0.1, 1.5, SWINGS), draw.uniform(0.98, 1.0, SWINGS)
+    return phases, 0.1, fades, draw.uniform(0.5, 2.0, SWINGS), draw.uniform(0.1, 0.3, SWINGS)
+
+
+@pytest.fixture
+def account(spec, swings):
+    phases, share, fades, gains, bounds = swings
+    waves = [f(part * phases) for part in (1.0, share) for f in (np.cos, np.sin)]
+    return Account(spec, np.concatenate([*waves, fades, gains, bounds]))
+
+
+def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings):
+    phases, _, fades, gains, bounds = swings
+    draw = np.random.default_rng(6)
     taken = draw.uniform(-1, 1, 300)
-    call(5)
+    account.call(5)
     for coefficient in taken:
-        call(1, taken=coefficient)
+        account.call(1, fTaken=coefficient)
     t = len(taken)
-    units = np.exp(1j * np.outer(phases, np.arange(1, t + 21)))
-    ages = t - np.arange(1, t + 1)
-    past = (units[:, :t] * fades[:, None] ** ages) @ taken
-    found = call(2, slots=20)
-    rows, values = found[3 + SWINGS + 13 :].reshape(13, SLOTS)[:, :20], found[3 + SWINGS : 3 + SWINGS + 13]
+    units = np.exp(1j * np.outer(phases, np.arange(1, t + 61)))
+    past = (units[:, :t] * fades[:, None] ** (t - np.arange(1, t + 1))) @ taken
+    ahead = units[:, t:] / fades[:, None] ** np.arange(1, 61)
+    # rows behind five coefficients of a trial
+    trial = draw.uniform(-1.0, 1.0, 25)
+    _, _, radii, values, rows = account.call(2, trial, nBefore=5, nSlots=20, nMet=2, nGap=1, fPart=0.7)
     shown, at = [0, 1, 2, 3, 8, 9], [0, 2, 5, 7, 9, 11]  # a row is left out behind the first two
-    ahead = units[:, t:] / fades[:, None] ** np.arange(1, 21)
     for swing, row in zip(shown, at, strict=True):
-        assert np.allclose(rows[row] + 1j * rows[row + 1], ahead[swing], rtol=0, atol=1e-11)
-        assert values[row] + 1j * values[row + 1] == pytest.approx(-past[swing] / 2.0, abs=1e-11)
-    assert np.allclose(found[3 : 3 + SWINGS], bounds / gains / 2.0)
-    plan = draw.uniform(-0.5, 0.5, 20)
-    ends = np.abs(past + ahead @ (2.0 * plan))
-    worst = call(3, slots=20, plan=plan)[1]
-    assert worst == pytest.approx(np.max(ends * gains / bounds), rel=1e-11)
-    call(4)
-    call(3, slots=20, plan=0.1 * plan)  # another one that is weighed changes nothing
-    call(6)
-    assert np.allclose(call(2, slots=20)[3 : 3 + SWINGS], np.maximum(ends, bounds / gains) / 2.0)
-    call(1, taken=2.0 * plan[0])  # what is committed stays as it is, but that it fades
-    assert np.allclose(call(2, slots=20)[3 : 3 + SWINGS], np.maximum(fades * ends, bounds / gains) / 2.0)
-    assert call(3, slots=19, plan=plan[1:])[1] == pytest.approx(
-        np.max(fades * ends / np.maximum(fades * ends, bounds / gains)), rel=1e-10
-    )
+        assert np.allclose(rows[row, :20] + 1j * rows[row + 1, :20], ahead[swing, 5:25], rtol=0, atol=1e-11)
+        known = past[swing] + ahead[swing, :5] @ trial[:5]
+        assert values[row] + 1j * values[row + 1] == pytest.approx(-known / 2.0, abs=1e-11)
+    levels = bounds / gains
+    assert np.allclose(radii[:4], 0.7 * np.cos(np.pi / 12) * levels[[2, 3, 8, 9]] / 2.0)
+    # plans: weighed, another one that is weighed changes nothing, committed, and what is taken of it
+    sums = past + ahead[:, :25] @ trial
+    assert account.call(3, trial, nSlots=25)[0] == pytest.approx(np.max(np.abs(sums) / levels), rel=1e-10)
+    account.call(4)
+    account.call(3, 0.1 * trial, nSlots=25)
+    account.call(6)
+    for number in range(3):
+        left = account.call(1, fTaken=trial[number])[1]
+        assert left == pytest.approx(_most(gains, fades ** (number + 1) * sums), rel=1e-10)
+    # a coefficient more before what is committed: all that is to come turns by a slot
+    known = past * fades**3 + (units[:, t : t + 3] * fades[:, None] ** np.arange(2, -1, -1)) @ trial[:3]
+    ahead = units[:, t + 3 :] / fades[:, None] ** np.arange(1, 58)
+    more = known + ahead[:, :23] @ np.r_[0.4, trial[3:]]
+    levels = np.maximum(bounds / gains, np.abs(fades**3 * sums))
+    assert account.call(7, fTaken=0.4)[0] == pytest.approx(np.max(np.abs(more) / levels), rel=1e-10)
+    half = 0.5 * more + 0.5 * fades**3 * sums
+    assert account.call(8, fPart=0.5)[0] == pytest.approx(np.max(np.abs(half) / levels), rel=1e-10)
+
+
+def _most(gains, sums):
+    """Sway of the machine that is left with the most, its two modes added."""
+    return (gains * np.abs(sums)).reshape(-1, 2).sum(axis=1).max()
+
+
+def test_behind_a_ramp_values_tell_what_swings_about_the_steady_motion(account, swings):
+    phases, _, fades, *_ = swings
+    trial = np.random.default_rng(7).uniform(-1.0, 1.0, 12)
+    account.call(5)
+    account.call(1)
+    _, _, _, values, rows = account.call(2, nSlots=12, nMet=2, nGap=1, fAfter=0.8, fPart=1.0)
+    swing, row = 3, 7
+    left = (rows[row, :12] + 1j * rows[row + 1, :12]) @ trial - 2.0 * (values[row] + 1j * values[row + 1])
+    # kept for 4000 slots at 0.8: the swing itself is what differs from one slot to the next less what turns with the drive
+    many = np.r_[trial, np.full(4000, 0.8)]
+    turn = np.exp(1j * phases[swing])
+    state, states = 0.0, []
+    for coefficient in many:  # in the frame that stands
+        state = fades[swing] / turn * state + coefficient
+        states.append(state)
+    steady = 0.8 / (1.0 - fades[swing] / turn)
+    swung = (states[30] - steady) * (turn / fades[swing]) ** 31 * turn  # turned back to the beginning
+    assert left == pytest.approx(swung, rel=1e-6)
+
+
+def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
+    """The same sums as if slots had been shorter until then: a plan weighed later is worth what swings then."""
+    phases, share, fades, gains, bounds = swings
+    first, plan = np.array([0.6, -0.2, 0.5]), np.array([0.3, 0.9, -0.4, 0.1])
+    account.call(5)
+    for coefficient in (*first, 0.0):
+        account.call(1, fTaken=coefficient)
+    account.call(10)
+    account.call(3, plan, nSlots=4)
+    account.call(4)
+    for _ in range(7):
+        worst = account.call(9, fPart=share, bWeighs=1.0)[0]
+    units = np.exp(1j * np.outer(phases, np.r_[1.0, 2.0, 3.0, 4.0 + 7 * share + np.arange(4)]))
+    past = (units[:, :3] * fades[:, None] ** np.r_[3.0, 2.0, 1.0]) @ first
+    ends = past * (1.0 - (1.0 - fades) * share) ** 7 + (units[:, 3:] / fades[:, None] ** np.arange(1, 5)) @ plan
+    assert worst == pytest.approx(np.max(np.abs(ends) * gains / bounds), rel=1e-6)

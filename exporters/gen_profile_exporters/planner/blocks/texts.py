@@ -31,16 +31,21 @@ class Sizes:
     ----------
     watched : tuple of float
         Machines that are watched: shares of the stated errors.
-    shown : tuple of float
-        Those of them that every programme has rows of.
+    more : int
+        Swings that a programme has rows of, besides those of the machine as given, the first and the last
+        one: those nearest to their bounds.
     """
 
     watched: tuple[float, ...] = (-1.0, 1.0)
-    shown: tuple[float, ...] = (-1.0, 1.0)
+    more: int = 0
+
+    def shown(self, modes: int) -> int:
+        """Swings that a programme has rows of."""
+        return 3 * modes + self.more
 
     def rows(self, modes: int) -> int:
         """Rows of a programme: those of the swings, and a target's way."""
-        return 2 * modes * (1 + len(self.shown)) + 1
+        return 2 * self.shown(modes) + 1
 
 
 def linear_programme(name: str, *, slots: int, rows: int) -> str:
@@ -86,29 +91,31 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
     modes, swings = constants.modes, constants.modes * (1 + len(sizes.watched))
     name = constants.name.replace("-", "_")
     names = {part: f"{name}_{part}" for part in ("linear_programme", "account", "modes", "planner")}
-    shown = [
-        *range(modes),
-        *(modes * (1 + sizes.watched.index(e)) + m for e in sizes.shown for m in range(modes)),
-    ]
+    ends = [*range(2 * modes), *range(swings - modes, swings)]
+    shown = [*ends, *sizes.more * [2 * modes]]
     rows, slots = sizes.rows(modes), longest(constants)
-    bounds = [constants.sway_share * share for share in _shares(constants)]
+    plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
+    share = constants.sway_share / len(constants.axes)
+    bounds = [share * part for part in _shares(constants)]
     lengths = {
         "live": max(1, len(constants.live)), "swing": swings, "shown": len(shown), "slot": slots,
         "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
         "power": max(1, len(constants.live)) * constants.degrees, "model": len(constants.model),
-        "future": slots + 4,
+        "future": plan + 4, "plan": plan,
     }  # fmt: skip
     values = {
         **names,
         **{f"last_{array}": length - 1 for array, length in lengths.items()},
         "swings": swings,
         "shown": len(shown),
+        "mode_count": modes,
         "slots": slots,
+        "polygon": literal(float(np.cos(np.pi / SIDES))),
         "bounds": initialiser([literal(float(v)) for v in np.tile(bounds, 1 + len(sizes.watched))]),
         "shown_swings": initialiser([str(v) for v in shown]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, sizes)),
-        "planner_constants": constant_lines(_of_motion(constants, len(shown), slots)),
+        "planner_constants": constant_lines(_of_motion(constants, swings, sizes, slots, plan)),
     }
     return "\n".join(
         [
@@ -155,20 +162,21 @@ def _of_modes(c: PlannerConstants, sizes: Sizes) -> dict[str, object]:
     }
 
 
-def _of_motion(c: PlannerConstants, shown: int, slots: int) -> dict[str, object]:
-    (axis,) = c.axes
+def _of_motion(c: PlannerConstants, swings: int, sizes: Sizes, slots: int, plan: int) -> dict[str, object]:
+    rows = sizes.rows(c.modes)
     return {
         "cModes": c.modes,
-        "cShown": shown,
+        "cShown": sizes.shown(c.modes),
         "cSlots": slots,
-        "cFuture": slots + 4,
-        "cReserve": 100 + 8 * slots,  # operations where a plan was found
-        "cVelocity": axis.velocity,
-        "cChange": axis.acceleration / axis.velocity,
-        "cCurve": axis.jerk / axis.velocity,
-        "cTravelLow": axis.travel[0],
-        "cTravelHigh": axis.travel[1],
-        "cPolygon": float(np.cos(np.pi / SIDES)),
+        "cPlan": plan,
+        "cFuture": plan + 4,
+        "cOwnWork": 80 + (50 * swings),  # operations of every cycle
+        "cReserve": 150 + 11 * plan + 30 * swings,  # operations where a plan was found
+        "cSlotWork": 650 + rows * (rows + 10),  # operations of an iteration, for each slot
+        "cVelocity": [axis.velocity for axis in c.axes],
+        "cAcceleration": [axis.acceleration for axis in c.axes],
+        "cJerk": [axis.jerk for axis in c.axes],
+        "cSwayLimit": c.sway_limit / len(c.axes),
     }
 
 
