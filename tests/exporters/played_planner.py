@@ -6,13 +6,15 @@ from gen_profile_exporters.planner.blocks.texts import Sizes, operations, planne
 ISSUED = {
     "fPosition": "LREAL", "fVelocity": "LREAL", "fAcceleration": "LREAL", "bMoving": "BOOL", "bLeads": "BOOL",
     "bReady": "BOOL", "bSteady": "BOOL", "fTimeToGo": "LREAL", "fSwayLeft": "LREAL", "bPromise": "BOOL",
-    "fStopLow": "LREAL", "fStopHigh": "LREAL", "bVoid": "BOOL", "nAhead": "DINT", "fEnd": "LREAL", "nProgrammes": "DINT", "nFailed": "DINT", "nUnfinished": "DINT",
+    "fStopLow": "LREAL",
+    "fStopHigh": "LREAL", "bVoid": "BOOL", "nAhead": "DINT", "fEnd": "LREAL",
+    "nProgrammes": "DINT", "nFailed": "DINT", "nUnfinished": "DINT",
     "nIterations": "DINT", "nSpent": "DINT",
 }  # fmt: skip
 
 
 def played_text(spec, sizes=None):
-    """The planner's blocks, and one that takes commands by today's names: bStop, bVelocity, or an edge of bExecute."""
+    """The planner's blocks, and one that takes commands by the names that today's block has."""
     _, constants = planner_constants(spec)
     sizes = sizes or Sizes()
     (axis,) = constants.axes

@@ -143,6 +143,37 @@ def test_a_stop_ends_sooner_than_the_committed_motion_and_a_target_that_is_reach
     assert stays["bLeads"][-1] == 1.0
 
 
+def test_a_speed_is_kept_until_the_stick_is_let_go_and_a_far_target_is_corrected_at_speed(spec, compiled):
+    """The speed stays as it is while the swing behind the ramp turns against the decline."""
+    random = np.random.default_rng(9)
+    history = History(spec, compiled, random)
+    low, high = history.limits.travel
+    target = low + 0.05 * (high - low) if history.place > (low + high) / 2 else high - 0.05 * (high - low)
+    away = np.sign(target - history.place)
+    history.hold(100.0, bExecute=1.0, fTarget=(low if away > 0 else high))
+    speed = 0.5 * away * history.limits.velocity
+    kept = history.hold(0.35 * (high - low) / abs(speed), bVelocity=1.0, fVelocityCommand=speed)
+    has = np.argmax(kept["bSteady"] > 0)
+    assert has > 0
+    assert np.allclose(kept["fVelocity"][has:], speed, rtol=0, atol=0.0026 * history.limits.velocity)
+    stop = history.hold(60.0, bVelocity=0.0, bStop=1.0)
+    assert abs(stop["fVelocity"][-1]) == 0.0
+    end = history.place = stop["fPosition"][-1]
+    whole = history.hold(
+        history.cycle + 0.4 * abs(target - end) / history.limits.velocity,
+        bStop=0.0,
+        bExecute=1.0,
+        fTarget=target,
+    )
+    slowest = np.abs(whole["fVelocity"][-1])
+    corrected = history.hold(100.0, bExecute=1.0, fTarget=target - 0.02 * away * (high - low))
+    near = np.abs(corrected["fPosition"] - (target - 0.02 * away * (high - low)))
+    far_off = near > 0.25 * abs(target - end)
+    assert np.abs(corrected["fVelocity"][far_off]).min() > 0.5 * slowest
+    assert near[-1] < 1e-9
+    history.keeps()
+
+
 @pytest.mark.slow
 def test_the_interpreter_issues_the_same_bits():
     spec = preset_spec("paper", list(PAPER))

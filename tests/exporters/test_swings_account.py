@@ -82,7 +82,7 @@ def test_modes_are_those_of_the_linearised_machine(spec, modes, rope, load):
 
 ORDERS = {
     "nOrder": "DINT", "fTaken": "LREAL", "nBefore": "DINT", "nSlots": "DINT", "nMet": "DINT", "nGap": "DINT",
-    "fAfter": "LREAL", "fPart": "LREAL", "bWeighs": "BOOL",
+    "fAfter": "LREAL", "fPart": "LREAL", "bWeighs": "BOOL", "bAnySlot": "BOOL",
 }  # fmt: skip
 ROWS, PLAN = 13, 2 * SLOTS + 4
 
@@ -91,7 +91,9 @@ class Account:
     """An account of ten swings whose turns, fades and gains are given, called with an order and a trial."""
 
     def __init__(self, spec, machine):
-        arrays = dict.fromkeys(("aTurnRe", "aTurnIm", "aTickRe", "aTickIm", "aFade", "aGain", "aBound"), SWINGS)
+        arrays = dict.fromkeys(
+            ("aTurnRe", "aTurnIm", "aTickRe", "aTickIm", "aFade", "aGain", "aBound"), SWINGS
+        )
         arrays["aTrial"] = PLAN
         given = "\n".join(f"g{name} : ARRAY [0..{size - 1}] OF LREAL;" for name, size in arrays.items())
         own = "\n".join(f"{name} : ARRAY [0..{size - 1}] OF LREAL;" for name, size in arrays.items())
@@ -200,7 +202,7 @@ def test_behind_a_ramp_values_tell_what_swings_about_the_steady_motion(account, 
     _, _, _, values, rows = account.call(2, nSlots=12, nMet=2, nGap=1, fAfter=0.8, fPart=1.0)
     swing, row = 3, 7
     left = (rows[row, :12] + 1j * rows[row + 1, :12]) @ trial - 2.0 * (values[row] + 1j * values[row + 1])
-    # kept for 4000 slots at 0.8: the swing itself is what differs from one slot to the next less what turns with the drive
+    # kept for 4000 slots at 0.8: the swing is what differs from the steady motion
     many = np.r_[trial, np.full(4000, 0.8)]
     turn = np.exp(1j * phases[swing])
     state, states = 0.0, []
@@ -212,8 +214,44 @@ def test_behind_a_ramp_values_tell_what_swings_about_the_steady_motion(account, 
     assert left == pytest.approx(swung, rel=1e-6)
 
 
+def test_a_decline_in_any_slot_keeps_what_the_motion_before_it_leaves(account, swings):
+    """However long the steady speed is kept, rows and radii bound what both leave."""
+    phases, _, fades, gains, bounds = swings
+    draw = np.random.default_rng(8)
+    trial = 0.004 * draw.uniform(-1.0, 1.0, 6)
+    account.call(5)
+    account.call(1)
+    _, _, radii, values, rows = account.call(
+        2, trial, nBefore=6, nSlots=9, fAfter=0.006, fPart=1.0, bAnySlot=1.0
+    )
+    assert np.all(radii > 0.0)
+    decline = 0.006 * draw.uniform(0.0, 1.0, 9)
+    for item, swing in enumerate((0, 1, 2, 3, 8, 9)):
+        turn = np.exp(1j * phases[swing]) / fades[swing]
+        own = (rows[2 * item, :9] + 1j * rows[2 * item + 1, :9]) @ decline
+        own -= 2.0 * (values[2 * item] + 1j * values[2 * item + 1])
+        kept = bounds[swing] / gains[swing] - 2.0 * radii[item] / np.cos(
+            np.pi / 12
+        )  # what turns with no slot
+        for slots in (0, 7, 40):
+            whole = np.r_[trial, np.full(slots, 0.006), decline]
+            end = np.exp(1j * phases[swing]) * np.sum(whole * turn ** np.arange(1, len(whole) + 1))
+            assert end == pytest.approx(
+                kept_at(account, swing, trial, 0.006, swings) + own * turn**slots, rel=1e-9
+            )
+        assert abs(kept_at(account, swing, trial, 0.006, swings)) == pytest.approx(kept, rel=1e-9)
+
+
+def kept_at(account, swing, trial, speed, swings):
+    """What swings about a steady speed behind a trial, from the values of its rows."""
+    row = 2 * (0, 1, 2, 3, 8, 9).index(swing)
+    _, _, _, values, rows = account.call(2, nSlots=len(trial), fAfter=speed, fPart=1.0)
+    left = (rows[row, : len(trial)] + 1j * rows[row + 1, : len(trial)]) @ trial
+    return left - 2.0 * (values[row] + 1j * values[row + 1])
+
+
 def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
-    """The same sums as if slots had been shorter until then: a plan weighed later is worth what swings then."""
+    """The same sums as if slots had been shorter until then: a plan is weighed as swings are then."""
     phases, share, fades, gains, bounds = swings
     first, plan = np.array([0.6, -0.2, 0.5]), np.array([0.3, 0.9, -0.4, 0.1])
     account.call(5)
@@ -226,5 +264,7 @@ def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
         worst = account.call(9, fPart=share, bWeighs=1.0)[0]
     units = np.exp(1j * np.outer(phases, np.r_[1.0, 2.0, 3.0, 4.0 + 7 * share + np.arange(4)]))
     past = (units[:, :3] * fades[:, None] ** np.r_[3.0, 2.0, 1.0]) @ first
-    ends = past * (1.0 - (1.0 - fades) * share) ** 7 + (units[:, 3:] / fades[:, None] ** np.arange(1, 5)) @ plan
+    ends = (
+        past * (1.0 - (1.0 - fades) * share) ** 7 + (units[:, 3:] / fades[:, None] ** np.arange(1, 5)) @ plan
+    )
     assert worst == pytest.approx(np.max(np.abs(ends) * gains / bounds), rel=1e-6)
