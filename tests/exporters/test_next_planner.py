@@ -119,9 +119,8 @@ def test_random_commands_are_obeyed_within_limits_and_promise(spec, compiled, se
     history.keeps()
     nominal, ends, worst = history.left()
     limit = min(spec.check.residual_sway.values())
-    share = spec.planner.sway_share * limit
-    assert nominal <= 0.02 * share  # which the sums of sampled velocities add
-    assert ends <= 1.02 * share
+    assert nominal <= 0.02 * spec.planner.sway_share * limit  # which the sums of sampled velocities add
+    assert ends <= 0.82 * limit  # that stops may leave
     assert worst <= limit  # the machines between the ends are not watched yet
 
 

@@ -19,6 +19,7 @@ LONGEST, FEWEST = (
     40,
 )  # slots of the longest programme, where there are operations for it, and where there are few
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
+STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave; the rest is for machines between
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
 
@@ -176,6 +177,7 @@ def _of_motion(c: PlannerConstants, swings: int, sizes: Sizes, slots: int, plan:
         "cVelocity": [axis.velocity for axis in c.axes],
         "cAcceleration": [axis.acceleration for axis in c.axes],
         "cJerk": [axis.jerk for axis in c.axes],
+        "cStopShare": max(1.0, STOP_SHARE * c.sway_limit / c.sway_share) if c.sway_share else 1.0,
         "cSwayLimit": c.sway_limit / len(c.axes),
     }
 
