@@ -74,8 +74,7 @@ def test_an_axis_that_moves_is_braked_from_where_it_is_within_the_limits(text, s
     assert issued["fTimeToGo"][0] > 0.5 and np.all(np.diff(issued["fTimeToGo"]) <= 0.0)
     assert x[-1] == pytest.approx(max(issued["fStopHigh"][0] if speed > 0 else issued["fStopLow"][0], -99.0))
     assert issued["nPromise"][-1] == 2.0
-    assert led.now(bLoadAtRest=1)["nPromise"] == 3.0  # the motion begins anew
-    assert led.hold(0.2)["nPromise"][-1] == 0.0
+    assert led.now(bLoadAtRest=1)["nPromise"] == 0.0
 
 
 @pytest.mark.parametrize("spike", [0.3, -4.0, 1e3, -1e9, math.nan])
@@ -146,15 +145,17 @@ class TestLiveParameters:
 
     def test_standing_others_are_taken_over_and_on_the_way_the_promise_goes(self, text):
         led = Led(text)
-        assert set(led.hold(0.3, fL1=7.0)["nPromise"]) == {0.0, 3.0}
-        led.hold(3.0, bExecute=1, fTarget=14.0)
-        assert led.hold(0.1, fL1=7.1)["nPromise"][-1] == 1.0
+        assert led.hold(0.3, fL1=7.0)["nPromise"].max() == 0.0
+        assert led.hold(3.0, bExecute=1, fTarget=14.0)["nPromise"].max() == 0.0
+        assert led.hold(0.1, fL1=7.1)["nPromise"].max() == 0.0
+        assert led.hold(0.5, fL1=7.0)["nPromise"].max() == 0.0
+        assert led.hold(0.3, fL1=7.1)["nPromise"][-1] == 1.0
         assert led.hold(10.0, fL1=7.0)["nPromise"][-1] == 1.0
         assert led.hold(0.3, bExecute=0, bLoadAtRest=1)["nPromise"][-1] == 0.0
 
     def test_a_hoist_that_goes_on_does_not_put_off_a_motion(self, text):
         led = Led(text)
-        for cycle in range(200):
+        for cycle in range(300):
             shown = led.now(fL1=6.0 + 0.01 * cycle, bExecute=1, fTarget=14.0)
         assert shown["fVelocity"] > 0.0 and shown["nPromise"] == 1.0
 
@@ -196,6 +197,23 @@ class TestZones:
             assert v[(x > 14.0 + 1e-9) & (x < 16.0 - 1e-9)].max() == pytest.approx(0.2)
             assert v.max() > 0.7 and (x.max() >= 20.0 if end == 20.0 else x.min() <= 10.0)
             led.hold(0.0, bVelocity=0)
+
+    def test_a_target_is_refused_by_an_interval_before_its_range_and_while_held_too(self, text):
+        led = Led(text)
+        led.hold(0.1, **{"aBlockedLow[0]": 15.0, "aBlockedHigh[0]": 16.0})
+        assert led.now(bExecute=1, fTarget=99.0)["nErrorId"] == 8.0
+        led.hold(0.1, bExecute=0, rOverride=0.0)
+        assert led.now(bExecute=1, fTarget=20.0)["nErrorId"] == 8.0
+        led.hold(0.1, bExecute=0, rOverride=1.0)
+        led.hold(3.0, bExecute=1, fTarget=14.0)  # and a motion stops for it
+        led.hold(0.0, bExecute=0)
+        assert led.hold(3.0, bExecute=1, fTarget=20.0)["fVelocity"][-1] == 0.0
+
+    def test_an_axis_beyond_its_travel_comes_back_and_goes_no_farther(self, text):
+        led = Led(text)
+        led.hold(0.1, bEnable=0, fActPosition=-0.5)
+        issued = led.hold(9.0, bEnable=1, bExecute=1, fTarget=2.0)
+        assert issued["bDone"][-1] == 1.0 and issued["fPosition"].min() == -0.5
 
     def test_what_is_no_number_holds_the_last_good_ones_and_is_error_5(self, text):
         led = Led(text)
