@@ -64,7 +64,7 @@ def test_one_file_answers_as_the_folder_does_and_gives_the_profile_out(library, 
     for one, other in zip(due["artefacts"], nearest["artefacts"], strict=True):
         assert Path(other["path"]).parent == tmp_path / "out"
         assert Path(other["path"]).read_bytes() == Path(one["path"]).read_bytes()
-    assert check_artefact(nearest["artefacts"][0]["path"]).manifest == "matches"
+    assert check_artefact(Path(nearest["artefacts"][0]["path"])).manifest == "matches"
 
 
 @pytest.mark.parametrize("length", [0.305, 0.31])

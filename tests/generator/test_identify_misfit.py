@@ -54,7 +54,7 @@ def test_a_rope_far_from_the_spec_s_is_found(lasts):
     exact = swing(true, times, [0.012, -0.01, 0.0, 0.004], (8.0,), "double-pendulum-crane")
     rates = np.gradient(exact, times) + np.random.default_rng(0).normal(0.0, 1e-3, len(times))
     log = SwingLog(times=times, values=rates, quantity="rate", load="hook")
-    found = identify(spec, [log, parse_reading("L1=6.0±0.01")], "L2").estimate
+    found = identify(spec, [log, parse_reading("L1=6.0±0.01")], ["L2"]).estimate
     assert inside(found, true) and found.half_range["L2"] < 0.1
 
 
@@ -65,7 +65,7 @@ def test_swings_that_are_not_small_are_fitted_as_such_where_small_ones_mislead()
     exact = swing(spec.plant.parameters, times, [0.2, 0.2, 0.0, 0.0], (8.0,), "double-pendulum-crane")
     noise = np.random.default_rng(0).normal(0.0, 1e-3, len(times))
     log = SwingLog(times=times, values=exact + noise, quantity="angle", load="hook")
-    found = identify(spec, log, ["L1", "L2"]).estimate
+    found = identify(spec, [log], ["L1", "L2"]).estimate
     assert inside(found, spec.plant.parameters) and found.half_range["L2"] < 0.1
 
 
@@ -159,7 +159,7 @@ def test_nothing_is_drawn_where_a_log_has_a_gap():
     logged = (TIMES < 5.0) | (TIMES > 7.0)
     values = (swing(HOIST.nominal(), TIMES, [0.1, 0.0]) + NOISE)[logged]
     log = SwingLog(times=TIMES[logged], values=values, quantity="angle", load="payload")
-    figure = identification_figure(identify(preset_spec("single-pendulum-crane"), log, "L0", (0.0, 4.0)))
+    figure = identification_figure(identify(preset_spec("single-pendulum-crane"), [log], ["L0"], (0.0, 4.0)))
     for line in [line for panel in figure.panels[:2] for line in panel.lines]:
         assert [5.0 < at < 7.0 for at in line.x[np.isnan(line.y)]] == [True]
 
@@ -201,4 +201,4 @@ def test_a_log_that_nothing_explains_is_said_to_be_of_another_machine():
     foreign = log_of(0.05 * np.cos(3.1 * TIMES) + 0.012 * np.cos(5.3 * TIMES + 1.0) + 0.1 * NOISE)
     expected = r"^The log of payload is not of this machine: a swing of .* which no parameter explains; look"
     with pytest.raises(InfeasibleProblem, match=expected):
-        identify(preset_spec("single-pendulum-crane"), foreign, "L0", (0.0, 4.0))
+        identify(preset_spec("single-pendulum-crane"), [foreign], ["L0"], (0.0, 4.0))

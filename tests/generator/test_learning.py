@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from gen_profile.assurance.verification.from_python import cosimulate
+from gen_profile.api.cosimulation import cosimulate
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile, SampledProfile, sample
 from gen_profile.spec.reading import HERE, parse_spec, preset_spec, preset_text, read_spec

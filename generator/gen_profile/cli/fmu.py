@@ -51,15 +51,17 @@ def fmu(
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
     spec = chosen.spec()
     from gen_profile.delivery.designs.fmu import export_fmu, platform_names
+    from gen_profile_fmu.description.fmu_files import Version
     from gen_profile_fmu.model.contents import AUTHOR
+    from gen_profile_fmu.model.plant_variables import InputKind
 
     platforms = () if source_only else platform_names(platform or "host")
     with progress() as tell:
         made = export_fmu(
             spec,
             kind,
-            version=version,
-            input_kind=input_name or "setpoint",
+            version=Version(version),
+            input_kind=InputKind(input_name or "setpoint"),
             platforms=platforms,
             path=path,
             author=author or AUTHOR,

@@ -14,8 +14,9 @@ from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
 from gen_profile.planner.interface import SENSOR, BlockAxis, live_inputs, sensed_axes
+from gen_profile.spec.arguments import as_numbers, as_values
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_numbers, as_spec, as_values
+from gen_profile.spec.reading import as_spec
 from gen_profile.support.errors import SpecError
 from gen_profile.support.suggestion import found, suggestion
 from gen_profile.support.summary import Sampled, Summarised

@@ -3,23 +3,22 @@
 import copy
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib.resources import files
-from numbers import Real
 from pathlib import Path, PureWindowsPath
 from typing import Any, TypeVar
 
+from gen_profile.spec.arguments import as_names, as_path, as_text
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.spec.tables import Table, structure
 from gen_profile.support.bounded_file import DOCUMENT, is_folder, read_bounded
 from gen_profile.support.errors import OutputError, SpecError, UnknownProgram
 from gen_profile.support.private_folder import is_agreed
-from gen_profile.support.suggestion import DASHES, found, listed, meant, number_meant, suggestion
+from gen_profile.support.suggestion import DASHES, listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
-Given = TypeVar("Given")
 HERE = Path()
 PROGRAMS = (("plant", "file"), ("check", "fmu"))  # keys that name code, which runs
 MOST_PARTS = 32  # of a key: its parser takes time and memory by their square
@@ -69,48 +68,6 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
 def as_spec(spec: Spec | Path | str) -> Spec:
     """Take a spec as it is, or read the file that is named; raises as `read_spec`."""
     return spec if isinstance(spec, Spec) else read_spec(spec)
-
-
-def as_path(path: Path | str, what: str = "A path") -> Path:
-    """Take a path; raises SpecError where it is none."""
-    if not isinstance(path, Path | str):
-        raise SpecError(f"{what} is expected, found {path!r}.")
-    return Path(path)
-
-
-def as_names(names: Sequence[str] | str) -> Sequence[str]:
-    """Take names as they are, or a single one, whose letters are no names; raises SpecError likewise."""
-    if not isinstance(names, Iterable):
-        raise SpecError(f"A name, or a list of names, is expected, found {names!r}.")
-    return (names,) if isinstance(names, str) else [as_text(name, "A name") for name in names]
-
-
-def as_text(text: str, what: str) -> str:
-    """Take a text; raises SpecError where it is none."""
-    if not isinstance(text, str):
-        raise SpecError(f"{what} is expected, found {found(text)}.")
-    return text
-
-
-def as_number(number: float, what: str) -> float:
-    """Take a number of any kind; raises SpecError where it is none, or a truth value."""
-    if not isinstance(number, Real) or isinstance(number, bool):
-        raise SpecError(f"{what}: must be a number, found {found(number)}.")
-    return float(number)
-
-
-def as_values(values: Mapping[str, Given], what: str) -> Mapping[str, Given]:
-    """Take values by name; raises SpecError likewise."""
-    if not isinstance(values, Mapping):
-        raise SpecError(f"{what}: give values by name, such as {{'L1': 6.0}}, found {values!r}.")
-    return values
-
-
-def as_numbers(numbers: Sequence[float], what: str) -> list[float]:
-    """Take numbers, one by one; raises SpecError likewise."""
-    if isinstance(numbers, str) or not isinstance(numbers, Iterable):
-        raise SpecError(f"{what}: must be a list of numbers, found {found(numbers)}.")
-    return [as_number(number, what) for number in numbers]
 
 
 def read_text(path: Path) -> str:

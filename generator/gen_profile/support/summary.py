@@ -1,15 +1,15 @@
 """Results as a line in a terminal, as a small table and a picture in a notebook, and as a table of pandas."""
 
-from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
-from importlib import import_module
 from typing import Any
 
 import attrs
 
 from gen_profile.support.errors import OutputError
 from gen_profile.support.plugins import require_installed
+
+drawers: list[Callable[["Drawable"], str]] = []  # from above: each gives the address of an image
 
 
 class Summarised:
@@ -52,14 +52,16 @@ class Drawable(Summarised):
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        """Add an image, since ids of inline SVGs may meet in one page; none without Matplotlib."""
+        """Add an image where something draws; none without Matplotlib."""
         table = super()._repr_html_()
         try:
-            picture = import_module("gen_profile.presentation.charts.plot").plot(self)  # above this layer
+            sources = [drawer(self) for drawer in drawers]
         except OutputError:
             return table
-        source = f"data:image/svg+xml;base64,{b64encode(picture.svg.encode()).decode()}"
-        return f'{table}<img style="max-width: 100%" alt="{escape(repr(self))}" src="{source}">'
+        images = (
+            f'<img style="max-width: 100%" alt="{escape(repr(self))}" src="{source}">' for source in sources
+        )
+        return f"{table}{''.join(images)}"
 
 
 class Tabled:

@@ -22,12 +22,10 @@ from gen_profile.assurance.verification.check import spec_and_manifest
 from gen_profile.assurance.verification.plausibility import another_move
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_path
 from gen_profile.support.artefacts.manifest import sha256
 from gen_profile.support.artefacts.reading import read_artefact, read_motion, require_companions
 from gen_profile.support.artefacts.writing import deliver, require_place
 from gen_profile.support.errors import CertificateError
-from gen_profile.support.progress import require_progress
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
@@ -44,41 +42,17 @@ class _Artefact:
 
 
 def certify_artefact(
-    path: Path | str, spec: Spec | Path | str | None = None, *, progress: Progress = lambda _, __: None
+    path: Path, spec: Spec | None = None, *, progress: Progress = lambda _, __: None
 ) -> Certificate:
     """Prove that no machine of a spec's ranges sways more than a bound after a file's motion.
-
-    docs/certificate.md states what is proved. A certificate is written beside the file where every limit is
-    proved to be kept: its name with ``.certificate.json``.
-
-    Parameters
-    ----------
-    path : Path or str
-        Any artefact of a motion.
-    spec : Spec, or the path of one, optional
-        Taken from ``manifest.json`` beside the file when not given.
-    progress : callable
-        Told how many boxes of machines are done, and of how many so far.
-
-    Returns
-    -------
-    Certificate
-        Of what could be proved; `Certificate.proved` tells whether that is all.
 
     Raises
     ------
     CertificateError
         No proof is written for this machine, or what the spec asks; or setpoints break limits of the axes.
     OutputError, ExportError, SpecError, CosimulationError
-        As of `gen_profile.check_artefact`.
-
-    Examples
-    --------
-    >>> gp.certify_artefact("deploy/paper.csv").proved  # what gp.design wrote
-    True
     """
-    require_progress(progress)
-    artefact = _read(as_path(path), spec)
+    artefact = _read(path, spec)
     require_place(certificate_path(artefact.path))  # before there is a proof to lose
     asked = asked_of_axes(artefact.spec, artefact.setpoints)
     certificate = _certificate(artefact, asked, attempt(artefact.spec, artefact.setpoints, progress))
@@ -88,40 +62,22 @@ def certify_artefact(
 
 
 def check_certificate(
-    path: Path | str,
-    certificate: Path | str,
-    spec: Spec | Path | str | None = None,
+    path: Path,
+    certificate: Path,
+    spec: Spec | None = None,
     *,
     progress: Progress = lambda _, __: None,
 ) -> Certificate:
     """Prove again what a certificate says of a file, with nothing solved and nothing believed of it.
-
-    Parameters
-    ----------
-    path : Path or str
-        The artefact.
-    certificate : Path or str
-    spec : Spec, or the path of one, optional
-        Taken from ``manifest.json`` beside the file when not given.
-    progress : callable
-        Told how many boxes of machines are done, and of how many.
 
     Raises
     ------
     CertificateError
         It is damaged, is about something else, or proves less than it says.
     OutputError, ExportError, SpecError
-        As of `gen_profile.check_artefact`.
-
-    Examples
-    --------
-    >>> _ = gp.certify_artefact("deploy/paper.csv")
-    >>> gp.check_certificate("deploy/paper.csv", "deploy/paper.csv.certificate.json").proved
-    True
     """
-    require_progress(progress)
-    artefact = _read(as_path(path), spec)
-    claimed = parse(read_artefact(as_path(certificate)))
+    artefact = _read(path, spec)
+    claimed = parse(read_artefact(certificate))
     theorem = _require_about(claimed, artefact)
     stated = np.array([sway.bound for sway in claimed.sways])
     bounds, largest_met, done = np.zeros(len(stated)), np.zeros(len(stated)), 0
@@ -165,7 +121,7 @@ def _bound_again(
     return len(boxes), theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(targets)
 
 
-def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
+def _read(path: Path, spec: Spec | None) -> _Artefact:
     content = read_motion(path)
     spec, manifest, digest = spec_and_manifest(path, content, spec)
     require_companions(manifest, path, content)

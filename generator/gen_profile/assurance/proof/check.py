@@ -17,7 +17,6 @@ from gen_profile.planner.forms import block_in, refuse_program, refuse_wrapper
 from gen_profile.planner.interface import SENSOR, block_axes, live_inputs, sensed_axes
 from gen_profile.planner.stated import unstated_limits
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_path
 from gen_profile.support.artefacts.manifest import PLANNER, Manifest
 from gen_profile.support.artefacts.reading import companions_of, read_artefact, strays
 from gen_profile.support.errors import ExportError, OutputError, SpecError
@@ -76,7 +75,7 @@ def is_planner_block(path: Path) -> bool:
 
 
 def check_block(
-    path: Path | str,
+    path: Path,
     spec: Spec | None = None,
     *,
     histories: int | None = None,
@@ -88,7 +87,7 @@ def check_block(
 
     Parameters
     ----------
-    path : Path or str
+    path : Path
         A planner block.
     spec : Spec, optional
         Taken from ``manifest.json`` beside the file when not given.
@@ -111,7 +110,6 @@ def check_block(
         It is no planner block that can be executed.
     CosimulationError
     """
-    path = as_path(path)
     content = read_artefact(path)
     spec, manifest, digest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)

@@ -22,12 +22,12 @@ from gen_profile.dynamics.evaluation.scenarios import Scenario, further_scenario
 from gen_profile.dynamics.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec, received_spec
+from gen_profile.spec.reading import received_spec
 from gen_profile.spec.values import require_whole
 from gen_profile.support.artefacts.manifest import FILENAME, Manifest, seal_of, sha256
 from gen_profile.support.artefacts.reading import companions_of, manifest_beside, read_motion, strays
 from gen_profile.support.errors import CosimulationError, ExportError, OutputError, SpecError
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import finite_number, number_meant, suggestion
 from gen_profile.support.summary import Drawable
 from gen_profile_exporters.exporter import target_of
@@ -157,35 +157,20 @@ class Judgement(Drawable, JudgedFile):
 
 
 def check_artefact(
-    path: Path | str,
-    spec: Spec | Path | str | None = None,
+    path: Path,
+    spec: Spec | None = None,
     *,
     samples: int | None = None,
     row: int | None = None,
     strict: bool = False,
-    scale: Sequence[str] | str = (),
-    mirror: Sequence[str] | str = (),
-    offset: Sequence[str] | str = (),
+    scale: Sequence[str] = (),
+    mirror: Sequence[str] = (),
+    offset: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Judgement:
     """Replay a file, co-simulate it, and compare it with its manifest.
 
-    Parameters
-    ----------
-    path : Path or str
-        Any artefact that the exporters write; its suffix names its format.
-    spec : Spec, or the path of one, optional
-        Taken from ``manifest.json`` beside the file when not given.
-    samples : int, optional
-        Draws in place of those that the spec asks for.
-    row : int, optional
-        Number of the only scenario to try.
-    strict : bool
-        Whether faults in the timing of setpoints count as well.
-    scale, mirror, offset : sequences of str, or str
-        A variant to judge, see `gen_profile.assurance.verification.check.varied`.
-    progress : callable
-        Told of a compilation, and how many scenarios beyond the machines are done, and of how many.
+    The spec is the manifest's where none is given; a variant of the motion is one as `varied` makes it.
 
     Raises
     ------
@@ -196,21 +181,14 @@ def check_artefact(
     ExportError
         The file is damaged.
     CosimulationError
-
-    Examples
-    --------
-    >>> gp.check_artefact("deploy/paper.csv").passed  # what gp.design wrote
-    True
     """
-    require_progress(progress)
-    path = as_path(path)
     content, format_ = read_motion(path), format_of(path)
     spec, manifest, digest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     agreement, companions = provenance(manifest, content, digest), companions_of(manifest, path, content)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
-    asked, played, variant = varied(spec, setpoints, *map(as_names, (scale, mirror, offset)))
+    asked, played, variant = varied(spec, setpoints, scale, mirror, offset)
     try:
         rows, searched = _rows(asked, played, row, progress)
         check = _verdict(asked, played, rows, progress)
@@ -332,7 +310,7 @@ def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:
 
 
 def spec_and_manifest(
-    path: Path, content: bytes, spec: Spec | Path | str | None, *, planner: bool = False
+    path: Path, content: bytes, spec: Spec | None, *, planner: bool = False
 ) -> tuple[Spec, Manifest | None, str]:
     """Take a spec that was named, or else the one in the manifest beside a file.
 
@@ -340,7 +318,7 @@ def spec_and_manifest(
     ----------
     path : Path
     content : bytes
-    spec : Spec, or the path of one, or None
+    spec : Spec or None
     planner : bool
         Whether the file is a planner block.
 
@@ -358,7 +336,6 @@ def spec_and_manifest(
     OutputError
         No spec was named, and no manifest is of this file.
     """
-    spec = None if spec is None else as_spec(spec)
     try:
         manifest = manifest_beside(path, content, planner=planner)
     except OutputError as error:

@@ -24,7 +24,6 @@ from gen_profile.methods.solvers.draft import Plan
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.support.artefacts.manifest import (
     FILENAME,
     Artefact,
@@ -34,7 +33,7 @@ from gen_profile.support.artefacts.manifest import (
 )
 from gen_profile.support.artefacts.writing import Kept, Staging, staged
 from gen_profile.support.errors import SpecError
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.summary import Drawable
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
@@ -146,9 +145,9 @@ def file_entry(folder: Path, artefact: Artefact) -> dict[str, Any]:
 
 
 def design(
-    spec: Spec | Path | str,
-    formats: Sequence[str] | str,
-    folder: Path | str,
+    spec: Spec,
+    formats: Sequence[str],
+    folder: Path,
     *,
     check: bool = True,
     keep_failed: bool = False,
@@ -156,33 +155,12 @@ def design(
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
 
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    formats : sequence of str, or str
-        Names known to the exporters' registry.
-    folder : Path or str
-        Made if needed; files of the same names are replaced, others left alone.
-    check : bool
-        Without it the manifest says ``"unverified"``.
-    keep_failed : bool
-        Deliver even what failed, marked so in the manifest.
-    progress : callable
-        Told what is being done.
-
     Raises
     ------
     GenProfileError
         Nothing was written.
-
-    Examples
-    --------
-    >>> gp.design(gp.preset_spec("paper"), "csv", "deploy").passed
-    True
     """
-    require_progress(progress)
-    spec, folder = as_spec(spec), as_path(folder)
-    formats, place = as_names(formats), staged(folder)
+    place = staged(folder)
     return _designed(spec, formats, folder, place, check=check, keep_failed=keep_failed, progress=progress)
 
 

@@ -1,9 +1,8 @@
 """From a spec to an FMU of its plant, motion or planner, of the plant with either, or to a system of FMUs."""
 
-from collections.abc import Mapping, Sequence
-from enum import Enum
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -14,11 +13,10 @@ from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.directions import planned_axes
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec
 from gen_profile.support.artefacts.manifest import sha256
 from gen_profile.support.artefacts.writing import deliver
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import suggestion
 from gen_profile_exporters.planner.c_source import c_name
 from gen_profile_fmu.building.build import build_fmu
@@ -32,7 +30,6 @@ from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
 KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
-Kind = TypeVar("Kind", bound=Enum)
 LEADERS = {"ssp": "profile", "planned-ssp": "planner"}  # of systems of two FMUs: what the plant follows
 
 
@@ -71,58 +68,31 @@ class Export:
 
 
 def export_fmu(
-    spec: Spec | Path | str,
-    kind: str = "plant",
-    path: Path | str | None = None,
+    spec: Spec,
+    kind: str,
+    path: Path | None,
     *,
-    version: Version | str = Version.FMI2,
-    input_kind: InputKind | str = InputKind.SETPOINT,
-    platforms: Sequence[str] | str | None = None,
+    version: Version,
+    input_kind: InputKind,
+    platforms: tuple[str, ...],
     author: str = AUTHOR,
     progress: Progress = no_progress,
 ) -> Export:
-    """Write an FMU, or a system of two.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    kind : str
-        One of `KINDS`.
-    path : Path or str, optional
-        Named after the spec in the working folder if not given.
-    version : Version or str
-        ``"2"`` or ``"3"``.
-    input_kind : InputKind or str
-        What a plant's drives are asked for: ``"setpoint"``, ``"acceleration"`` or ``"velocity"``.
-    platforms : sequence of str, or str, optional
-        Names of `PLATFORMS`, none for sources only; this computer's by default.
-    author : str
-        Who made the model.
-    progress : callable
-        Told what is being done.
+    """Write an FMU, or a system of two, for platforms by their names; named after the spec without a path.
 
     Raises
     ------
     GenProfileError
-        Nothing was written: a choice or the file's suffix is wrong, or there is no such motion.
-
-    Examples
-    --------
-    >>> gp.export_fmu(gp.preset_spec("paper"), "plant", "crane.fmu").path.name
-    'crane.fmu'
+        Nothing was written: the kind, a platform or the file's suffix is wrong, or there is no such motion.
     """
-    require_progress(progress)
-    spec = as_spec(spec)
     if kind not in KINDS:
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
     systems = {"ssp": spec.ascii_name, "planned-ssp": f"{spec.ascii_name} planned"}
     identifier = c_name(systems.get(kind, f"{spec.ascii_name} {kind}"))
     suffix = ".ssp" if kind in LEADERS else ".fmu"
-    path = as_path(path or f"{identifier}{suffix}")
+    path = path or Path(f"{identifier}{suffix}")
     if path.suffix.lower() != suffix:
         raise OutputError(f"out {path}: name a file that ends in {suffix}, as other tools ask for.")
-    version, input_kind = _one_of(Version, version, "version"), _one_of(InputKind, input_kind, "input_kind")
-    platforms = platform_names("host") if platforms is None else tuple(as_names(platforms))
     for platform in platforms:
         if platform not in PLATFORMS:
             raise SpecError(f"platforms: unknown platform {platform!r}{suggestion(platform, PLATFORMS)}")
@@ -140,15 +110,6 @@ def export_fmu(
         content = built(_model(spec, kind, input_kind, progress))
     deliver(path, content)
     return Export(path=path, content=content, identifier=identifier, version=version, platforms=platforms)
-
-
-def _one_of(kinds: type[Kind], value: Kind | str, place: str) -> Kind:
-    """Take a member of an enumeration as it is, or by its value."""
-    known = {str(member.value): member for member in kinds}
-    found = value if isinstance(value, kinds) else known.get(str(value))
-    if found is None:
-        raise SpecError(f"{place}: unknown value {value!r}{suggestion(str(value), known)}")
-    return found
 
 
 def platform_names(choice: str) -> tuple[str, ...]:

@@ -16,12 +16,10 @@ from gen_profile.planner.forms import block_files, block_in, is_program
 from gen_profile.planner.full_speed import slow_axes
 from gen_profile.planner.margins import Margins, sensor_margins
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec, as_text
-from gen_profile.spec.values import require_whole
 from gen_profile.support.artefacts.manifest import PLANNER, Artefact, artefact_of
 from gen_profile.support.artefacts.writing import staged
 from gen_profile.support.errors import Suggestion
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.summary import Drawable
 
 
@@ -84,9 +82,9 @@ class Deployment(Drawable):
 
 
 def deploy_planner(
-    spec: Spec | Path | str,
-    formats: Sequence[str] | str,
-    folder: Path | str,
+    spec: Spec,
+    formats: Sequence[str],
+    folder: Path,
     *,
     histories: int = HISTORIES,
     check: bool = True,
@@ -96,43 +94,14 @@ def deploy_planner(
 ) -> Deployment:
     """Write a planner block, prove what was written, and deliver what passes.
 
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    formats : sequence of str, or str
-        Names of formats that carry function blocks, or C. All hold the same program; one is executed.
-    folder : Path or str
-        Made if needed; files of the same names are replaced, others are left alone.
-    histories : int
-        Of commands, that it is proved on; fewer than 200 are a trial.
-    check : bool
-        Without it the manifest says ``"unverified"``.
-    keep_failed : bool
-        Deliver even what failed, marked so in the manifest. Otherwise changes are looked for that pass.
-    scheduler : str, optional
-        Address of a Dask scheduler, whose workers run the histories.
-    progress : callable
-        Told what is being done.
-
     Raises
     ------
     GenProfileError
         Nothing was written.
-
-    Examples
-    --------
-    >>> gp.deploy_planner(gp.preset_spec("bay-crane"), "plc", "block", histories=10).proof.passed
-    True
     """
-    require_progress(progress)
-    spec = as_spec(spec)
-    if scheduler is not None:
-        as_text(scheduler, "scheduler: an address")
-    require_whole(histories, 1, "histories")
-    folder = as_path(folder)
     progress("finding the modes over the live ranges")
     block = planner_block(spec)
-    files = block_files(block, spec, as_names(formats))
+    files = block_files(block, spec, formats)
     with staged(folder) as staging:
         written = {file.filename: staging.write(file.filename, file.content) for file in files}
         text = _executed(block, written)

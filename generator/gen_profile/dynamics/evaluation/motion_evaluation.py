@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
 
 import attrs
 import numpy as np
@@ -23,9 +22,8 @@ from gen_profile.motion.metrics import (
     peak,
     root_mean_square,
 )
-from gen_profile.motion.profile import Array, Profile, require_motion
+from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec
 from gen_profile.support.errors import InfeasibleProblem, SpecError, rounded_down
 from gen_profile.support.summary import Summarised
 
@@ -127,30 +125,16 @@ class MotionEvaluation(Summarised):
         return tuple(Sway(times=times, sway=sway) for swing in simulations for sway in swing.sway(times))
 
 
-def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
+def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     """Integrate every machine of a spec under a motion of its axes.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    motion : Profile
 
     Raises
     ------
     SpecError
-        It is no motion, or has not the machine's axes.
+        The motion has not the machine's axes.
     InfeasibleProblem
         It goes on to where the machine cannot be.
-
-    Examples
-    --------
-    >>> spec = gp.preset_spec("paper")
-    >>> evaluation = gp.evaluate(spec, gp.plan(spec).motion)
-    >>> round(1e3 * evaluation.figures["sway_residual_worst_m"], 3)  # mm
-    1.955
     """
-    spec = as_spec(spec)
-    require_motion(motion)
     plant, until = spec.machine(), _watched_until(spec, motion)
     named = [machine.parameters for machine in scenarios(spec)]
     swing = PlantSimulation(plant, motion, named, until, spec.move.initial)

@@ -1,6 +1,5 @@
 """A plant's small oscillations about rest: q̈_u = −stiffness q_u − damping q̇_u + input q̈_a."""
 
-import math
 from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache
 
@@ -13,9 +12,7 @@ from gen_profile.dynamics.problem.dynamics import dynamics, parameter_rows
 from gen_profile.dynamics.problem.symbolic import Function
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.reading import as_number, as_numbers, as_values
-from gen_profile.support.errors import InfeasibleProblem, SpecError
-from gen_profile.support.suggestion import found
+from gen_profile.support.errors import InfeasibleProblem
 
 SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
 
@@ -70,39 +67,14 @@ class Linearization:
 def linearize(
     plant: Plant, parameters: Mapping[str, float], q_a: Sequence[float] | None = None
 ) -> Linearization:
-    """Linearise a plant at rest, where q_u = 0.
-
-    Parameters
-    ----------
-    plant : Plant
-    parameters : mapping of str to float
-        Value of every parameter.
-    q_a : (m,) sequence of float, optional
-        Where the axes stand; 0 by default.
+    """Linearise a plant of these parameters at rest, where q_u = 0 and the axes stand at q_a, 0 by default.
 
     Raises
     ------
-    SpecError
-        A parameter is missing, or no finite number; or there is not a place of each axis.
     InfeasibleProblem
         A mode has no restoring force, so the machine has no natural frequency to speak of.
-
-    Examples
-    --------
-    >>> spec = gp.preset_spec("paper")
-    >>> gp.linearize(spec.machine(), spec.plant.parameters).frequencies.round(2)  # rad/s
-    array([3.64, 9.02])
     """
-    if not isinstance(plant, Plant):
-        raise SpecError(f"A machine is expected, such as spec.machine() gives, found {found(plant)}.")
-    parameters = as_values(parameters, "parameters")
-    for name in (parameter.name for parameter in plant.parameters):
-        if not math.isfinite(as_number(parameters.get(name, math.nan), f"parameters: {name}")):
-            raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")
-    axes = [0.0] * len(plant.actuated) if q_a is None else as_numbers(q_a, "at")
-    if len(axes) != len(plant.actuated):
-        template = "at: must hold one position per axis ({axes}), found {found}."
-        raise SpecError(template, axes=len(plant.actuated), found=len(axes))
+    axes = [0.0] * len(plant.actuated) if q_a is None else q_a
     return _linearized(plant, tuple(parameters.items()), resting_place(plant, axes))
 
 

@@ -1,41 +1,25 @@
 """From a spec to a motion and its figures, before anything is written."""
 
-from pathlib import Path
-
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers.draft import Plan, solved
 from gen_profile.methods.solvers.shortest import shortest
 from gen_profile.methods.solvers.solution import SIMPLER, Status, no_motion
 from gen_profile.methods.solvers.suggestions import explained, remedy
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec
 from gen_profile.support.errors import LimitViolation
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.work import OutOfWork, budget
 
 EXPLAINING = "looking for what would do"
 
 
-def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
+def plan(spec: Spec, progress: Progress = no_progress) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    progress : Progress
 
     Raises
     ------
     InfeasibleProblem, SolverDiverged, LimitViolation
-
-    Examples
-    --------
-    >>> plan = gp.plan(gp.preset_spec("paper"))
-    >>> plan.motion.duration
-    3.0
     """
-    require_progress(progress)
-    spec = as_spec(spec)
     try:
         with budget(*choice.ANSWER):
             return judged(draft(spec, progress), progress)

@@ -23,7 +23,6 @@ from gen_profile.presentation.charts.picture import require_drawable, save
 from gen_profile.presentation.charts.proof import draw
 from gen_profile.presentation.charts.robustness import robustness_figure
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_path
 from gen_profile.studies.comparison.compare import Comparison
 from gen_profile.studies.comparison.robustness import Robustness
 from gen_profile.studies.identification.identify import Identification
@@ -59,17 +58,16 @@ Drawn = (
 )
 
 
-def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) -> Picture | None:
-    """Draw a result: a machine, a motion, its sway, a check, a comparison, a swing, a proof.
+def picture(result: Drawn, *, every: bool = False) -> Picture:
+    """Draw a result for a notebook to show; raises as `plot`."""
+    with TemporaryDirectory() as folder:
+        drawn = Path(folder) / "picture.svg"
+        plot(result, drawn, every=every)
+        return Picture(drawn.read_text("utf-8"))
 
-    Parameters
-    ----------
-    result : Spec, Plan, Design, Profile, Check, Judgement, Comparison, Robustness, Identification, SwingLog
-        or Deployment
-    path : Path or str, optional
-        Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
-    every : bool, optional
-        Draw the curves of all methods of a comparison, not only of the most telling ones.
+
+def plot(result: Drawn, path: Path, *, every: bool = False) -> None:
+    """Draw a result into a PNG, SVG or PDF file; the curves of all methods of a comparison, if asked.
 
     Raises
     ------
@@ -77,17 +75,7 @@ def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) 
         There is no picture of what is given.
     OutputError
         The file cannot be written, Matplotlib is not installed, or there is nothing to draw.
-
-    Examples
-    --------
-    >>> gp.plot(gp.plan(gp.preset_spec("paper")), "motion.svg")
     """
-    if path is None:
-        with TemporaryDirectory() as folder:
-            drawn = Path(folder) / "picture.svg"
-            plot(result, drawn, every=every)
-            return Picture(drawn.read_text("utf-8"))
-    path = as_path(path)
     require_drawable(path)
     match result:
         case Spec(plant=plant):
@@ -101,7 +89,6 @@ def plot(result: Drawn, path: Path | str | None = None, *, every: bool = False) 
         case _:
             figures, name, title = _figures(result, every)
             save(figures, path, name, title)
-    return None
 
 
 def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:

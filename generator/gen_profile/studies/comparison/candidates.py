@@ -14,7 +14,7 @@ from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.methods.solvers.shortest import timed
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
-from gen_profile.motion.profile import Profile, require_motion
+from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.values import NONE
 from gen_profile.support.errors import GenProfileError, InfeasibleProblem, SpecError
@@ -55,20 +55,6 @@ def own_method(spec: Spec) -> str:
         return spec.solver.shaper
     # β means the same as in the paper only together with a γ
     return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
-
-
-def as_motions(own: Sequence[Profile] | Profile) -> Sequence[Profile]:
-    """Take motions as they are, or a single one.
-
-    Raises
-    ------
-    SpecError
-        One is no profile.
-    """
-    motions = own if isinstance(own, list | tuple) else (own,)
-    for motion in motions:
-        require_motion(motion)
-    return motions
 
 
 def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:

@@ -1,7 +1,6 @@
 """Optimal motions and shapers side by side, on the same machines, and which of them to take."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -10,11 +9,10 @@ from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation, 
 from gen_profile.dynamics.evaluation.phrases import mm, number
 from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec
-from gen_profile.studies.comparison.candidates import Candidate, as_motions, candidates
+from gen_profile.studies.comparison.candidates import Candidate, candidates
 from gen_profile.support.errors import GenProfileError, InfeasibleProblem
 from gen_profile.support.phrase import Phrase, joined
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.summary import Drawable, Tabled
 
 SAME = 1e-3  # relative difference of figures that says nothing
@@ -232,31 +230,13 @@ class Comparison(Drawable, Tabled):
         }
 
 
-def compare(
-    spec: Spec | Path | str, progress: Progress = no_progress, *, own: Sequence[Profile] | Profile = ()
-) -> Comparison:
-    """Try every shaper and variants of the optimal motion on the machines of a spec.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    progress : callable
-        Told what is being done.
-    own : sequence of Profile, or Profile
-        Further motions of the axes, each of a ``method`` of its own.
-
-    Examples
-    --------
-    >>> gp.compare(gp.preset_spec("paper"))
-    <Comparison name: paper, methods: nzv, zv, ... fastest: optimal-beta0, gentlest: optimal-beta50>
-    """
-    require_progress(progress)
-    spec = as_spec(spec)
+def compare(spec: Spec, progress: Progress = no_progress, *, own: Sequence[Profile] = ()) -> Comparison:
+    """Try every shaper, variants of the optimal motion, and own motions on the machines of a spec."""
     rows: list[ComparedMethod] = []
     left_out: dict[str, str] = {}
     too_slow: dict[str, float] = {}
     impossible: dict[str, str] = {}
-    listed = tuple(candidates(spec, as_motions(own)))
+    listed = tuple(candidates(spec, own))
     for done, candidate in enumerate(listed):
         progress("comparing", done, len(listed), candidate.method)
         try:

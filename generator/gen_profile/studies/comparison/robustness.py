@@ -4,7 +4,6 @@ import csv
 from collections.abc import Mapping, Sequence
 from io import StringIO
 from itertools import product
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -17,11 +16,10 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_number, as_spec
 from gen_profile.spec.values import require_whole
-from gen_profile.studies.comparison.candidates import as_motions, candidates
+from gen_profile.studies.comparison.candidates import candidates
 from gen_profile.support.errors import GenProfileError, SpecError
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import suggestion
 from gen_profile.support.summary import Drawable, Tabled
 
@@ -158,45 +156,22 @@ def _crossing(errors: Array, fraction: Array) -> float:
 
 
 def robustness(
-    spec: Spec | Path | str,
-    parameters: Sequence[str] | str = (),
+    spec: Spec,
+    parameters: Sequence[str] = (),
     *,
-    methods: Sequence[str] | str = (),
-    own: Sequence[Profile] | Profile = (),
+    methods: Sequence[str] = (),
+    own: Sequence[Profile] = (),
     points: int | None = None,
     half_range: float | None = None,
     progress: Progress = no_progress,
 ) -> Robustness:
-    """Try shapers and variants of the optimal motion over errors of one or two parameters.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    parameters : sequence of str, or str
-        One or two; the first uncertain one by default.
-    methods : sequence of str, or str
-        As `gen_profile.studies.comparison.candidates` names them; all by default.
-    own : sequence of Profile, or Profile
-        Further motions of the axes, each of a ``method`` of its own.
-    points : int, optional
-        Per parameter.
-    half_range : float, optional
-        Greatest relative error; by default one and a half times what the spec states.
-    progress : callable
-        Told what is being done.
+    """Try shapers, variants of the optimal motion, and own motions over errors of one or two parameters.
 
     Raises
     ------
     SpecError
         A parameter or method is unknown, there are too few points, or the range is none.
-
-    Examples
-    --------
-    >>> gp.robustness(gp.preset_spec("paper"), "L1", methods=["zv", "optimal-beta50"], points=5)
-    <Robustness name: paper, errors: L1 -30 to +30 %, zv: 17.72 mm at worst, optimal-beta50: 4.781 mm ...>
     """
-    require_progress(progress)
-    spec, parameters, methods, own = as_spec(spec), as_names(parameters), as_names(methods), as_motions(own)
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}
     left_out: dict[str, str] = {}
@@ -236,7 +211,7 @@ def error_grid(
         raise SpecError("parameter: at most two, of which a map is drawn.")
     if points is not None:
         require_whole(points, FEWEST, "points")
-    if half_range is not None and not 0.0 < as_number(half_range, "range") <= WIDEST:
+    if half_range is not None and not 0.0 < half_range <= WIDEST:
         raise SpecError(
             f"range: must be greater than 0 and at most {WIDEST} (0.1 is 10 %), found {half_range}."
         )

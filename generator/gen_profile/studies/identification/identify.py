@@ -1,7 +1,7 @@
 """From measurements on site to a spec whose machine they determine, and whose uncertainty they state."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ import tomli_w
 
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_number, as_numbers, as_path, as_spec, as_text
 from gen_profile.studies.identification.estimation import (
     CONFIDENCE,
     INITIAL_RESIDUAL_RATIO,
@@ -36,7 +35,7 @@ from gen_profile.support.artefacts.writing import deliver_all
 from gen_profile.support.errors import InfeasibleProblem, SpecError, rounded_up
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import AND, Phrase, joined
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import finite_number, suggestion
 from gen_profile.support.summary import Drawable
 
@@ -133,34 +132,16 @@ class Identification(Drawable):
 
 
 def read_swing(
-    path: Path | str,
-    spec: Spec | Path | str,
+    path: Path,
+    spec: Spec,
     *,
-    columns: tuple[str | int, str | int] | None = None,
+    columns: tuple[str, str] | None = None,
     signal: str = "angle",
     unit: str | None = None,
     time_unit: str | None = None,
     after: float | None = None,
 ) -> SwingLog:
-    """Read a logged swing of a spec's machine.
-
-    Parameters
-    ----------
-    path : Path or str
-        Table with a column of times and one of values.
-    spec : Spec, or the path of one
-    columns : (str or int, str or int) or None
-        Their names, or their numbers from 1; by default those whose names tell it, or the first two.
-    signal : str
-        What the values are: ``angle``, ``sway``, ``rate`` (of the angle) or ``acceleration`` (of the sway,
-        without gravity) of the first load, or of a named one, ``angle:hook``.
-    unit : str or None
-        Of the values; by default what their column's name says, or the SI unit. A number before it is the
-        size of one count, ``0.09 deg``.
-    time_unit : str or None
-        One of `TIME_UNITS`; by default what the column's name says, or the times show.
-    after : float or None
-        Time in s from which on the axes stood still; None for the whole log.
+    """Read a logged swing of a spec's machine; what is not given, the names of the columns say.
 
     Raises
     ------
@@ -168,36 +149,25 @@ def read_swing(
         The machine has no such signal, or a choice is wrong.
     OutputError
         The file cannot be read.
-
-    Examples
-    --------
-    >>> times = np.arange(0.0, 20.0, 0.05)
-    >>> swing = 3.0 * np.cos(1.278 * times + 0.3)
-    >>> np.savetxt("swing.csv", np.c_[times, swing], delimiter=",", header="time_s,angle_deg", comments="")
-    >>> gp.read_swing("swing.csv", gp.preset_spec("bay-crane"), columns=("time_s", "angle_deg"))
-    <SwingLog times: (400,), values: (400,), quantity: angle, load: hook, ...>
     """
-    spec = as_spec(spec)
     plant = spec.machine()
     loads = plant.loads
-    if columns is not None and (not isinstance(columns, tuple | list) or len(columns) != 2):
-        raise SpecError(f"columns: name two, of times and values, such as (1, 2), found {columns!r}.")
-    if time_unit is not None and as_text(time_unit, "time_unit: a unit") not in TIME_UNITS:
+    if time_unit is not None and time_unit not in TIME_UNITS:
         raise SpecError(f"time_unit: unknown unit {time_unit!r}{suggestion(time_unit, TIME_UNITS)}")
-    quantity, _, named = as_text(signal, "signal: a name").partition(":")
+    quantity, _, named = signal.partition(":")
     load = named or loads[0]
     if quantity not in SI_UNITS:
         raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, SI_UNITS)}")
     if load not in loads:
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
-    per_unit = None if unit is None else _per_unit(as_text(unit, "unit: a unit"), quantity)
+    per_unit = None if unit is None else _per_unit(unit, quantity)
     return parse_swing(
-        read_text(as_path(path), "swing"),
+        read_text(path, "swing"),
         str(path),
-        columns=None if columns is None else (str(columns[0]), str(columns[1])),
+        columns=columns,
         per_second=None if time_unit is None else TIME_UNITS[time_unit],
         per_unit=per_unit,
-        after=None if after is None else as_number(after, "after"),
+        after=after,
         quantity=quantity,
         load=load,
         one_direction=plant.directions == 1,
@@ -218,25 +188,13 @@ def _per_unit(unit: str, quantity: str) -> float:
 
 
 def identify(
-    spec: Spec | Path | str,
-    measurements: Sequence[Measurement] | Measurement,
-    free: Sequence[str] | str = (),
+    spec: Spec,
+    measurements: Sequence[Measurement],
+    free: Sequence[str] = (),
     q_a: Sequence[float] | None = None,
     progress: Progress = no_progress,
 ) -> Identification:
     """Identify parameters of a spec's machine, and put them and their ranges into the spec.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-        Its parameters are where the search starts; those that are not identified are taken as exact.
-    measurements : sequence of Measurement, or Measurement
-    free : sequence of str, or str
-        Parameters to identify, beside those that were read directly.
-    q_a : (m,) sequence of float, optional
-        Where the axes stood while periods and swings were measured; the target of the move by default.
-    progress : callable
-        Told what is being done.
 
     Raises
     ------
@@ -244,26 +202,13 @@ def identify(
         A measurement or parameter does not belong to the machine.
     InfeasibleProblem
         The measurements do not determine the parameters, or not well enough to be of use.
-
-    Examples
-    --------
-    >>> timed = gp.parse_period("49.2±0.2/10")  # ten swings, with a stop watch
-    >>> gp.identify(gp.preset_spec("bay-crane"), [timed], "L1")
-    <Identification name: bay-crane, L1: 4.68921>
     """
-    require_progress(progress)
-    spec = as_spec(spec)
     plant = spec.machine()
-    measurements = tuple(measurements) if isinstance(measurements, Iterable) else (measurements,)
-    for one in measurements:
-        if not isinstance(one, Measurement):
-            known = "parse_reading, parse_period and read_swing"
-            raise SpecError(f"measurements: what {known} give is expected, found {one!r}.")
     readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
     read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
-    asked = {*as_names(free), *read}
+    asked = {*free, *read}
     _require_known(plant, readings, asked)
-    stood = tuple(spec.move.target if q_a is None else as_numbers(q_a, "at"))
+    stood = tuple(spec.move.target if q_a is None else q_a)
     if len(stood) != len(plant.actuated):
         template = "at: must hold one position per axis ({axes}), found {found}."
         raise SpecError(template, axes=len(plant.actuated), found=len(stood))

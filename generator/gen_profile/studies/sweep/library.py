@@ -9,13 +9,12 @@ import attrs
 
 from gen_profile.delivery.designs.names import names_of_library, require_own_names
 from gen_profile.dynamics.evaluation.phrases import named
-from gen_profile.spec.reading import as_path
 from gen_profile.studies.sweep.case import PASSED
 from gen_profile.studies.sweep.store import case_files, case_folder, case_spec, grid_of, swept_table
 from gen_profile.support.artefacts.manifest import FILENAME, SEAL, parse_manifest, seal_of, sha256
 from gen_profile.support.artefacts.writing import staged
 from gen_profile.support.errors import ExportError, SpecError
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
@@ -57,18 +56,8 @@ class Library:
         )
 
 
-def write_library(folder: Path | str, path: Path | str, progress: Progress = no_progress) -> Library:
+def write_library(folder: Path, path: Path, progress: Progress = no_progress) -> Library:
     """Put the PLC blocks of all cases that passed into one, and make sure that it issues the same.
-
-    Parameters
-    ----------
-    folder : Path or str
-        Or file, of a finished sweep that exported a format with the playback block.
-    path : Path or str
-        File to write, such as ``crane.st``; the function block is named after it, and its suffix tells the
-        format, which need not be the sweep's.
-    progress : callable
-        Told what is being done.
 
     Raises
     ------
@@ -78,14 +67,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = no_
         The sweep's files were altered, or the library cannot be written, as where a motion has its names.
     ExportError
         The profiles do not fit into one block.
-
-    Examples
-    --------
-    >>> gp.write_library("ropes", "crane.st").block  # of what gp.run_sweep wrote
-    'FB_crane'
     """
-    require_progress(progress)
-    folder, path = as_path(folder), as_path(path)
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
     profiles, specs, entries, target = _gathered(folder, stem.removeprefix("FB_"), progress)

@@ -12,13 +12,12 @@ from pyarrow import compute
 from gen_profile.assurance.verification.check import Judgement, check_artefact
 from gen_profile.dynamics.evaluation.phrases import named
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_path, as_values
 from gen_profile.studies.sweep.case import PASSED
 from gen_profile.studies.sweep.grid import Grid, GridAxis, overrides
 from gen_profile.studies.sweep.store import case_folder, case_spec, grid_of, swept_table, take_out
 from gen_profile.studies.sweep.table import Table, cell
 from gen_profile.support.errors import CheckFailed, SpecError
-from gen_profile.support.progress import Progress, no_progress, require_progress
+from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import finite_number, number_meant, suggestion
 
 TRIES = 64
@@ -92,27 +91,22 @@ class LookupResult:
 
 
 def lookup(
-    folder: Path | str,
-    asked: Mapping[str, Any],
+    folder: Path,
+    asked: Mapping[str, str],
     progress: Progress = no_progress,
     *,
-    out: Path | str | None = None,
+    out: Path | None = None,
 ) -> LookupResult:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
-    Distances are counted in steps of the grid, and what is more than one step away is another profile, not an
-    answer. Keys of the machine and its check are taken as asked; in all others, such as the move, what the
-    profile was designed for stands in for what was asked.
-
     Parameters
     ----------
-    folder : Path or str
+    folder : Path
         Or file, of a finished sweep.
-    asked : mapping
-        A value, or a text of one, for every varied key.
+    asked : mapping of str to str
+        A value for every varied key.
     progress : callable, optional
-        Told every step.
-    out : Path or str, optional
+    out : Path, optional
         Folder to which the profile is written, with its manifest.
 
     Raises
@@ -123,16 +117,9 @@ def lookup(
         There is no finished sweep, or its files were altered.
     CheckFailed
         No profile near is safe there, or what was asked for lies beyond the grid.
-
-    Examples
-    --------
-    >>> gp.lookup("ropes", {"plant.L1": 0.49}).used  # of what gp.run_sweep wrote
-    {'plant.L1': 0.5}
     """
-    require_progress(progress)
-    folder, out = as_path(folder), None if out is None else as_path(out)
     grid = grid_of(folder)
-    wanted = _wanted(grid, {key: str(value) for key, value in as_values(asked, "asked").items()})
+    wanted = _wanted(grid, asked)
     near, first = _near(grid, swept_table(folder, grid, ["case", "status", *wanted]), wanted)
     rows = swept_table(folder, grid, cases=near).to_pylist()
     nearest = next(iter(swept_table(folder, grid, cases=first).to_pylist()), None)

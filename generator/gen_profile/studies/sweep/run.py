@@ -6,22 +6,17 @@ a sweep that is started again works out the rest.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
 import attrs
-import numpy as np
-import tomli_w
 from dask.system import CPU_COUNT
 from distributed import Client, Future, KilledWorker, as_completed
 
-from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_names, as_path, as_spec, as_text
-from gen_profile.spec.values import require_whole
 from gen_profile.studies.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
-from gen_profile.studies.sweep.grid import Grid, grid_of_values
+from gen_profile.studies.sweep.grid import Grid
 from gen_profile.studies.sweep.store import Keeper, Store, opened, swept_table
 from gen_profile.support.artefacts.manifest import versions
 from gen_profile.support.cluster import client_of, processes, unable
@@ -242,58 +237,3 @@ def _outcomes(future: Future) -> list[CaseOutcome]:
         raise
     except Exception as error:
         raise SpecError(f"{unable(error)} What is finished is kept: sweep again.") from error
-
-
-def run_sweep(
-    spec: Spec | Path | str,
-    vary: Mapping[str, Sequence[Any]],
-    formats: Sequence[str] | str,
-    folder: Path | str,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-) -> Sweep:
-    """Design, export and check all combinations of values, or go on where such a sweep was interrupted.
-
-    Parameters
-    ----------
-    spec : Spec, or the path of one
-    vary : mapping of str to sequence
-        Values by key of the spec, such as ``{"plant.L1": [0.4, 0.5]}``.
-    formats : sequence of str, or str
-        To export, such as ``["plc"]``.
-    folder : Path or str
-        To write to.
-    workers : int, optional
-        Processes of this computer; by default one for each of its processors.
-    scheduler : str, optional
-        Address of a Dask scheduler, whose workers to use instead.
-
-    Raises
-    ------
-    SpecError
-        A key or all of its values make no sense, or the scheduler does not answer.
-    OutputError
-        Dask or PyArrow are not installed, or the folder holds another sweep or cannot be written.
-
-    Examples
-    --------
-    >>> sweep = gp.run_sweep(gp.preset_spec("paper"), {"plant.L1": [0.45, 0.5]}, "plc", "ropes", workers=1)
-    >>> sweep.statuses
-    {'passed': 2}
-    """
-    spec = as_spec(spec)
-    if not isinstance(vary, Mapping):
-        raise SpecError(f"vary: give values by key, such as {{'plant.L1': [0.45, 0.5]}}, found {vary!r}.")
-    if scheduler is not None:
-        as_text(scheduler, "scheduler: an address")
-    if workers is not None:
-        require_whole(workers, 1, "workers")
-    for key, values in vary.items():
-        if isinstance(values, str) or not isinstance(values, Iterable):
-            raise SpecError(f"vary {key}: give a list of values, found {values!r}.")
-    listed = {key: [np.asarray(value).tolist() for value in values] for key, values in vary.items()}
-    grid = grid_of_values(listed)  # value by value: numbers beside texts would become texts
-    text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
-    store = prepare(text, (), grid, as_names(formats), as_path(folder))
-    return sweep(store, scheduler=scheduler, workers=workers)

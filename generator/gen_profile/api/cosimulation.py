@@ -14,8 +14,9 @@ from gen_profile.dynamics.evaluation.scenarios import Scenario
 from gen_profile.dynamics.evaluation.simulation import AT_REST, Response
 from gen_profile.dynamics.problem.linearization import eigenvalues
 from gen_profile.motion.profile import Array, SampledProfile, require_samples
+from gen_profile.spec.arguments import as_values
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import as_spec, as_values
+from gen_profile.spec.reading import as_spec
 from gen_profile.support.errors import SpecError
 from gen_profile.support.suggestion import suggestion
 
