@@ -8,6 +8,7 @@ import pytest
 from command_line import run_here
 from pictures import colours
 
+from gen_profile.cli.entry import cli
 from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.motion.metrics import peak
@@ -98,6 +99,13 @@ def test_faults_are_sentences(words, sentence):
     outcome = run_here("robustness", *words)
     assert (outcome.code, len(outcome.errors)) == (2, 1)
     assert outcome.errors[0].startswith(f"Error: {sentence}")
+
+
+def test_a_sentence_names_the_option_that_a_command_was_given_whoever_calls_it():
+    """What stood on the command line of the process decided it."""
+    words = ["robustness", "--preset", "paper", "--parameter", "L3"]
+    with pytest.raises(SpecError, match=r"^--parameter L3: unknown parameter"):
+        cli.main(words, prog_name="gen-profile", standalone_mode=False)
 
 
 def test_the_command_draws_writes_and_tells(tmp_path):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from gen_profile.cli.outcome import print_warnings
-from gen_profile.support.errors import OutputError, SpecError
+from gen_profile.support.errors import GenProfileError, OutputError, SpecError
 
 if TYPE_CHECKING:
     from gen_profile.spec.model import Spec
@@ -328,10 +330,31 @@ def output(command: Command) -> Command:
     @wraps(command)
     def careful(*, as_json: bool, **values: Any) -> Any:
         # `as_json` is for `print_outcome`
-        _require_apart(click.get_current_context())
-        return command(**values)
+        context = click.get_current_context()
+        _require_apart(context)
+        try:
+            return command(**values)
+        except GenProfileError as error:
+            error.args = tuple(_by_option(context, sentence) for sentence in error.sentences)
+            raise
 
     return cast("Command", careful)
+
+
+def _by_option(context: click.Context, sentence: str) -> str:
+    """Name an argument that a sentence begins with by its option: ``vary: …`` becomes ``--vary: …``."""
+    given = [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+    ]
+    if context.ignore_unknown_options:  # which are words of an argument
+        given += [word.partition("=")[0] for word in context.params["words"]]
+    flags = {option.removeprefix("--"): option for option in given if option.startswith("--")}
+    flags |= {name.replace("-", "_"): option for name, option in flags.items()}
+    return re.sub(
+        r"^[\w.]+(?=[: ,])", lambda match: flags.get(match[0], match[0]), sentence, flags=re.MULTILINE
+    )
 
 
 def _require_apart(context: click.Context) -> None:

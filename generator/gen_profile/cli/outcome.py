@@ -108,7 +108,7 @@ def print_error(error: Exception, as_json: bool) -> int:
     """Tell an error in sentences, and in JSON where that was asked for; return its exit code."""
     match error:
         case GenProfileError():
-            code, message = error.exit_code, _as_typed(str(error))
+            code, message = error.exit_code, str(error)
         case click.ClickException():
             code, message = error.exit_code, error.format_message()
         case click.Abort(__cause__=None, __context__=EOFError()):
@@ -136,14 +136,3 @@ def _json(document: Mapping[str, Any]) -> str:
     import json
 
     return json.dumps(document, indent=2, allow_nan=False)
-
-
-def _as_typed(message: str) -> str:
-    """Name an argument that a sentence begins with as it was typed: ``vary: …`` becomes ``--vary: …``."""
-    typed = {word.partition("=")[0] for word in sys.argv if word.startswith("--")}
-
-    def flag(match: re.Match[str]) -> str:
-        options = (f"--{match[0]}", f"--{match[0].replace('_', '-')}")
-        return next((option for option in options if option in typed), match[0])
-
-    return re.sub(r"^[\w.]+(?=[: ,])", flag, message, flags=re.MULTILINE)
