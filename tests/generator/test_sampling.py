@@ -5,21 +5,13 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from gen_profile.dynamics.problem.sampling import halton, latin_hypercube
+from gen_profile.dynamics.problem.sampling import halton
 
 
 @pytest.fixture
 def qmc():
     """Load it for who uses it: it takes each process that collects these tests half a second."""
     return import_module("scipy.stats.qmc")
-
-
-@pytest.mark.parametrize(("points", "dimensions"), [(1, 1), (7, 3), (200, 90)])
-def test_a_latin_hypercube_is_scipy_s_and_leaves_its_generator_where_scipy_does(qmc, points, dimensions):
-    ours, theirs = np.random.default_rng(4), np.random.default_rng(4)
-    drawn = latin_hypercube(points, dimensions, ours)
-    assert np.array_equal(drawn, qmc.LatinHypercube(dimensions, seed=theirs).random(points))
-    assert ours.random() == theirs.random()
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 9])

@@ -20,7 +20,6 @@ from gen_profile.assurance.proof.sensing import CHOICES, SensedHistory, sensed
 from gen_profile.dynamics.evaluation import phrases
 from gen_profile.dynamics.problem.hoisted_plant import hoisted
 from gen_profile.dynamics.problem.linearization import linearize
-from gen_profile.dynamics.problem.sampling import latin_hypercube
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
 from gen_profile.planner.directions import planned_axes
@@ -279,8 +278,10 @@ class Histories:
         -------
         (count, choices) array
         """
+        from scipy.stats import qmc  # noqa: PLC0415  # half a second
+
         random = np.random.default_rng(seed)
-        drawn: Array = latin_hypercube(count, self.choices, random)
+        drawn: Array = qmc.LatinHypercube(self.choices, seed=random).random(count)
         corners = self.corners(count)
         every = 2 ** min(self._ends, 62)
         numbers = np.arange(every) if every == corners else random.integers(every, size=corners)

@@ -6,7 +6,6 @@ import attrs
 import numpy as np
 
 from gen_profile.dynamics.problem.parameter_box import MOST_TRACED, corners, ends
-from gen_profile.dynamics.problem.sampling import latin_hypercube
 from gen_profile.spec.model import Spec
 
 TIMING = "timing"
@@ -127,7 +126,10 @@ def _draws(spec: Spec) -> list[Scenario]:
         return []
     ends = np.array(list(ranges.values()))
     random = np.random.default_rng(spec.check.seed)
-    values = ends[:, 0] + latin_hypercube(spec.check.samples, len(ranges), random) * np.ptp(ends, axis=1)
+    from scipy.stats import qmc  # noqa: PLC0415  # half a second
+
+    shares = qmc.LatinHypercube(len(ranges), seed=random).random(spec.check.samples)
+    values = ends[:, 0] + shares * np.ptp(ends, axis=1)
     rows = []
     for draw, drawn in enumerate(values.tolist()):
         named = dict(zip(ranges, drawn, strict=True))

@@ -1,31 +1,9 @@
-"""Points spread over the unit cube, those of SciPy's `qmc`, which takes half a second to load."""
+"""Halton's points, those of SciPy's `qmc`: each plan spreads some, and `qmc` takes half a second to load."""
 
 from itertools import count, islice
 
 import numpy as np
 from numpy.typing import NDArray
-
-
-def latin_hypercube(points: int, dimensions: int, random: np.random.Generator) -> NDArray[np.float64]:
-    """Draw points of which each stripe of the cube has one (M. D. McKay et al., Technometrics, 1979).
-
-    Parameters
-    ----------
-    points, dimensions : int
-    random : numpy.random.Generator
-
-    Returns
-    -------
-    (points, dimensions) array
-        From 0 to 1.
-    """
-    (random,) = random.spawn(1)
-    within = random.uniform(size=(points, dimensions))
-    stripes = np.tile(np.arange(1, points + 1), (dimensions, 1))
-    for row in stripes:
-        random.shuffle(row)
-    drawn: NDArray[np.float64] = (stripes.T - within) / points
-    return drawn
 
 
 def halton(points: int, dimensions: int, begin: int = 0) -> NDArray[np.float64]:
