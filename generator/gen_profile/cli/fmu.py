@@ -9,10 +9,10 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import OutputFile, SpecChoice, option
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.cli.progress import progress
+from gen_profile.delivery.designs.fmu_kinds import KINDS
 from gen_profile.support.errors import SpecError
 
-# spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
-KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
+# spelled out here because --help must not wait for CasADi; a test holds them against those of gen_profile_fmu
 INPUTS = ("setpoint", "acceleration", "velocity")
 PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86_64", "macos-arm64", "all")
 

@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.delivery.designs.fmu_kinds import KINDS
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.motion.profile import Profile
@@ -29,7 +30,6 @@ from gen_profile_fmu.model.planner import planned_system_model, planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
-KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
 LEADERS = {"ssp": "profile", "planned-ssp": "planner"}  # of systems of two FMUs: what the plant follows
 
 
