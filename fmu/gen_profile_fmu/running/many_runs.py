@@ -13,6 +13,8 @@ from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.running.instances import CalledFmu, Instance, compiled_loops, doubles, instance, unsigned
 
+NO_ZONES = np.empty((0, 9))
+
 
 class _PerRun(Structure):
     _fields_ = [("values", POINTER(c_double)), ("size", c_size_t)]
@@ -28,6 +30,8 @@ class _Plan(Structure):
         ),
         ("n_components", c_size_t),
         ("since", c_double),
+        ("zones", POINTER(c_double)),
+        ("n_zones", c_size_t),
     ]
 
 
@@ -67,6 +71,7 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
         *,
         since: float = 0.0,
         components: int = 0,
+        zones: Array = NO_ZONES,
     ) -> Array:
         """Simulate all runs, and keep the greatest magnitude of each output.
 
@@ -84,10 +89,13 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
         components : int
             So many of the last outputs are the components of a vector: its greatest length at any time, also
             before `since`, is one more column.
+        zones : (zones, 9) array
+            Where bodies may not be; the least room to them at any time is one more column. Numbers of the
+            outputs that are a body's place and height; from, to and top; twice where it may be all the same.
 
         Returns
         -------
-        (runs, outputs) or (runs, outputs + 1) array
+        (runs, outputs) array, or with one or two columns more
 
         Raises
         ------
@@ -106,9 +114,11 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
             output_references=unsigned(self._variables.named(outputs)),
             n_components=components,
             since=since * (1.0 - 1e-12),
+            zones=doubles(zones),
+            n_zones=len(zones),
         )
         runs = next((len(rows) for rows in given.values() if len(rows) != 1), 1)
-        return self._run(plan, np.empty((runs, len(outputs) + (components > 0))))
+        return self._run(plan, np.empty((runs, len(outputs) + (components > 0) + (len(zones) > 0))))
 
     def _run(self, plan: _Plan, rows: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""
@@ -127,7 +137,7 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
     def _fill(self, plan: _Plan, rows: Array, worker: Instance, first: int, end: int) -> int:
         """Have a worker fill rows of what is to be found; the first bad run, or `end`."""
         worker.messages.clear()
-        room = np.empty(plan.n_outputs)
+        room = np.empty(2 * plan.n_outputs)
         return int(self._loop(byref(worker.called), byref(plan), first, end, doubles(room), doubles(rows)))
 
 

@@ -48,6 +48,7 @@ def cli() -> None:
 @option("--no-check", "Skip the co-simulation; the manifest then says unverified.")
 @option("--keep-failed", "Write the artefacts even where the check fails.")
 @options.certify
+@options.plot
 @signing_option("manifest")
 @options.output
 def design(
@@ -59,6 +60,7 @@ def design(
     no_check: bool,
     keep_failed: bool,
     certify: bool,
+    picture: Path | None,
     key_path: Path | None,
     **export: str | None,
 ) -> None:
@@ -77,6 +79,7 @@ def design(
 
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
+        draw(outcome, picture, tell)
     if outcome.passed:
         sign(folder, key)
     certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])

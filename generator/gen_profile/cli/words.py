@@ -59,6 +59,9 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
     """Tell what was designed, how it was judged, what is proved of each file, and where they lie."""
     solution, figures = outcome.plan.solution, outcome.figures
     solver = f"{outcome.spec.solver.method} shaper, fed with a {outcome.spec.solver.base} move"
+    passage = outcome.plan.passage
+    if passage is not None:
+        solver = f"over stacks, {passage.programs} programs in {outcome.plan.solver_time:.2g} s"
     if solution is not None:
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time
         solver = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
@@ -70,10 +73,15 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
     rows = [
         ("move", _move(outcome.spec)),
         ("solver", solver),
+        *([] if passage is None else [("duration", passage.gained(figures["duration_s"]))]),
         *_peaks(outcome),
         ("sway on the way", f"{load} {mm(figures['sway_transient_peak_m'])}"),
         ("residual sway", f"{load} {nominal} nominal, {worst} at worst"),
-        *([] if outcome.check is None else (*_groups(outcome.check), *_wind(outcome.check))),
+        *(
+            []
+            if outcome.check is None
+            else (*_groups(outcome.check), *_wind(outcome.check), *_nearest(outcome.check))
+        ),
         ("check", _verdict(outcome.check)),
         *(row for path, proof in certificates.items() for row in (("file", path.name), *_proved(proof))),
         *_cost_of_lag(figures, outcome.spec.cost.effort),
@@ -103,6 +111,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
         *findings,
         *_groups(check),
         *_wind(check),
+        *_nearest(check),
         ("check", _verdict(check)),
         *([] if certificate is None else (*_proved(certificate), *_written(judged.path, certificate))),
     ]
@@ -224,6 +233,12 @@ def _wind(check: Check) -> list[tuple[str, str]]:
         return []
     held = f"holds aside {_by_load(check.wind.loads)} ({check.wind.machine}); not judged"
     return [(f"wind, {check.wind.force:g} N", held)]
+
+
+def _nearest(check: Check) -> list[tuple[str, str]]:
+    """Tell where a load comes nearest to what stands there, on which machine."""
+    near = check.nearest
+    return [] if near is None else [("clearance", f"{near.nearness(check.path)} ({near.scenario.name})")]
 
 
 def comparison(compared: Comparison) -> str:

@@ -23,6 +23,7 @@ from gen_profile.planner.machine import (
 from gen_profile.planner.sensor import between, sensor_constants
 from gen_profile.planner.stated import STEADY, quick_limits, target_range, unstated_limits
 from gen_profile.spec.model import Spec
+from gen_profile.spec.stack_rules import refuse_stacks
 from gen_profile.support.errors import SpecError
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import Phrase, placed
@@ -73,6 +74,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
     SpecError
         A limit is not stated, or the block does not take this machine.
     """
+    refuse_stacks(spec, "a planner block")
     modes_of_live, constants = planner_constants(spec)
     text = block_text(constants)
     declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only

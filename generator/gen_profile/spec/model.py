@@ -20,6 +20,7 @@ from gen_profile.plants.registry import find_plant
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.disturbances import PathSpec, WindSpec
 from gen_profile.spec.planner import PlannerSpec
+from gen_profile.spec.stacks import StacksSpec
 from gen_profile.spec.structure import Checked, kinds_of
 from gen_profile.spec.values import (
     NONE,
@@ -366,6 +367,7 @@ class Spec(Drawable, Checked):
     export: ExportSpec = ExportSpec()
     can: CanSpec = attrs.field(factory=CanSpec)
     planner: PlannerSpec = attrs.field(factory=PlannerSpec)
+    path: StacksSpec | None = None
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -387,10 +389,10 @@ class Spec(Drawable, Checked):
         """Where the axes stand that do not move, by their number, in m (or rad).
 
         Those that the move neither asks to move nor sets free, or whose travel leaves them no room. A
-        machine's only axis is not held: it is what removes a swing in place.
+        machine's only axis is not held: it is what removes a swing in place. On a path over stacks none is.
         """
         move, axes = self.move, self.machine().actuated
-        if len(axes) == 1:
+        if len(axes) == 1 or self.path is not None:
             return {}
 
         def stays(column: int) -> bool:

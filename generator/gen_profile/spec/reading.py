@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from gen_profile.spec.arguments import as_names, as_path, as_text
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
+from gen_profile.spec.stacks import SOURCES
 from gen_profile.spec.tables import Table, structure
 from gen_profile.support.bounded_file import DOCUMENT, is_folder, read_bounded
 from gen_profile.support.errors import OutputError, SpecError, UnknownProgram
@@ -33,6 +34,14 @@ SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
     r"=\s*[A-Za-z_]": "; a text stands in quotes",
+}
+
+# a move is stated one way, and so is what stands under it: the new way replaces the old one
+REPLACED: dict[tuple[str, str], Sequence[str]] = {
+    ("move", "distance"): ("start", "target"),
+    ("move", "start"): ("distance",),
+    ("move", "target"): ("distance",),
+    **{("path", one): [other for other in SOURCES if other != one] for one in SOURCES},
 }
 
 
@@ -365,11 +374,8 @@ def _override(document: Table, override: str) -> None:
 
 def _set(table: Table, path: Sequence[str], value: object) -> None:
     """Set the value of a key in the table that holds it."""
-    # a move is stated one way: the new way replaces the old one
-    replaced = {"distance": ("start", "target"), "start": ("distance",), "target": ("distance",)}
-    if path[0] == "move":
-        for other in replaced.get(path[-1], ()):
-            table.pop(other, None)
+    for other in REPLACED.get((path[0], path[-1]), ()):
+        table.pop(other, None)
     table[path[-1]] = value
 
 

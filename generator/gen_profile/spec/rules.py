@@ -8,6 +8,7 @@ from gen_profile.plants.virtual_work import end_load_is_a_body
 from gen_profile.spec.can import SENSOR_BYTES, CanSensorSpec
 from gen_profile.spec.model import RobustnessSpec, Spec
 from gen_profile.spec.planner import SensorSpec
+from gen_profile.spec.stack_rules import stack_faults
 from gen_profile.spec.structure import place
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.suggestion import suggestion
@@ -318,5 +319,5 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
 OF_MACHINE = (
     _forgotten, _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes,
-    _live, _sensor,
+    _live, _sensor, stack_faults,
 )  # fmt: skip

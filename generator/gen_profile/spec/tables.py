@@ -16,6 +16,7 @@ from gen_profile.spec.external_fmu import KEYS as FMU_KEYS
 from gen_profile.spec.external_fmu import external_fmu
 from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
 from gen_profile.spec.rules import broken_rules
+from gen_profile.spec.stacks import StacksSpec, stacks_of
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, place
 from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, between
 from gen_profile.support.errors import SpecError
@@ -76,6 +77,11 @@ def structure(document: Mapping[str, Any], folder: Path) -> Spec:
         "check": _check(written["check"], move, plant, folder, structurer),
         "axis": _axis(written["axis"], plant, structurer),
     }
+    if "path" in document:
+        stated = stacks_of(written["path"], folder, structurer)
+        typed["path"] = structurer.fit(stated, StacksSpec, "path", None)
+    else:
+        del written["path"]
     spec: Spec = structurer.fit({**document, **written, **typed}, Spec, "")
     for fault in broken_rules(spec, plant):
         faults.add(*fault)
@@ -90,6 +96,7 @@ def _misplaced(document: Mapping[str, Any], plant: Plant | None, faults: Faults)
         "plant": ["type", *FILE_KEYS, *parameters],
         "move": MOVE_KEYS,
         "check": CHECK_KEYS,
+        "path": [*kinds_of(StacksSpec), "profile", "file"],
     }
     kinds = kinds_of(Spec).items()
     keys |= {name: kinds_of(kind) for name, kind in kinds if attrs.has(kind) and name not in keys}

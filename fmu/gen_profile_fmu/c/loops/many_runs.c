@@ -20,7 +20,12 @@ typedef struct {
     const unsigned *input_references, *parameter_references, *output_references;
     size_t n_components;                 /* of the last outputs: of a vector whose greatest length is kept, too */
     double since;                        /* time from which peaks of single outputs count */
+    const double *zones;                 /* n_zones x ZONE: where bodies may not be */
+    size_t n_zones;
 } Plan;
+
+/* A zone: the outputs that are a body's place and height; from, to and top; twice between which places it may be. */
+enum { X, Z, LOW, HIGH, TOP, OWN, ZONE = OWN + 4 };
 
 static const double *of_run(const PerRun *numbers, size_t run) { return numbers->values + run * numbers->size; }
 
@@ -31,22 +36,52 @@ static double length(const Plan *plan, const double *values) {
     return sqrt(squares);
 }
 
-/* What is kept of every run. */
-static size_t columns(const Plan *plan) { return plan->n_outputs + (plan->n_components > 0); }
+/* By how much more than it must a body at x is beside a zone. */
+static double beside(const double *zone, double x) {
+    double most = fmax(zone[LOW] - x, x - zone[HIGH]);
+    for (size_t i = OWN; i < ZONE; i += 2) most = fmax(most, fmin(x - zone[i], zone[i + 1] - x));
+    return most;
+}
 
-/* One run; `values` is room for the outputs. */
+/* Least room to all zones in a step, in which bodies go straight: beside a zone or above it. */
+static double room(const Plan *plan, const double *was, const double *is) {
+    double least = INFINITY;
+    for (const double *zone = plan->zones; zone < plan->zones + plan->n_zones * ZONE; zone += ZONE) {
+        const size_t x = (size_t)zone[X], z = (size_t)zone[Z];
+        const double first = beside(zone, was[x]), last = beside(zone, is[x]);
+        const double above = was[z] - zone[TOP], later = is[z] - zone[TOP];
+        least = fmin(least, fmin(fmax(first, above), fmax(last, later)));
+        const double apart = first - above, after = last - later;
+        if (apart * after < 0.0) least = fmin(least, first + (last - first) * apart / (apart - after));
+    }
+    return least;
+}
+
+/* What is kept of every run. */
+static size_t columns(const Plan *plan) { return plan->n_outputs + (plan->n_components > 0) + (plan->n_zones > 0); }
+
+/* One run; `values` has room for the outputs twice. */
 static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values, double *peaks) {
     const double *times = of_run(&plan->times, run), *input = of_run(&plan->inputs, run);
-    for (size_t i = 0; i < columns(plan); i++) peaks[i] = 0.0;
+    const size_t last = columns(plan) - 1;
+    double *is = values, *was = values + plan->n_outputs;
+    for (size_t i = 0; i <= last; i++) peaks[i] = 0.0;
     int status = begin(fmu, times[0], plan->parameter_references, plan->n_parameters, of_run(&plan->parameters, run));
+    if (plan->n_zones > 0) {
+        peaks[last] = INFINITY;
+        if (status == GOOD) status = get(fmu, plan->output_references, plan->n_outputs, is);
+    }
     for (size_t k = 0; k < plan->steps && status == GOOD; k++, input += plan->n_inputs) {
         status = set(fmu, plan->input_references, plan->n_inputs, input);
         if (status == GOOD) status = step(fmu, times[k], times[k + 1] - times[k]);
         const bool counts = times[k + 1] >= plan->since;
-        if (status != GOOD || (!counts && plan->n_components == 0)) continue;
-        status = get(fmu, plan->output_references, plan->n_outputs, values);
-        for (size_t i = 0; counts && i < plan->n_outputs; i++) peaks[i] = fmax(peaks[i], fabs(values[i]));
-        if (plan->n_components > 0) peaks[plan->n_outputs] = fmax(peaks[plan->n_outputs], length(plan, values));
+        if (status != GOOD || (!counts && plan->n_components == 0 && plan->n_zones == 0)) continue;
+        double *const other = was;
+        was = is, is = other;
+        status = get(fmu, plan->output_references, plan->n_outputs, is);
+        for (size_t i = 0; counts && i < plan->n_outputs; i++) peaks[i] = fmax(peaks[i], fabs(is[i]));
+        if (plan->n_components > 0) peaks[plan->n_outputs] = fmax(peaks[plan->n_outputs], length(plan, is));
+        if (plan->n_zones > 0) peaks[last] = fmin(peaks[last], room(plan, was, is));
     }
     return status;
 }

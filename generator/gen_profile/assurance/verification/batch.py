@@ -11,6 +11,7 @@ from contextvars import ContextVar
 import attrs
 import numpy as np
 
+from gen_profile.dynamics.evaluation.clearance import zones_of
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
@@ -19,6 +20,7 @@ from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.many_runs import ManyRuns
 
+NOWHERE = ((np.inf, -np.inf),) * 2  # in place of where a body stands at the start or the target
 _most: ContextVar[int] = ContextVar("_most", default=sys.maxsize)
 
 
@@ -93,8 +95,8 @@ def residual_peaks(
 
     Returns
     -------
-    (runs, loads) or (runs, loads + 1) array
-        m.
+    (runs, loads) array, or with more columns
+        m; the last one is the least room to stacks, where the spec has some.
 
     Raises
     ------
@@ -109,9 +111,24 @@ def residual_peaks(
     inputs = {
         f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
     }
-    outputs = [f"sway.{load}" for load in plant.loads]
+    zones = np.array(
+        [
+            [
+                2.0 * zone.body,
+                2.0 * zone.body + 1.0,
+                zone.low,
+                zone.high,
+                zone.top,
+                *np.ravel((*zone.own, *NOWHERE)[:2]),
+            ]
+            for zone in zones_of(spec)
+        ]
+    ).reshape(-1, 9)
+    places = [f"position.{body}.{along}" for body in plant.bodies for along in "xz"] if len(zones) else []
+    outputs = [*places, *(f"sway.{load}" for load in plant.loads)]
     components = plant.directions if on_the_way else 0
-    return runs.peaks(feed.times, inputs, values, outputs, since=since, components=components)
+    found = runs.peaks(feed.times, inputs, values, outputs, since=since, components=components, zones=zones)
+    return found[:, len(places) :]
 
 
 def processors() -> int:

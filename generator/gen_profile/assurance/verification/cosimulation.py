@@ -8,6 +8,7 @@ import numpy as np
 
 from gen_profile.assurance.verification.plausibility import implausibilities
 from gen_profile.assurance.verification.verdict import Check, Finding
+from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.dynamics.evaluation.residual_sway import (
     RESIDUAL_SAMPLES,
     STANDSTILL,
@@ -15,8 +16,9 @@ from gen_profile.dynamics.evaluation.residual_sway import (
     observation_time,
 )
 from gen_profile.dynamics.evaluation.scenarios import Scenario
-from gen_profile.dynamics.evaluation.simulation import Response, Sway
+from gen_profile.dynamics.evaluation.simulation import Response, Sway, body_places
 from gen_profile.dynamics.evaluation.static_deflection import in_wind
+from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
@@ -114,7 +116,7 @@ def judge(
     after = [_from(response, arrival_time) for response in responses]
     error = _greatest_distance(responses, expected, judged_from(spec, followed or setpoints))
     between = max(above_samples(response.sway) for response in after)
-    if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
+    if _whole_way(spec):  # until the last setpoint samples are farther apart
         moving = len(setpoints.times)
         between = max(between, *(above_samples(response.sway[:moving]) for response in responses))
     pairs = zip(machines, responses, strict=True)
@@ -124,6 +126,7 @@ def judge(
         arrival=arrival(spec, setpoints),
         findings=tuple(_finding(spec, machine, response, arrival_time) for machine, response in pairs),
         sway_limit=spec.limits.sway,
+        path=spec.path,
         wind=in_wind(spec, machines),
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
@@ -151,7 +154,12 @@ def beyond_equations(
 
 def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
     """Time in s from which sway counts."""
-    return (1.0 - ROUNDING) * arrival(spec, setpoints) if spec.limits.sway is None else 0.0
+    return 0.0 if _whole_way(spec) else (1.0 - ROUNDING) * arrival(spec, setpoints)
+
+
+def _whole_way(spec: Spec) -> bool:
+    """Whether what loads do on the way is judged, too."""
+    return spec.limits.sway is not None or spec.path is not None
 
 
 def _greatest_distance(responses: Sequence[Sway], expected: Sequence[Sway], since: float) -> float:
@@ -202,9 +210,15 @@ def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) 
     plant, after = spec.machine(), _from(response, arrival)
     modal = modal_amplitudes(plant, machine.parameters, after)
     end_load = length(response.sway[:, plant.end_load])
+    near = None
+    if spec.path is not None:
+        p = parameter_rows(plant, [machine.parameters])
+        near = nearest(spec, response.times, body_places(plant, response.q_u, response.position, p))
     return Finding(
         scenario=machine,
         residual=dict(zip(plant.loads, map(float, peak(after.sway)), strict=True)),
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
         on_the_way=None if spec.limits.sway is None else float(np.abs(end_load).max()),
+        room=None if near is None else near.room,
+        nearest=near,
     )

@@ -140,5 +140,10 @@ def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) 
 def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:
     """Take the peaks; amplitudes of modes are known of the machines' trajectories only."""
     residual = dict(zip(spec.machine().loads, map(float, peaks), strict=False))
-    transient = None if spec.limits.sway is None else float(peaks[-1])
-    return Finding(scenario=row, residual=residual, modal=residual, on_the_way=transient)
+    return Finding(
+        scenario=row,
+        residual=residual,
+        modal=residual,
+        on_the_way=None if spec.limits.sway is None else float(peaks[len(residual)]),
+        room=None if spec.path is None else float(peaks[-1]),
+    )

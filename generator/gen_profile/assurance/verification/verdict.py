@@ -6,15 +6,18 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.dynamics.evaluation.clearance import Nearest
 from gen_profile.dynamics.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
 from gen_profile.dynamics.evaluation.static_deflection import StaticDeflection
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE
+from gen_profile.spec.stacks import StacksSpec
 from gen_profile.support.errors import CheckFailed
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.summary import Drawable, Tabled
 
 QUANTILES = (0.5, 0.9, 0.99)  # of the residual sways of a group, as they are reported
 FINE = 1e3  # µm, up to which an error is shown in these
+ROOM_TOLERANCE = 5e-4  # m, by which a load may be nearer to a stack than the clearance
 MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed: a manifest must not hold thousands
 
 
@@ -31,12 +34,35 @@ class Finding:
         Sum of the modes' amplitudes at standstill in m: what the sway of every load can ever reach.
     on_the_way : float or None
         Greatest sway of the end load at any time in m, where that is limited.
+    room : float or None
+        Least room to stacks beyond the clearance in m, where the spec has some; negative where it is broken.
+    nearest : Nearest or None
+        When and where that is, as far as it is known.
     """
 
     scenario: Scenario
     residual: Mapping[str, float]
     modal: Mapping[str, float]
     on_the_way: float | None = None
+    room: float | None = None
+    nearest: Nearest | None = None
+
+    def nearness(self, path: StacksSpec | None) -> Phrase:
+        """Say how near to a stack a load comes, and where as far as that is known."""
+        room = self.room or 0.0
+        template = (
+            "keeps the clearance with {room:.4g} mm to spare" if room >= 0.0 else "{room:.4g} mm too near"
+        )
+        kept = Phrase(template, room=1e3 * abs(room))
+        if self.nearest is None or path is None:
+            return kept
+        return Phrase(
+            "{kept}: {body} at the stack from {stack}, after {time:.4g} s",
+            kept=kept,
+            body=self.nearest.body,
+            stack=path.named(self.nearest.stack),
+            time=self.nearest.time,
+        )
 
 
 class Examination:
@@ -92,6 +118,8 @@ class Check(Drawable, Tabled, Examination):
         What the spec states and hardly means, a sentence each.
     wind : StaticDeflection or None
         What the spec's wind adds to every sway for as long as it blows, which is not judged.
+    path : StacksSpec or None
+        What stands in the way of the loads.
     """
 
     limit: Mapping[str, float]
@@ -105,6 +133,7 @@ class Check(Drawable, Tabled, Examination):
     searched: int = 0
     plausibility_warnings: tuple[str, ...] = ()
     wind: StaticDeflection | None = None
+    path: StacksSpec | None = None
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -149,6 +178,18 @@ class Check(Drawable, Tabled, Examination):
         if self.sway_limit is None or finding.on_the_way is None:
             return 0.0
         return (finding.on_the_way + self.error_bound) / (SWAY_TOLERANCE * self.sway_limit)
+
+    def _share_of_room(self, finding: Finding) -> float:
+        """Tell by how much in m a load is nearer to a stack than it may be, above 1."""
+        if finding.room is None:
+            return 0.0
+        return max(1.0 - (finding.room - self.error_bound + ROOM_TOLERANCE), 0.0)
+
+    @property
+    def nearest(self) -> Finding | None:
+        """The machine that has the least room to stacks; none where there are none."""
+        rooms = [one for one in self.judged if one.room is not None]
+        return min(rooms, key=lambda one: one.room or 0.0) if rooms else None
 
     @property
     def worst(self) -> tuple[str, Finding]:
@@ -211,6 +252,11 @@ class Check(Drawable, Tabled, Examination):
                 "ranges."
             )
             yield self._exceeded(template, swaying, load, swaying.on_the_way or 0.0, self.sway_limit)
+        near = max(findings, key=self._share_of_room)
+        if self._share_of_room(near) > 1.0:
+            template = "path.clearance: {where} ({name}; integration error up to {error})."
+            where = near.nearness(self.path)
+            yield Phrase(template, where=where, name=near.scenario.name, error=self._error())
 
     def _exceeded(self, template: str, finding: Finding, load: str, sway: float, limit: float) -> Phrase:
         name, error = finding.scenario.name, self._error()
@@ -232,6 +278,7 @@ class Check(Drawable, Tabled, Examination):
             "sway_limit_m": self.sway_limit,
             "machines_searched": self.searched,
             "wind": None if self.wind is None else self.wind.to_dict(),
+            "nearest": self._nearest(),
             "groups": [self._group(name, findings) for name, findings in self.groups.items()],
             "scenarios": [
                 {
@@ -244,6 +291,7 @@ class Check(Drawable, Tabled, Examination):
                     "residual_peaks_m": dict(finding.residual),
                     "residual_modal_m": dict(finding.modal),
                     "sway_peak_m": finding.on_the_way,
+                    "room_m": finding.room,
                     "passed": self.keeps_limit(finding),
                 }
                 for finding in self.listed()
@@ -266,7 +314,19 @@ class Check(Drawable, Tabled, Examination):
         return max(self._share_after(finding, load) for load in self.limit)
 
     def _share(self, finding: Finding) -> float:
-        return max(self.fraction_after(finding), self._share_on_the_way(finding))
+        return max(
+            self.fraction_after(finding), self._share_on_the_way(finding), self._share_of_room(finding)
+        )
+
+    def _nearest(self) -> dict[str, Any] | None:
+        finding = self.nearest
+        if finding is None:
+            return None
+        where = finding.nearest
+        place = dict.fromkeys(("time_s", "stack", "body"))
+        if where is not None:
+            place = {"time_s": where.time, "stack": where.stack, "body": where.body}
+        return {"room_m": finding.room, "row": finding.scenario.row, **place}
 
     def _end_load(self, finding: Finding) -> float:
         return max(finding.residual[load] for load in list(self.limit)[-self.directions :])

@@ -144,8 +144,12 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
             since=since,
             on_the_way=sway is not None,
         )
-        taken = peaks[:, : len(limits)] / limits
-        return np.column_stack([taken, peaks[:, -1] / sway]) if sway is not None else taken
+        figures = [peaks[:, : len(limits)] / limits]
+        if sway is not None:
+            figures.append(peaks[:, len(limits)] / sway)
+        if spec.path is not None:
+            figures.append(-peaks[:, -1])
+        return np.column_stack(figures)
 
     return worst_places(shares, begun, KEPT)
 

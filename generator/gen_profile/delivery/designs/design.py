@@ -116,6 +116,11 @@ class Design(Drawable):
     def _solver(self) -> dict[str, Any]:
         """Tell how the motion was found; what a shaper has not is null."""
         solution, spec, seconds = self.plan.solution, self.spec.solver, {"time_s": self.plan.solver_time}
+        passage = self.plan.passage
+        if passage is not None:
+            passed = {"status": "converged", "method": "over-stacks", "iterations": passage.programs}
+            told = {"one_by_one_s": passage.one_by_one, "lift_m": passage.lift}
+            return {**passed, "residual": None, **seconds, "cost": None, **told}
         if solution is None:
             shaped = {"status": "shaped", "method": spec.method, "base": spec.base, "iterations": 0}
             return {**shaped, "residual": None, **seconds, "cost": None}

@@ -159,6 +159,12 @@ class PlantSimulation:
         q_a = self._profile.derivative(times, 0) if by_place else self._profile.start[None]
         return sway(q_u, q_a, self._p[:, None])[..., 0]
 
+    def bodies(self, times: Array) -> Array:
+        """Places of the bodies in m at rising times in s, shape (machines, times, bodies, 3)."""
+        return body_places(
+            self.plant, self.states(times)[0], self._profile.derivative(times, 0), self._p[:, None]
+        )
+
 
 def greatest_sway(
     plant: Plant,
@@ -326,6 +332,18 @@ def _sway(plant: Plant) -> tuple[Function, bool]:
     """Compile the sway of (q_u, q_a, p), where nothing else is looked at; and whether q_a changes it."""
     d = dynamics(plant)
     return Function("sway", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, d.sway), sym.depends(d.sway, d.q_a)
+
+
+def body_places(plant: Plant, q_u: Array, q_a: Array, p: Array) -> Array:
+    """Find x, y and z of the bodies of machines in m, shape (…, bodies, 3), of coordinates and parameters."""
+    found = _places(plant)(q_u, q_a, p)[..., 0]
+    return found.reshape(*found.shape[:-1], len(plant.bodies), 3)
+
+
+@cache
+def _places(plant: Plant) -> Function:
+    d = dynamics(plant)
+    return Function("places", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, d.place)
 
 
 def motion_of(profile: Profile) -> Callable[[Array], Array]:

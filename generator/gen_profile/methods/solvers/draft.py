@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from gen_profile.dynamics.evaluation.clearance import Nearest
 from gen_profile.dynamics.evaluation.motion_evaluation import (
     MotionEvaluation,
     evaluate,
@@ -31,6 +32,35 @@ ROOM = 2.0  # times a shaper's delay, which leaves the base move as much time
 WITHIN = 0.99
 
 
+@attrs.frozen(kw_only=True)
+class Passage:
+    """What is known of a motion over stacks.
+
+    Attributes
+    ----------
+    lift : float
+        How far the hoist lifts from the start, in m.
+    one_by_one : float or None
+        Duration in s of lifting, travelling and lowering one after the other, where one was found.
+    nearest : Nearest
+        Of machines all over the ranges.
+    programs : int
+        That were solved.
+    """
+
+    lift: float
+    one_by_one: float | None
+    nearest: Nearest
+    programs: int
+
+    def gained(self, duration: float) -> str:
+        """Compare a duration in s with that of one axis after the other."""
+        if self.one_by_one is None:
+            return f"{duration:.4g} s"
+        saved = 100.0 * (1.0 - duration / self.one_by_one)
+        return f"{duration:.4g} s, {saved:.3g} % less than one axis after the other ({self.one_by_one:.4g} s)"
+
+
 @attrs.frozen(kw_only=True, eq=False, repr=False)
 class Plan(Drawable):
     """A motion for a spec, of which nothing is written yet, or none.
@@ -45,12 +75,15 @@ class Plan(Drawable):
         Motion of the axes, there in what `gen_profile.plan` gives.
     solver_time : float
         s.
+    passage : Passage or None
+        Of a motion over stacks, which has no solution.
     """
 
     spec: Spec
     solution: Solution | None
     found: Profile | None
     solver_time: float = 0.0
+    passage: Passage | None = None
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""

@@ -2,9 +2,10 @@
 
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers.draft import Plan, solved
+from gen_profile.methods.solvers.over_stacks.plan import over_stacks
 from gen_profile.methods.solvers.shortest import shortest
 from gen_profile.methods.solvers.solution import SIMPLER, Status, no_motion
-from gen_profile.methods.solvers.suggestions import explained, remedy
+from gen_profile.methods.solvers.suggestions import Remedy, explained, remedy
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import LimitViolation
 from gen_profile.support.progress import Progress, no_progress
@@ -37,6 +38,8 @@ def draft(spec: Spec, progress: Progress = no_progress) -> Plan:
     OutOfWork
         Nothing is left of a budget.
     """
+    if spec.path is not None:
+        return over_stacks(spec, progress)
     if spec.move.shortest:
         return shortest(spec, progress)
     progress("solving")
@@ -59,7 +62,7 @@ def judged(drafted: Plan, progress: Progress = no_progress) -> Plan:
         explained(spec, drafted.solution).raise_for_status()
     if drafted.broken:
         progress(EXPLAINING)
-        better = remedy(spec)
+        better = Remedy() if spec.path is not None else remedy(spec)  # which knows no stacks
         raise LimitViolation(
             *(one.sentence() for one in drafted.broken),
             *filter(None, [better.advice]),

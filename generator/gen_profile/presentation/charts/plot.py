@@ -15,7 +15,13 @@ from gen_profile.dynamics.evaluation.phrases import number
 from gen_profile.methods.solvers.draft import Plan
 from gen_profile.motion.profile import Profile
 from gen_profile.presentation.charts.comparison import comparison_figure
-from gen_profile.presentation.charts.curves import motion_figure, profile_figure, select_machines, sway_figure
+from gen_profile.presentation.charts.curves import (
+    motion_figure,
+    path_figure,
+    profile_figure,
+    select_machines,
+    sway_figure,
+)
 from gen_profile.presentation.charts.figure import PLAIN, Bars, Figure
 from gen_profile.presentation.charts.identification import identification_figure, log_figure
 from gen_profile.presentation.charts.machine import draw_machine
@@ -97,7 +103,12 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
         case Plan(spec=spec, evaluation=evaluation):
             arrival = evaluation.motion.duration
             sway = sway_figure(spec, evaluation, select_machines(evaluation), arrival)
-            return [motion_figure(spec, evaluation), sway], spec.name, f"{spec.name}: {spec.plant.type}"
+            over = [] if spec.path is None else [path_figure(spec, evaluation, select_machines(evaluation))]
+            return (
+                [motion_figure(spec, evaluation), *over, sway],
+                spec.name,
+                f"{spec.name}: {spec.plant.type}",
+            )
         case Profile(method=method):
             return [profile_figure(result)], method, method
         case Check():

@@ -116,7 +116,7 @@ def report(
     measured = None
     if read is not None:
         measured = compare_measured(outcome.spec, outcome.plan.evaluation, read, arrival, log_start)
-    comparison = compare(spec, progress) if compared else None
+    comparison = compare(spec, progress) if compared and spec.path is None else None
     progress("writing the report")
     page = _page(outcome, comparison, measured).with_fields(fields)
     return Report(design=outcome, comparison=comparison, measured=measured, content=render(page))

@@ -19,6 +19,7 @@ from gen_profile.presentation.charts.comparison import compared_styles, comparis
 from gen_profile.presentation.charts.curves import (
     hamiltonian_figure,
     motion_figure,
+    path_figure,
     select_machines,
     spectrum_figure,
     sway_figure,
@@ -106,6 +107,11 @@ def sections(
     words = "All machines follow the same setpoints. Dashed: where the loads would be if nothing swung."
     played = animation(spec, evaluation, shown, check.arrival)
     yield Section(title="The machine plays the move", words=[words], blocks=[played])
+    if outcome.plan.passage is not None and check.nearest is not None:
+        near, gained = check.nearest, outcome.plan.passage.gained(evaluation.motion.duration)
+        kept = f"The clearance on {machine(near.scenario.name)}: {near.nearness(spec.path)}."
+        over = path_figure(spec, evaluation, shown)
+        yield Section(title="Over the stacks", words=[f"{gained}.", kept], blocks=[over])
     limits = _limits(spec, evaluation, outcome.figures, check)
     yield Section(title="Limits and margins", blocks=[limits])
     figures = [motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]
@@ -258,7 +264,14 @@ def _methods(comparison: Comparison) -> Section:
 
 
 def _evidence(outcome: Design) -> Section:
-    solution = outcome.plan.solution
+    solution, passage = outcome.plan.solution, outcome.plan.passage
+    if passage is not None:
+        words = (
+            "The hoist's motion is known in closed form, and the trolley's was found by "
+            f"{passage.programs} convex programs in {outcome.plan.solver_time:.2g} s; machines all over the "
+            "ranges were followed afterwards."
+        )
+        return Section(title="Solver evidence", words=(words,), blocks=[])
     if solution is None:
         base, method = outcome.spec.solver.base, outcome.spec.solver.method
         words = f"The motion is a {base} move through the shaper {method}; nothing was optimised."

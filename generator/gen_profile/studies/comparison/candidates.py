@@ -16,6 +16,7 @@ from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
+from gen_profile.spec.stack_rules import refuse_stacks
 from gen_profile.spec.values import NONE
 from gen_profile.support.errors import GenProfileError, InfeasibleProblem, SpecError
 
@@ -71,8 +72,9 @@ def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
     Raises
     ------
     SpecError
-        Two have the same name.
+        Two have the same name; or there is a path over stacks.
     """
+    refuse_stacks(spec, "a comparison of methods")
     known = [*SHAPERS, *(candidate.method for candidate in _optimal_candidates(spec))]
     for motion in own:
         if motion.method in known:

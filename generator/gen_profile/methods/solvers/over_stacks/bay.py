@@ -1,0 +1,217 @@
+"""A path over stacks as the programs take it: machines, their ends, and when each load is high enough."""
+
+import math
+
+import attrs
+import numpy as np
+
+from gen_profile.dynamics.evaluation.scenarios import scenarios
+from gen_profile.dynamics.problem.dynamics import parameter_rows
+from gen_profile.dynamics.problem.initial_state import initial_state
+from gen_profile.methods.solvers.over_stacks.hoist import Pieces, Rates, highest, least_time
+from gen_profile.methods.solvers.over_stacks.swing import Swing, swing_of
+from gen_profile.motion.profile import Array
+from gen_profile.plants.plant import Plant, decides
+from gen_profile.spec.model import AxisLimitsSpec, Spec
+from gen_profile.spec.stacks import Zone, hanging, trolley_and_hoist, zones
+
+FINE = 4001  # times at which levels are compared; between them they are straight lines
+UNLIMITED = 1e4  # in place of a limit of the trolley that is not stated
+EDGE = 1e-9  # s, to either side of a crossing
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Bay:
+    """What is asked for.
+
+    Attributes
+    ----------
+    spec : Spec
+    plant : Plant
+    trolley, hoist : int
+        Numbers of the axes.
+    nominal, others : Swing
+        Of the nominal machine, with sensitivities, and of the machines at the ends of all ranges.
+    machines : (machines, parameters) array
+        Nominal first.
+    hang : (machines, bodies) array
+        Heights of the bodies at the start, m above the suspension.
+    zones : tuple of Zone
+    """
+
+    spec: Spec
+    plant: Plant
+    trolley: int
+    hoist: int
+    nominal: Swing
+    others: Swing
+    machines: Array
+    hang: Array
+    zones: tuple[Zone, ...]
+
+    @property
+    def limits(self) -> AxisLimitsSpec:
+        """Of the trolley."""
+        return self.spec.limits.of(self.trolley)
+
+    @property
+    def rates(self) -> Rates:
+        """Of the hoist."""
+        return _rates(self.spec.limits.of(self.hoist))
+
+    @property
+    def begin(self) -> Array:
+        """State of the nominal machine at the start, sensitivities included."""
+        state = np.zeros(self.nominal.states)
+        state[0] = self.spec.move.start[self.trolley]
+        swing = initial_state(self.plant, self.spec.move.initial)
+        state[3 : 3 + len(swing)] = swing
+        return state
+
+    @property
+    def target(self) -> float:
+        """Of the trolley in m."""
+        return self.spec.move.target[self.trolley]
+
+    @property
+    def rise(self) -> float:
+        """From start to target in m, upwards."""
+        return -self.spec.move.distance[self.hoist]
+
+    @property
+    def top(self) -> float:
+        """How far the hoist can lift from the start in m."""
+        travel, start = self.spec.limits.of(self.hoist).travel, self.spec.move.start[self.hoist]
+        least = self.plant.actuated[self.hoist].lower
+        return start - max(least, travel[0] if travel else least)
+
+    @property
+    def needed(self) -> float:
+        """How far the hoist has to lift from the start in m, so that all loads clear what is between."""
+        passed = filter(self.passes, self.zones)
+        lifts = [zone.top - float(self.hang[:, zone.body].min()) for zone in passed]
+        return max(0.0, self.rise, *lifts)
+
+    @property
+    def way(self) -> float:
+        """Of the trolley in m."""
+        return abs(self.target - float(self.begin[0]))
+
+    def passes(self, zone: Zone) -> bool:
+        """Whether a body has to go over a stack."""
+        return len(set(self._sides(zone))) > 1
+
+    def alone(self) -> "Bay":
+        """Leave the nominal machine only."""
+        return attrs.evolve(self, machines=self.machines[:1], hang=self.hang[:1])
+
+    def quickest_travel(self) -> float:
+        """Least time in s that the trolley takes by itself."""
+        return least_time(self.way, _rates(self.limits)) if self.way else 0.0
+
+    def quickest_lift(self, lift: float) -> float:
+        """Least time in s that the hoist takes to rest at a height and go on from there to the target."""
+        return least_time(lift, self.rates) + least_time(self.rise - lift, self.rates)
+
+    def lifted(self, duration: float, top: float, waits: tuple[float, float] = (0.0, 0.0)) -> Pieces | None:
+        """Find the hoist's motion upwards, at most as high as the top; none in too little time."""
+        motion = highest(duration - sum(waits), self.rise, top, self.rates)
+        return motion if motion is None or not any(waits) else motion.within(*waits)
+
+    def _sides(self, zone: Zone) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Between which places a body may be while it is low, before a stack and after it."""
+        return _side(zone, float(self.begin[0])), _side(zone, self.target)
+
+    def bounds(self, machine: int, body: int, up: Pieces, times: Array) -> tuple[Array, Array]:
+        """Tell between which places a body of a machine may be at some times, as a hoist lifts it."""
+        low, high = np.full(len(times), -np.inf), np.full(len(times), np.inf)
+        fine = np.linspace(0.0, up.duration, FINE)
+        level = self.hang[machine, body] + up.at(fine)[:, 0]
+        for zone in self.zones:
+            if zone.body != body:
+                continue
+            rises, falls = _crossings(fine, level, zone.top)
+            for (left, right), counts in zip(
+                self._sides(zone), (times <= rises + EDGE, times >= falls - EDGE), strict=True
+            ):
+                low[counts] = np.maximum(low[counts], left)
+                high[counts] = np.minimum(high[counts], right)
+        return low, high
+
+    def events(self, machine: int, up: Pieces) -> Array:
+        """List the times at which bodies of a machine cross the heights of stacks."""
+        fine = np.linspace(0.0, up.duration, FINE)
+        lifted = up.at(fine)[:, 0]
+        crossed = [_crossings(fine, self.hang[machine, zone.body] + lifted, zone.top) for zone in self.zones]
+        return np.unique([time for pair in crossed for time in pair if 0.0 < time < up.duration])
+
+
+def bay_of(spec: Spec, reserve: float = 0.0) -> Bay:
+    """State the path of a spec over its stacks, with so much more clearance in m."""
+    plant, path, move = spec.machine(), spec.path, spec.move
+    axes = trolley_and_hoist(plant, spec.plant.parameters)
+    assert path is not None and axes is not None  # as the spec's rules hold
+    trolley, hoist = axes
+    sideways, above = path.clearances
+    wider = attrs.evolve(path, clearance=(sideways + reserve, above + reserve))
+    named = _machines(spec, plant)
+    ends = [hanging(plant, spec.plant.parameters, q_a) for q_a in (move.start, move.target)]
+    hang = np.array([[z for _, z in hanging(plant, values, move.start)] for values in named])
+    desensitized = tuple(spec.robustness.uncertain) if spec.robustness.method == "sensitivity" else ()
+    return Bay(
+        spec=spec,
+        plant=plant,
+        trolley=trolley,
+        hoist=hoist,
+        nominal=swing_of(plant, trolley, desensitized),
+        others=swing_of(plant, trolley, ()),
+        machines=parameter_rows(plant, named),
+        hang=hang,
+        zones=zones(wider, ends),
+    )
+
+
+def _machines(spec: Spec, plant: Plant) -> list[dict[str, float]]:
+    """List the nominal machine, and those at ends and corners of ranges that matter."""
+    nominal = dict(spec.plant.parameters)
+    found = [nominal]
+    idle = {name for name in spec.checked_ranges() if not decides(plant, name, nominal)}
+    for row in scenarios(spec)[1:]:
+        values = {name: nominal[name] if name in idle else value for name, value in row.parameters.items()}
+        if values not in found:
+            found.append(values)
+    return found
+
+
+def _rates(limits: AxisLimitsSpec) -> Rates:
+    return Rates(
+        speed=limits.velocity or UNLIMITED,
+        acceleration=limits.acceleration or UNLIMITED,
+        jerk=limits.jerk or UNLIMITED,
+    )
+
+
+def _side(zone: Zone, end: float) -> tuple[float, float]:
+    """Between which places a body may be that is on its end's side of a stack."""
+    if end <= zone.low:
+        return (-math.inf, zone.low)
+    if end >= zone.high:
+        return (zone.high, math.inf)
+    return next(((a, b) for a, b in zone.own if a <= end <= b), (-math.inf, math.inf))
+
+
+def _crossings(times: Array, level: Array, top: float) -> tuple[float, float]:
+    """Tell until when a level is too low on its way up, and from when on its way down."""
+    peak = int(np.argmax(level))
+    low = level < top
+    if low[peak]:
+        return float(times[peak]), float(times[peak])
+    before, after = np.flatnonzero(low[:peak]), np.flatnonzero(low[peak:])
+    rises = -1.0 if not len(before) else _crossed(times, level, top, int(before[-1]))
+    falls = times[-1] + 1.0 if not len(after) else _crossed(times, level, top, peak + int(after[0]) - 1)
+    return rises, float(falls)
+
+
+def _crossed(times: Array, level: Array, top: float, k: int) -> float:
+    share = (top - level[k]) / (level[k + 1] - level[k])
+    return float(times[k] + share * (times[k + 1] - times[k]))

@@ -1,0 +1,354 @@
+"""The quickest motion over stacks, or the calmest within a time: searches over convex programs."""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.dynamics.evaluation.clearance import Nearest, nearest
+from gen_profile.dynamics.evaluation.simulation import PlantSimulation
+from gen_profile.dynamics.problem.parameter_box import machines_of
+from gen_profile.dynamics.problem.problem import problem_of
+from gen_profile.methods.solvers.draft import Passage, Plan, in_cycles, lasting, suggested
+from gen_profile.methods.solvers.over_stacks.bay import Bay, bay_of
+from gen_profile.methods.solvers.over_stacks.hoist import Pieces
+from gen_profile.methods.solvers.over_stacks.program import INTERVAL, Course, Program, resting
+from gen_profile.methods.solvers.search import Search, least
+from gen_profile.motion.profile import Array, Profile
+from gen_profile.spec.model import Spec
+from gen_profile.spec.stacks import Zone
+from gen_profile.spec.values import LONGEST_MOVE
+from gen_profile.support.errors import (
+    Code,
+    InfeasibleProblem,
+    NoMotion,
+    Reason,
+    SolverDiverged,
+    Suggestion,
+    rounded_down,
+    rounded_up,
+)
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.progress import Progress, no_progress
+
+METHOD = "over stacks"
+RESERVE = 2e-3  # m of clearance, for what lies between the steps of programs
+ENOUGH = 5e-4  # m that may be missing to it
+# how much room is missing falls with the duration by about the trolley's speed
+ROUGH = Search(precision=4e-3, close=8e-3, slope=2.0, believed=(0.2, 20.0), longest=0.4, downward=True)
+EXACT = attrs.evolve(ROUGH, precision=8e-4, close=1e-3)
+DECIDED_BY_HOIST = 0.3  # s, beyond the hoist's own least time, up to which no other height is quicker
+LOWER = (0.0, 0.25, 0.5, 0.75)  # of the way from the height that is needed to the top, as other heights
+WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # s before the hoist begins, and after it ends
+WORTH = 2e-3  # of the duration, that another height must save
+ROUNDS = 8  # of linearising anew
+SETTLED = 1e-6  # m, rad and their rates, by which states change from one program to the next
+LONGER = 2e-3  # of the duration that is added where the machines themselves have too little room
+TRIES = 12
+WATCHED = 4001  # times at which machines are looked at
+NEARLY = (
+    0.3  # m that may be missing where machines are linear about rest: as they swing, they have more or less
+)
+ACCURACY = 1e-7  # of machines that are looked at, relative
+CLOSE = 1e-9  # s, between knots that are one
+OVERALL = 1e-3  # m of clearance that is asked for beyond what another machine of the ranges lacked
+
+Lifted = Callable[[float], Pieces | None]  # from a duration in s to the hoist's motion
+
+
+@attrs.define(kw_only=True)
+class _Planner:
+    """Searches over programs, and counts them."""
+
+    bay: Bay
+    programs: int = 0
+
+    def solved(self, about: Course, *, smooth: bool = False) -> Course | None:
+        """Solve a program about a course."""
+        self.programs += 1
+        return Program(bay=self.bay, about=about).solve(smooth=smooth)
+
+    def quickest(
+        self, lifted: Lifted, start: float, search: Search, near: Course | None = None
+    ) -> Course | None:
+        """Find the course of least duration that has room, machines being linear about rest or another."""
+        found: dict[float, Course] = {}
+
+        def excess(duration: float) -> float:
+            up = lifted(duration)
+            about = None if up is None else stretched(near, up) if near else resting(self.bay, up)
+            course = None if about is None else self.solved(about)
+            if course is None:
+                return math.inf
+            found[duration] = course
+            return (max(-course.room, course.miss) - ENOUGH) / max(self.bay.way, 1.0)
+
+        duration = least(excess, start, search, LONGEST_MOVE)
+        return None if duration is None else found[duration]
+
+    def course(self) -> Course:
+        """Find what the spec asks for.
+
+        Raises
+        ------
+        InfeasibleProblem, SolverDiverged
+        """
+        _require_height(self.bay)
+        move = self.bay.spec.move
+        found = self.shortest() if move.shortest else self.in_time(move.duration)
+        if found is None:
+            raise _refusal(self)
+        return found
+
+    def shortest(self) -> Course:
+        """Find the quickest course that machines themselves follow with room; it ends on a cycle."""
+        bay, alone = self.bay, _Planner(bay=self.bay.alone())
+        start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
+        lifted: Lifted = partial(bay.lifted, top=bay.top)
+        rough = _there(alone.quickest(lifted, start, ROUGH))
+        if rough.up.duration > bay.quickest_lift(bay.needed) + DECIDED_BY_HOIST:
+            rough, lifted = alone.otherwise_lifted(rough, lifted)
+        self.programs += alone.programs
+        if len(bay.machines) > 1:
+            rough = _there(self.quickest(lifted, rough.up.duration, ROUGH))
+        near = self.solved(rough) or rough
+        course = self.quickest(lifted, near.up.duration, EXACT, near) or near
+        duration = course.up.duration
+        for _ in range(TRIES):
+            up = lifted(in_cycles(bay.spec, duration))
+            assert up is not None  # in more time than before
+            if (settled := self.settled(stretched(course, up))) is not None:
+                return settled
+            duration *= 1.0 + LONGER
+        raise _none_found()
+
+    def otherwise_lifted(self, best: Course, lifted: Lifted) -> tuple[Course, Lifted]:
+        """Look for a lower top, or for waits of the hoist, that are quicker, as where the trolley decides."""
+        bay = self.bay
+        tops = [bay.needed + share * (bay.top - bay.needed) for share in LOWER]
+        for top in tops:
+            for waits in WAITS:
+                way: Lifted = partial(bay.lifted, top=top, waits=waits)
+                while (up := way(best.up.duration * (1.0 - WORTH))) is not None:
+                    course = self.solved(resting(bay, up))
+                    if course is None or not has_room(course):
+                        break
+                    best, lifted = course, way
+        return best, lifted
+
+    def in_time(self, duration: float) -> Course | None:
+        """Find the smoothest course of a duration that lifts little; none where it is too short."""
+        bay = self.bay
+        for top in (*(bay.needed + share * (bay.top - bay.needed) for share in LOWER), bay.top):
+            up = bay.lifted(duration, top)
+            course = None if up is None else self.solved(resting(bay, up))
+            if course is not None and -course.room < NEARLY and course.miss < NEARLY:
+                settled = self.settled(self.solved(course) or course)
+                if settled is not None:
+                    return settled
+        return None
+
+    def settled(self, course: Course) -> Course | None:
+        """Linearise anew until machines do what the program says; the smoothest such course, with room."""
+        for _ in range(ROUNDS):
+            smoother = self.solved(course, smooth=True)
+            if smoother is None:
+                return None
+            pairs = zip(smoother.begins, course.begins, strict=True)
+            moved = max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs)
+            course = smoother
+            if moved < SETTLED:
+                break
+        return course if has_room(course) else None
+
+
+def has_room(course: Course) -> bool:
+    """Whether a course reaches its target with nearly as much room as it shall have."""
+    return course.room >= -ENOUGH and course.miss <= ENOUGH
+
+
+def stretched(course: Course, up: Pieces) -> Course:
+    """Let a course last as long as another motion of the hoist."""
+    ratio = course.up.duration / up.duration
+    slower = np.ones(course.begins[0].shape[-1])
+    slower[:3] = ratio ** np.arange(3.0)
+    nominal, others = course.begins
+    begins = (nominal * slower, others * slower[: others.shape[-1]])
+    return attrs.evolve(course, up=up, jerks=course.jerks * ratio**3, begins=begins)
+
+
+def _there(course: Course | None) -> Course:
+    if course is None:
+        raise _none_found()
+    return course
+
+
+def _none_found() -> SolverDiverged:
+    return SolverDiverged(
+        Phrase("move.duration: no duration was found in which the load passes the stacks; widen the limits."),
+        reasons=[Reason(code=Code.DIVERGED, place="move.duration")],
+    )
+
+
+def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
+    """Find the motion of trolley and hoist over what stands there.
+
+    Raises
+    ------
+    InfeasibleProblem, SolverDiverged
+        With what is in the way, and by how much.
+    """
+    began, reserve = time.perf_counter(), RESERVE
+    progress("solving")
+    for _ in range(ROUNDS):
+        planner = _Planner(bay=bay_of(spec, reserve))
+        course = planner.course()
+        motion = _profile(planner.bay, course)
+        near = _nearest(spec, motion)
+        if near.room >= 0.0:
+            break
+        reserve += OVERALL - near.room
+    passage = Passage(
+        lift=course.up.peak(),
+        one_by_one=_one_by_one(planner.bay),
+        nearest=near,
+        programs=planner.programs,
+    )
+    return Plan(
+        spec=lasting(spec, motion.duration) if spec.move.shortest else spec,
+        solution=None,
+        found=motion,
+        solver_time=time.perf_counter() - began,
+        passage=passage,
+    )
+
+
+def _nearest(spec: Spec, motion: Profile) -> Nearest:
+    """Look for the least room of machines all over the ranges."""
+    named = machines_of(problem_of(spec, whole=True))
+    swing = PlantSimulation(
+        spec.machine(), motion, named, motion.duration, spec.move.initial, accuracy=ACCURACY
+    )
+    times = np.linspace(0.0, motion.duration, WATCHED)
+    return min((nearest(spec, times, bodies) for bodies in swing.bodies(times)), key=lambda one: one.room)
+
+
+def _one_by_one(bay: Bay) -> float | None:
+    """Tell how long lifting, travelling without sway and lowering take one after the other, in s."""
+    lift = bay.needed
+    alone = attrs.evolve(bay.alone(), zones=())
+    held = _Planner(bay=alone).quickest(partial(_held, lift), bay.quickest_travel() + INTERVAL, ROUGH)
+    return None if held is None else bay.quickest_lift(lift) + held.up.duration
+
+
+def _held(lift: float, duration: float) -> Pieces:
+    return Pieces(lengths=np.array([duration]), jerks=np.zeros(1), start=lift)
+
+
+def _profile(bay: Bay, course: Course) -> Profile:
+    """Write the course as polynomials of both axes, with ends that are exact."""
+    lengths = np.full(len(course.jerks), course.up.duration / len(course.jerks))
+    trolley = _to_rest(lengths, course.jerks, float(bay.begin[0]), bay.target)
+    hoist = _to_rest(
+        course.up.lengths, -course.up.jerks, bay.spec.move.start[bay.hoist], bay.spec.move.target[bay.hoist]
+    )
+    knots = np.union1d(trolley.knots, hoist.knots)
+    knots = knots[np.append(np.diff(knots) > CLOSE, True)]
+    knots[0], knots[-1] = 0.0, course.up.duration
+    columns = {bay.trolley: trolley.at(knots[:-1]), bay.hoist: hoist.at(knots[:-1])}
+    taylor = np.stack([columns[axis] for axis in sorted(columns)], axis=2)
+    return Profile(
+        knots=knots,
+        coefficients=taylor / np.array([1.0, 1.0, 2.0, 6.0])[:, None],
+        target=np.array(bay.spec.move.target),
+        method=METHOD,
+    )
+
+
+def _to_rest(lengths: Array, jerks: Array, start: float, target: float) -> Pieces:
+    """Change jerks by as little as ends the motion at rest at its target, to rounding."""
+    knots = np.concatenate([[0.0], np.cumsum(lengths)])
+    left = knots[-1] - knots
+    powers = [-np.diff(left**order) / math.factorial(order) for order in (3, 2, 1)]
+    ends = np.array(powers)
+    missed = np.array([target - start, 0.0, 0.0]) - ends @ jerks
+    weights = lengths[:, None] * ends.T
+    return Pieces(
+        lengths=lengths, jerks=jerks + weights @ np.linalg.solve(ends @ weights, missed), start=start
+    )
+
+
+def _require_height(bay: Bay) -> None:
+    """Refuse stacks that the hoist cannot lift the load over, in any time."""
+    lacking = bay.needed - bay.top
+    if lacking <= 0.0:
+        return
+    path = bay.spec.path
+    assert path is not None
+    highest = max((zone for zone in bay.zones if bay.passes(zone)), key=lambda zone: zone.top)
+    sideways, above = path.clearances
+    less = rounded_down(max(above - lacking - RESERVE, 1e-9))
+    raise InfeasibleProblem(
+        Phrase(
+            "path.stacks: the stack from {stack} is in the way: at the hoist's top the {body} is "
+            "{lacking:.3g} m too low to pass it with path.clearance.",
+            stack=path.named(highest.stack),
+            body=bay.plant.bodies[highest.body],
+            lacking=lacking,
+        ),
+        reasons=[Reason(code=Code.INFEASIBLE, place="path.stacks", found=bay.needed, allowed=bay.top)],
+        suggestions=_tried(bay.spec, {"path.clearance": (sideways, less)}) if less > 1e-3 else (),
+    )
+
+
+def _refusal(planner: _Planner) -> InfeasibleProblem:
+    """Say what is in the way in the time that is asked for, by how much, and which time was found to do."""
+    bay, asked = planner.bay, planner.bay.spec.move.duration
+    up = bay.lifted(asked, bay.top)
+    course = None if up is None else planner.solved(resting(bay, up))
+    sentence = Phrase("move.duration: the hoist alone takes longer than {asked:g} s.", asked=asked)
+    if course is not None:
+        zone, missing = _in_the_way(bay, course)
+        template = (
+            "move.duration: in {asked:g} s the {body} is {missing:.3g} m too near to the stack from {stack}."
+        )
+        body, path = bay.plant.bodies[zone.body], bay.spec.path
+        assert path is not None
+        stack = path.named(zone.stack)
+        sentence = Phrase(template, asked=asked, body=body, missing=missing, stack=stack)
+        if course.miss > max(missing, ENOUGH):
+            template = "move.duration: in {asked:g} s the trolley stays {miss:.3g} m away from its target."
+            sentence = Phrase(template, asked=asked, miss=course.miss)
+    needed = rounded_up(planner.shortest().up.duration)
+    values = {"move.duration": needed}
+    return InfeasibleProblem(
+        sentence,
+        reasons=[Reason(code=Code.TOO_SHORT, place="move.duration", found=asked, allowed=needed)],
+        suggestions=_tried(bay.spec, values),
+    )
+
+
+def _tried(spec: Spec, values: Mapping[str, Any]) -> tuple[Suggestion, ...]:
+    """Suggest values where they give a motion."""
+    try:
+        return (suggested(values, over_stacks(spec.changed(values))),)
+    except NoMotion:
+        return ()
+
+
+def _in_the_way(bay: Bay, course: Course) -> tuple[Zone, float]:
+    """Find the stack that a course comes too near to, and by how much in m."""
+    one = Program(bay=bay, about=course).followed[0]
+    places = one.seen[0, :, 1:].reshape(-1, one.seen.shape[-1])
+    times = np.linspace(0.0, course.up.duration, len(places) + 1)[1:]
+
+    def missing(zone: Zone) -> float:
+        low, high = attrs.evolve(bay, zones=(zone,)).bounds(0, zone.body, course.up, times)
+        x = places[:, zone.body]
+        return float(np.maximum(low - x, x - high).max())
+
+    return max(((zone, missing(zone)) for zone in bay.zones), key=lambda pair: pair[1])

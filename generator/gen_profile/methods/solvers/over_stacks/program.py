@@ -1,0 +1,325 @@
+"""The trolley's convex program for a duration and a hoist's motion: all machines linear about what they did.
+
+Variables are changes of the trolley's jerk in every interval and of all states at its begin; what a load may
+do while it is low are linear bounds of its place, at steps and at the instants at which it crosses a height.
+"""
+
+import math
+from functools import cached_property, partial
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import expm
+
+from gen_profile.dynamics.problem.linearization import linear_terms, linearize
+from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Matrix, place
+from gen_profile.methods.solvers.over_stacks.bay import Bay
+from gen_profile.methods.solvers.over_stacks.hoist import Pieces
+from gen_profile.methods.solvers.over_stacks.swing import TROLLEY, Followed, followed
+from gen_profile.motion.profile import Array
+
+INTERVAL = 0.4  # s, about, of constant jerk
+STEPS = 8  # in each interval, at which bounds hold
+MARGIN = 0.3  # m, of spare room that is worth knowing
+MISSING = 30.0  # times a metre too near to a stack, a metre beside the target counts
+SMOOTH = 1e-4  # of the squared jerk's mean, beside a metre of room
+DEAR = 1e3  # times the squared jerk's mean, a metre too near counts where the jerk is what is minimised
+KEPT_SWAY = 0.998  # share of the limit of sway that is kept at steps, for what lies between them
+KEPT_RESIDUAL = 0.98  # likewise of residual sway
+TURNS = 24  # times within half a period, at which residual sway is held to its limit
+
+Numbers = NDArray[np.intp]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Course:
+    """The trolley's motion by jerks in even intervals, and what every machine does under it.
+
+    Attributes
+    ----------
+    up : Pieces
+        The hoist's motion, upwards.
+    jerks : (intervals,) array
+    begins : tuple of arrays
+        States of the nominal machine at the begin and end of every interval, (intervals + 1, n), and of the
+        others, (machines, intervals + 1, n).
+    room : float
+        m, that is left to the stacks beyond the clearance; negative where it is missing.
+    miss : float
+        m, by which the target is missed.
+    """
+
+    up: Pieces
+    jerks: Array
+    begins: tuple[Array, Array]
+    room: float = -math.inf
+    miss: float = 0.0
+
+
+def resting(bay: Bay, up: Pieces) -> Course:
+    """Begin where everything hangs still at the start."""
+    intervals = max(math.ceil(up.duration / INTERVAL), 4)
+    begin = np.tile(bay.begin, (intervals + 1, 1))
+    other = np.tile(bay.begin[: bay.others.states], (len(bay.machines) - 1, intervals + 1, 1))
+    return Course(up=up, jerks=np.zeros(intervals), begins=(begin, other))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Program:
+    """All machines linear about a course."""
+
+    bay: Bay
+    about: Course
+
+    @property
+    def step(self) -> float:
+        """Of integration in s."""
+        return self.about.up.duration / len(self.about.jerks) / STEPS
+
+    @cached_property
+    def followed(self) -> list[Followed]:
+        """What the machines do, the nominal one first; each is alone along the first axis."""
+        bay, about = self.bay, self.about
+        intervals = len(about.jerks)
+        half = np.arange(2 * STEPS * intervals + 1) * self.step / 2.0
+        lifted = -about.up.at(half.astype(np.float64))[:, :3]
+        lifted[:, 0] += bay.spec.move.start[bay.hoist]
+        rows = np.arange(intervals)[:, None] * 2 * STEPS + np.arange(2 * STEPS + 1)
+        nominal, others = about.begins
+        follow = partial(followed, jerks=about.jerks, hoist=lifted[rows], step=self.step)
+        first = follow(bay.nominal, nominal[None, :-1], bay.machines[:1])
+        if not len(others):
+            return [first]
+        rest = follow(bay.others, others[:, :-1], bay.machines[1:])
+        each = attrs.asdict(rest, recurse=False)
+        return [
+            first,
+            *(Followed(**{k: v[m : m + 1] for k, v in each.items()}) for m in range(len(others))),
+        ]
+
+    @property
+    def width(self) -> int:
+        """Number of states of all machines, the trolley's once."""
+        others = (len(self.bay.machines) - 1) * (self.bay.others.states - TROLLEY)
+        return self.bay.nominal.states + others
+
+    def _columns(self, machine: int) -> Numbers:
+        """Where the states of a machine are among all, and the jerk behind them."""
+        first = self.bay.nominal.states
+        if machine == 0:
+            return np.append(np.arange(first), self.width)
+        own = self.bay.others.states - TROLLEY
+        swing = first + (machine - 1) * own + np.arange(own)
+        return np.concatenate([np.arange(TROLLEY), swing, [self.width]])
+
+    def _rows(self, intervals: Numbers, blocks: Array, machine: int = 0) -> Matrix:
+        """Place rows on a machine's state at the begin of intervals, and on the jerk there.
+
+        Parameters
+        ----------
+        intervals : (count,) array of int
+        blocks : (count, rows, n + 1) array
+        """
+        wide = np.zeros((*blocks.shape[:2], self.width + 1))
+        wide[:, :, self._columns(machine)[: blocks.shape[2]]] = blocks
+        return place(wide, intervals * (self.width + 1), self.variables)
+
+    @property
+    def variables(self) -> int:
+        """Number of them: states and jerks, how far the target is missed, and how much room is missing."""
+        return (len(self.about.jerks) + 1) * (self.width + 1) - 1 + 2
+
+    def solve(self, *, smooth: bool) -> Course | None:
+        """Find the motion with the most room; or the smoothest one, where room suffices.
+
+        Returns
+        -------
+        Course or None
+            None where the program was not solved.
+        """
+        program = ConicProgram(np.ones(self.variables))
+        self._dynamics(program)
+        self._trolley(program)
+        self._ends(program, free=not smooth)
+        for machine in range(len(self.bay.machines)):
+            self._beside(program, machine)
+            self._sway(program, machine)
+            if machine and self.bay.spec.robustness.method != "none":
+                self._left(program, machine)
+        least = sparse.csr_matrix(([-1.0], ([0], [self.variables - 1])), shape=(1, self.variables))
+        program.at_most(least, np.array([-1.0 if smooth else MARGIN - 1.0]))
+        intervals = len(self.about.jerks)
+        jerks = np.arange(intervals) * (self.width + 1) + self.width
+        weight, linear = np.zeros(self.variables), np.zeros(self.variables)
+        scale = (self.bay.limits.jerk or 1.0) ** 2 * intervals / (1.0 if smooth else SMOOTH)
+        weight[jerks], linear[jerks] = 1.0 / scale, self.about.jerks / scale
+        linear[-1], linear[-2] = (DEAR, 0.0) if smooth else (1.0, MISSING)
+        solution = program.solve(sparse.diags(weight, format="csc"), linear)
+        if solution.verdict is not ConicStatus.SOLVED:
+            return None
+        return self._course(solution.x, jerks)
+
+    def _course(self, x: Array, jerks: Numbers) -> Course:
+        """Take the states and jerks that a program found."""
+        changes = np.append(x[:-2], 0.0).reshape(-1, self.width + 1)
+        nominal, others = self.about.begins
+        moved = [changes[:, self._columns(m + 1)[:-1]] for m in range(len(others))]
+        return attrs.evolve(
+            self.about,
+            jerks=self.about.jerks + x[jerks],
+            begins=(nominal + changes[:, : nominal.shape[1]], others + np.array(moved).reshape(others.shape)),
+            room=1.0 - float(x[-1]),
+            miss=float(x[-2]),
+        )
+
+    def _dynamics(self, program: ConicProgram) -> None:
+        """Let every interval begin where the one before it ended, and the first at the start."""
+        first = sparse.eye(self.width, self.variables, format="csr")
+        program.equal(first, np.zeros(self.width))
+        intervals = np.arange(len(self.about.jerks))
+        starts = [self.about.begins[0], *self.about.begins[1]]
+        for machine, (one, begins) in enumerate(zip(self.followed, starts, strict=True)):
+            skipped = TROLLEY if machine else 0
+            ends, along = one.states[0, :, -1, skipped:], one.along[0, :, -1, skipped:]
+            columns = self._columns(machine)
+            blocks = np.zeros((len(intervals), along.shape[1], 2 * self.width + 1))
+            blocks[:, :, columns] = along
+            own = self.width + 1 + columns[skipped:-1]
+            blocks[:, np.arange(along.shape[1]), own] = -1.0
+            matrix = place(blocks, intervals * (self.width + 1), self.variables)
+            program.equal(matrix, (begins[1:, skipped:] - ends).ravel())
+
+    def _trolley(self, program: ConicProgram) -> None:
+        """Hold travel, velocity, acceleration and jerk to limits, by control points of half intervals."""
+        limits, jerks = self.bay.limits, self.about.jerks
+        span = self.step * STEPS
+        begins = self.about.begins[0][:-1, :TROLLEY]
+        intervals = np.arange(len(jerks))
+        ranges = [(limits.travel, 0), (limits.velocity, 1), (limits.acceleration, 2), (limits.jerk, 3)]
+        for stated, order in ranges:
+            if stated is None:
+                continue
+            low, high = stated if isinstance(stated, tuple) else (-stated, stated)
+            points = _control_points(span, order)
+            now = np.concatenate([begins, jerks[:, None]], axis=1) @ points.T
+            blocks = np.zeros((len(jerks), len(points), self.bay.nominal.states + 1))
+            blocks[:, :, [0, 1, 2, -1]] = points
+            matrix = self._rows(intervals, blocks)
+            program.at_most(matrix, (high - now).ravel())
+            program.at_most(-matrix, (now - low).ravel())
+
+    def _ends(self, program: ConicProgram, *, free: bool) -> None:
+        """End at rest, without sway or sensitivity, at the target, or as near to it as can be."""
+        states = self.bay.nominal.states
+        asked = np.zeros(states)
+        asked[0] = self.bay.target
+        left = asked - self.about.begins[0][-1]
+        at = len(self.about.jerks) * (self.width + 1)
+        matrix = sparse.eye(states, self.variables, k=at, format="csr")
+        program.equal(matrix[1:], left[1:])
+        missed = sparse.csr_matrix(([1.0], ([0], [self.variables - 2])), shape=(1, self.variables))
+        if not free:
+            program.equal(missed, np.zeros(1))
+        program.at_most(matrix[:1] - missed, left[:1])
+        program.at_most(-matrix[:1] - missed, -left[:1])
+
+    def _beside(self, program: ConicProgram, machine: int) -> None:
+        """Keep the bodies of a machine beside stacks while they are low."""
+        bay, up = self.bay, self.about.up
+        grid = np.arange(1, len(self.about.jerks) * STEPS + 1) * self.step
+        events = bay.events(machine, up)
+        times = np.unique(np.concatenate([grid[1::2], events - 1e-7, events, events + 1e-7]))
+        times = times[(times > 0.0) & (times <= up.duration)]
+        for body in range(len(bay.plant.bodies)):
+            low, high = bay.bounds(machine, body, up, times)
+            for sign, bound in ((1.0, high), (-1.0, low)):
+                held = np.isfinite(bound)
+                if not held.any():
+                    continue
+                intervals, now, along = self._at(machine, body, times[held])
+                matrix = self._rows(intervals, sign * along[:, None], machine)
+                program.at_most(matrix, sign * (bound[held] - now), give=1.0)
+
+    def _at(self, machine: int, row: int, times: Array) -> tuple[Numbers, Array, Array]:
+        """Tell what is seen of a machine at some times, straight between steps, and its derivatives."""
+        one, intervals = self.followed[machine], len(self.about.jerks)
+        number = np.minimum((times / self.step).astype(np.intp), intervals * STEPS - 1)
+        k, j = np.divmod(number, STEPS)
+        share = times / self.step - number
+        now = (1.0 - share) * one.seen[0, k, j, row] + share * one.seen[0, k, j + 1, row]
+        weights = share[:, None]
+        along = (1.0 - weights) * one.seen_along[0, k, j, row] + weights * one.seen_along[0, k, j + 1, row]
+        return k, now, along
+
+    def _sway(self, program: ConicProgram, machine: int) -> None:
+        """Hold the end load's sway on the way to its limit."""
+        limit = self.bay.spec.limits.sway
+        if limit is None:
+            return
+        one, intervals = self.followed[machine], np.arange(len(self.about.jerks))
+        now, along = one.seen[0, :, 1:, -1], one.seen_along[0, :, 1:, -1]
+        matrix = self._rows(intervals, along, machine)
+        program.at_most(matrix, (KEPT_SWAY * limit - now).ravel())
+        program.at_most(-matrix, (KEPT_SWAY * limit + now).ravel())
+
+    def _left(self, program: ConicProgram, machine: int) -> None:
+        """Hold what is left of a machine's sway at the target to its limit."""
+        bay = self.bay
+        shown, limits = _residual(bay, machine)
+        columns = self._columns(machine)[TROLLEY:-1]
+        at = len(self.about.jerks) * (self.width + 1)
+        wide = np.zeros((len(shown), self.width))
+        wide[:, columns] = shown
+        matrix = place(wide[None], np.array([at]), self.variables)
+        now = shown @ self.about.begins[1][machine - 1][-1, TROLLEY:]
+        program.at_most(matrix, limits - now)
+        program.at_most(-matrix, limits + now)
+
+
+def _residual(bay: Bay, machine: int) -> tuple[Array, Array]:
+    """Rows on (q_u, q̇_u) at the target that are the sways of loads in the time to come, and their limits."""
+    plant, target = bay.plant, bay.spec.move.target
+    rows = bay.machines[machine : machine + 1]
+    stiffness, damping = (terms[0] for terms in linear_terms(plant, rows, target))
+    n = len(stiffness)
+    names = [parameter.name for parameter in plant.parameters]
+    linear = linearize(plant, dict(zip(names, rows[0].tolist(), strict=True)), target)
+    periods = 0.5 if n == 1 else 3.0
+    times = TURNS * (1 if n == 1 else 4)
+    step = periods * 2.0 * math.pi / float(linear.frequencies[0]) / times
+    once = expm(step * np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
+    shown = np.concatenate([linear.sway_gain, np.zeros_like(linear.sway_gain)], axis=1)
+    found = [shown]
+    for _ in range(times - 1):
+        found.append(found[-1] @ once)
+    limits = KEPT_RESIDUAL * np.array(list(bay.spec.check.residual_sway.values()))
+    return np.concatenate(found), np.tile(limits, times)
+
+
+def _control_points(span: float, order: int) -> Array:
+    """Bernstein coefficients of a derivative in both halves of an interval, by (x, v, a, jerk) at its begin.
+
+    They bound the derivative (G. Farin, Curves and Surfaces for CAGD, 2002, section 5.1).
+    """
+    half = span / 2.0
+
+    def state(t: float) -> Array:
+        powers = [
+            [t ** (p - d) / math.factorial(p - d) if p >= d else 0.0 for p in range(4)] for d in range(4)
+        ]
+        return np.array(powers)
+
+    degree = 3 - order
+    found: list[Array] = []
+    for begin in (0.0, half):
+        at = state(begin)
+        # blossoms: c_i = Σ_k binom(i, k) / binom(degree, k) · half^k / k! · k-th derivative
+        for i in range(degree + 1):
+            weights = [
+                math.comb(i, k) / math.comb(degree, k) * half**k / math.factorial(k) for k in range(i + 1)
+            ]
+            found.append(np.sum([w * at[order + k] for k, w in enumerate(weights)], axis=0))
+    found.append(state(span)[order])
+    return np.unique(np.array(found), axis=0)

@@ -1,0 +1,118 @@
+"""Rules of the table ``[path]``: a machine that can pass over stacks, and ends that are clear of them."""
+
+from collections.abc import Iterator
+
+from gen_profile.plants.plant import Plant
+from gen_profile.spec.model import Spec
+from gen_profile.spec.stacks import MOST_STACKS, Zone, hanging, trolley_and_hoist, zones
+from gen_profile.support.errors import SpecError
+from gen_profile.support.phrase import Phrase
+from gen_profile.support.units import RATES
+
+Fault = tuple[str, ...]
+
+
+def stack_faults(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Find what a spec of a path over stacks lacks, and where its ends are in the way."""
+    path = spec.path
+    if path is None:
+        return
+    for number, (low, high, _) in enumerate(path.stacks):
+        if not low < high:
+            yield f"path.stacks.{number}", "must begin left of where it ends: from, to, height"
+    if not path.stacks:
+        yield (
+            "path.stacks",
+            "must hold at least one stack: from, to and height in m",
+            "path.file",
+            "path.profile",
+        )
+    if len(path.stacks) > MOST_STACKS:
+        template = "holds {count} stacks, and {most} are the most; join those of about one height"
+        yield "path.stacks", Phrase(template, count=len(path.stacks), most=MOST_STACKS)
+    axes = trolley_and_hoist(plant, spec.plant.parameters)
+    if axes is None:
+        yield (
+            "path",
+            "needs a machine of two axes, one that carries the load along and one that lifts it, such as "
+            "single-pendulum-crane",
+        )
+        return
+    yield from _methods(spec)
+    yield from _rates(spec, plant, axes[1])
+    yield from _ends(spec, plant)
+
+
+def refuse_stacks(spec: Spec, what: str) -> None:
+    """Refuse a path over stacks where something would plan through them.
+
+    Raises
+    ------
+    SpecError
+    """
+    if spec.path is not None:
+        raise SpecError("path: {what} knows no stacks; remove [path], or see docs/over-stacks.md.", what=what)
+
+
+def _methods(spec: Spec) -> Iterator[Fault]:
+    """Refuse what does not go together with a path over stacks."""
+    if spec.solver.method != "auto":
+        yield "solver.method", "knows no stacks; remove it, or remove [path]"
+    if not spec.move.stops:
+        yield "move.final_velocity", "a path over stacks ends at rest; remove it, or remove [path]"
+    if spec.move.free:
+        yield "move.free", "both axes move on a path over stacks; remove it"
+    if spec.actuator.type != "ideal":
+        yield (
+            "actuator.type",
+            "a path over stacks is planned for drives that follow exactly; remove it, and state how they lag "
+            "as check.path.lag, so that it is judged",
+        )
+    if spec.robustness.order != 1:
+        yield "robustness.order", "a path over stacks knows first-order sensitivities; remove it"
+    if spec.check.foreign is not None:
+        yield "check.fmu", "an external FMU tells no place of the load; remove it, or remove [path]"
+
+
+def _rates(spec: Spec, plant: Plant, hoist: int) -> Iterator[Fault]:
+    """Require what limits the hoist, and where its top is."""
+    limits, name = spec.limits.of(hoist), plant.actuated[hoist].name
+    for rate in RATES:
+        if getattr(limits, rate) is None:
+            template = (
+                "required with [path], such as limits.axis.{name}.{rate}: it decides when the load is up"
+            )
+            yield f"limits.axis.{name}.{rate}", Phrase(template, name=name, rate=rate)
+    if limits.travel is None and plant.actuated[hoist].lower < -1e3:
+        template = "required with [path]: its lower end is the hoist's top"
+        yield f"limits.axis.{name}.travel", Phrase(template)
+
+
+def _ends(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse ends at which a load is nearer to a stack than it may come."""
+    path, parameters = spec.path, spec.plant.parameters
+    assert path is not None
+    places = [hanging(plant, parameters, q_a) for q_a in (spec.move.start, spec.move.target)]
+    if len(places[0]) == 1 and path.hook is not None:
+        yield "path.hook", "the machine has no hook; remove it"
+    for key, bodies in zip(("start", "target"), places, strict=True):
+        for zone in zones(path, [bodies, bodies]):
+            x, z = bodies[zone.body]
+            if not zone.own and zone.low < x < zone.high and z < zone.top:
+                yield f"move.{key}", _too_near(spec, plant, zone, x, z)
+
+
+def _too_near(spec: Spec, plant: Plant, zone: Zone, x: float, z: float) -> Phrase:
+    """Say how far a load is from where it may be: sideways, or upwards."""
+    assert spec.path is not None
+    template = (
+        "the {body} is too near to the stack from {stack} by {sideways:.3g} m sideways; move it, allow a "
+        "smaller path.clearance, or begin or end {upwards:.3g} m higher"
+    )
+    return Phrase(
+        template,
+        body=plant.bodies[zone.body],
+        stack=spec.path.named(zone.stack),
+        sideways=min(x - zone.low, zone.high - x),
+        upwards=zone.top - z,
+    )

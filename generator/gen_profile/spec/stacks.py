@@ -1,0 +1,224 @@
+"""What stands under a crane, and how near its loads may come to it: the table ``[path]``.
+
+A load is a box that hangs upright, its middle at the place of the machine's body. It may not come nearer to a
+stack than the clearance: either it is beside it by the one for the sides, or above it by the one for heights.
+A stack that the load stands on, or hangs over, at the start or the target is left upwards: until the load is
+clear of it, it stays within the clearance for the sides of where it stood.
+"""
+
+import csv
+from collections.abc import Mapping, Sequence
+from io import StringIO
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array
+from gen_profile.plants.plant import Plant
+from gen_profile.spec.structure import Checked, Faults, Structurer
+from gen_profile.spec.values import Distance, NotNegative, Words
+from gen_profile.support.bounded_file import DOCUMENT, read_bounded
+from gen_profile.support.phrase import Phrase
+
+MOST_STACKS = 200
+TOUCHING = 1e-3  # m, by which a load may be lower than what it stands on
+NUDGE = 1e-6  # m, by which a machine is moved to see which way an axis carries the load
+
+Stack = Annotated[
+    tuple[Distance, Distance, Distance],
+    Words("must be three numbers in m, such as [8.0, 10.5, 6.0]: from, to and height, found {found}"),
+]
+Point = Annotated[
+    tuple[Distance, Distance],
+    Words("must be two numbers in m, such as [8.0, 6.0]: place and height, found {found}"),
+]
+Size = Annotated[
+    tuple[NotNegative, NotNegative],
+    Words("must be two numbers in m, such as [2.5, 2.6]: width and height, found {found}"),
+]
+SOURCES = ("stacks", "profile", "file")
+
+
+@attrs.frozen(kw_only=True)
+class StacksSpec(Checked, table="path"):
+    """What stands in the way of a load, in m; heights are counted from any level.
+
+    Attributes
+    ----------
+    stacks : tuple of (from, to, height)
+        Along the trolley's axis, in its own coordinate.
+    rail : float
+        Height of where the load is suspended, from the same level as the stacks' heights.
+    load, hook : (width, height)
+        Of the end load, and of what hangs above it; the middle of each is where the machine has its body.
+    clearance : float or (float, float)
+        To the sides and upwards; one number is both.
+    """
+
+    stacks: tuple[Stack, ...]
+    rail: Distance
+    load: Size
+    hook: Size | None = None
+    clearance: NotNegative | tuple[NotNegative, NotNegative] = 0.5
+
+    @property
+    def clearances(self) -> tuple[float, float]:
+        """To the sides and upwards, in m."""
+        return self.clearance if isinstance(self.clearance, tuple) else (self.clearance, self.clearance)
+
+    def size(self, body: int, bodies: int) -> tuple[float, float]:
+        """Width and height of one of the machine's bodies in m, the last of which is the load."""
+        return self.load if body == bodies - 1 else self.hook or (0.0, 0.0)
+
+    def named(self, stack: int) -> Phrase:
+        """Name a stack by its place."""
+        low, high, height = self.stacks[stack]
+        return Phrase("{low:g} to {high:g} m, {height:g} m high", low=low, high=high, height=height)
+
+
+def stacks_of(table: Mapping[str, Any], folder: Path, structurer: Structurer) -> dict[str, Any]:
+    """Take a profile of heights, or a file, for stacks: the higher end of every piece counts.
+
+    Parameters
+    ----------
+    table : mapping
+        What ``[path]`` states.
+    folder : Path
+        What the file's name is relative to.
+    structurer : Structurer
+    """
+    faults = structurer.faults
+    given = [key for key in SOURCES if key in table]
+    others = {key: value for key, value in table.items() if key not in SOURCES}
+    if len(given) != 1:
+        faults.add("path", "state one of stacks, profile and file: what stands under the crane")
+        return {**others, "stacks": []}
+    (source,) = given
+    rows = table[source]
+    if source == "file":
+        rows = _rows(folder / rows, faults) if isinstance(rows, str) else rows
+        if not isinstance(rows, list):
+            faults.add("path.file", "must name a CSV file of the columns from, to, height, or place, height")
+            rows = []
+    if source == "profile" or (source == "file" and rows and len(rows[0]) == 2):
+        rows = _pieces(rows, f"path.{source}", structurer)
+    return {**others, "stacks": rows}
+
+
+def _rows(path: Path, faults: Faults) -> list[list[float]]:
+    """Read the rows of a CSV file: two or three numbers each, behind a header or none."""
+    try:
+        text = read_bounded(path, DOCUMENT).decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        problem = getattr(error, "strerror", "it is no UTF-8 text")
+        faults.add("path.file", "{path} cannot be read ({problem})", path=path, problem=problem)
+        return []
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    split = csv.reader(StringIO("\n".join(lines)), delimiter=";" if ";" in text else ",")
+    rows: list[list[float]] = []
+    for number, cells in enumerate(split):
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            row = []
+        if len(row) in (2, 3) and (not rows or len(row) == len(rows[0])):
+            rows.append(row)
+        elif number > 0:
+            template = "{path}: line {line} must be two or three numbers in m, as all others"
+            faults.add("path.file", template, path=path.name, line=number + 1)
+            break
+    if not rows:
+        faults.add("path.file", "{path} holds no rows of numbers", path=path.name)
+    return rows
+
+
+def _pieces(points: Any, where: str, structurer: Structurer) -> list[tuple[float, float, float]]:
+    """Make a stack of every piece of a polyline, as high as its higher end; equal neighbours become one."""
+    fitted = structurer.fit(points, tuple[Point, ...], where, ())
+    if any(left > right for (left, _), (right, _) in pairwise(fitted)):
+        structurer.faults.add(where, "must go from left to right")
+    pieces: list[tuple[float, float, float]] = []
+    for (left, low), (right, high) in pairwise(fitted):
+        height = max(low, high)
+        if pieces and pieces[-1][1:] == (left, height):
+            pieces[-1] = (pieces[-1][0], right, height)
+        elif right > left:
+            pieces.append((left, right, height))
+    return pieces
+
+
+@attrs.frozen(kw_only=True)
+class Zone:
+    """Where a body of the machine may not be: between two places and below a height, in the machine's frame.
+
+    Attributes
+    ----------
+    stack, body : int
+        Numbers of both.
+    low, high, top : float
+        m, of the body's middle, clearances included.
+    own : tuple of (float, float)
+        Between which places the body may be all the same: it stands there at the start or the target.
+    """
+
+    stack: int
+    body: int
+    low: float
+    high: float
+    top: float
+    own: tuple[tuple[float, float], ...] = ()
+
+    def beside(self, x: Array) -> Array:
+        """Tell by how much more than it must a body is beside the stack, in m; negative where it is not."""
+        sides = [self.low - x, x - self.high, *(np.minimum(x - a, b - x) for a, b in self.own)]
+        return np.asarray(np.maximum.reduce(sides))
+
+
+def zones(path: StacksSpec, ends: Sequence[Sequence[tuple[float, float]]]) -> tuple[Zone, ...]:
+    """List where each body may not be.
+
+    Parameters
+    ----------
+    path : StacksSpec
+    ends : two sequences of (x, z)
+        Where the bodies hang at the start and the target, in m, in the machine's frame.
+    """
+    sideways, above = path.clearances
+    found = []
+    for body in range(len(ends[0])):
+        width, height = path.size(body, len(ends[0]))
+        places = [end[body] for end in ends]
+        for number, (left, right, stack) in enumerate(path.stacks):
+            low, high = left - width / 2.0 - sideways, right + width / 2.0 + sideways
+            level = stack - path.rail + height / 2.0
+            over = [x for x, z in places if low < x < high and level - TOUCHING <= z]
+            own = tuple(dict.fromkeys((x - sideways, x + sideways) for x in over))
+            found.append(Zone(stack=number, body=body, low=low, high=high, top=level + above, own=own))
+    return tuple(found)
+
+
+def hanging(plant: Plant, parameters: Mapping[str, float], q_a: Sequence[float]) -> list[tuple[float, float]]:
+    """Tell where the bodies of a machine at rest are, horizontally and above the suspension, in m."""
+    still, named = [0.0] * len(plant.unactuated), SimpleNamespace(**parameters)
+    places = plant.mechanics(still, list(q_a), named).place
+    return [(float(x), float(z)) for x, _, z in places]
+
+
+def trolley_and_hoist(plant: Plant, parameters: Mapping[str, float]) -> tuple[int, int] | None:
+    """Find which of a machine's two axes carries the load along, and which lifts it; none of others."""
+    if len(plant.actuated) != 2 or not plant.bodies:
+        return None
+    q_a, _ = plant.probe()
+    here = np.array(hanging(plant, parameters, q_a)[-1])
+
+    def moved(axis: int) -> list[int]:
+        there = [at + NUDGE * (number == axis) for number, at in enumerate(q_a)]
+        ways = (np.array(hanging(plant, parameters, there)[-1]) - here) / NUDGE
+        return [round(way) if abs(way - round(way)) < NUDGE**0.5 else 2 for way in ways.tolist()]
+
+    ways = [moved(0), moved(1)]
+    return next(((k, 1 - k) for k in (0, 1) if ways[k] == [1, 0] and ways[1 - k] == [0, -1]), None)

@@ -1,0 +1,150 @@
+"""Trolley and hoist together over stacks, against another integrator, and as written to files."""
+
+import attrs
+import numpy as np
+import pytest
+from generator.quay import RAIL, ROPE, STACKS, followed, quay, shortage
+
+import gen_profile as gp
+from gen_profile.assurance.verification.batch import Feed, many_machines, residual_peaks
+from gen_profile.dynamics.evaluation.clearance import nearest
+from gen_profile.dynamics.evaluation.simulation import body_places
+from gen_profile.dynamics.problem.dynamics import parameter_rows
+from gen_profile.motion.profile import sample
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
+
+pytestmark = pytest.mark.slow
+
+NEARER = 5e-4  # m, by which no machine may come nearer to a stack than the clearance
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return gp.plan(quay())
+
+
+@pytest.fixture(scope="module")
+def folder(plan, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("deploy")
+    spec = attrs.evolve(plan.spec, check=attrs.evolve(plan.spec.check, samples=20))
+    assert gp.design(spec, ["csv", "plc", "can"], folder).passed
+    return folder
+
+
+def ends(plan):
+    return plan.spec.move.start[0], plan.spec.move.target[0]
+
+
+class TestMotion:
+    @pytest.mark.parametrize("rope", [0.9, 0.93, 0.97, 1.0, 1.05, 1.1])
+    def test_no_machine_of_the_range_comes_nearer_than_the_clearance(self, plan, rope):
+        times = np.linspace(0.0, plan.motion.duration, 20001)
+        x, z, sway = followed(plan.motion, rope * ROPE, times)
+        assert shortage(x, z, plan.spec.path, *ends(plan)) <= NEARER
+        assert np.abs(sway).max() <= 1.01 * 1.5
+
+    @pytest.mark.parametrize("rope", [0.9, 1.0, 1.1])
+    def test_no_machine_sways_on(self, plan, rope):
+        times = np.linspace(0.0, plan.motion.duration + 20.0, 4001)
+        _, _, sway = followed(plan.motion, rope * ROPE, times)
+        left = np.abs(sway[times >= plan.motion.duration]).max()
+        assert left <= (1e-4 if rope == 1.0 else 0.1)
+
+    def test_limits_are_kept_and_ends_exact(self, plan):
+        motion, limits = plan.motion, plan.spec.limits
+        times = np.linspace(0.0, motion.duration, 40001)
+        for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
+            greatest = np.abs(motion.derivative(times, order)).max(axis=0)
+            allowed = [getattr(limits.of(axis), name) for axis in (0, 1)]
+            assert (greatest <= np.array(allowed) * (1.0 + 1e-6)).all()
+        before_end = motion.duration * (1.0 - 1e-12)
+        for order, expected in enumerate((motion.target, 0.0, 0.0)):
+            np.testing.assert_allclose(motion.derivative([before_end], order)[0], expected, atol=1e-7)
+
+    def test_it_is_quicker_than_one_axis_after_the_other(self, plan):
+        assert plan.motion.duration < 0.7 * plan.passage.one_by_one
+
+    def test_more_time_is_used_for_less_lifting_and_less_jerk(self, plan):
+        longer = gp.plan(quay(move={"duration": 1.2 * plan.motion.duration}))
+        assert longer.passage.lift <= plan.passage.lift + 1e-6
+        times = np.linspace(0.0, 1.0, 5001)
+        jerks = [
+            np.square(one.motion.derivative(times * one.motion.duration, 3)[:, 0]) for one in (longer, plan)
+        ]
+        assert jerks[0].mean() < 0.5 * jerks[1].mean()
+
+    def test_it_swings_at_the_start(self):
+        plan = gp.plan(quay(move={"initial": {"phi": 0.02}}, limits={"sway": None}))
+        assert plan.figures["sway_residual_worst_m"] <= 0.1
+        assert plan.passage.nearest.room >= 0.0
+
+    def test_the_other_way(self):
+        back = gp.plan(quay(move={"start": [36.0, 18.7], "target": [0.0, 30.1]}))
+        times = np.linspace(0.0, back.motion.duration, 20001)
+        x, z, _ = followed(back.motion, ROPE, times)
+        assert shortage(x, z, back.spec.path, 36.0, 0.0) <= NEARER
+
+
+class TestRefusals:
+    def test_too_quick_names_the_stack_and_a_time_that_does(self, plan):
+        with pytest.raises(gp.InfeasibleProblem) as refusal:
+            gp.plan(quay(move={"duration": 0.95 * plan.motion.duration}))
+        assert "too near to the stack from 25 to 27.5 m" in refusal.value.sentences[0]
+        (suggestion,) = refusal.value.suggestions
+        assert suggestion.passes
+        assert plan.motion.duration <= suggestion.values["move.duration"] + 0.1
+        gp.plan(suggestion.spec)
+
+    def test_a_wall_names_itself_and_a_clearance_that_does(self):
+        stacks = [*STACKS[:2], [25.0, 27.5, 30.9], *STACKS[3:]]
+        with pytest.raises(
+            gp.InfeasibleProblem, match=r"25 to 27\.5 m, 30\.9 m high is in the way"
+        ) as refusal:
+            gp.plan(quay(stacks))
+        (suggestion,) = refusal.value.suggestions
+        assert gp.plan(suggestion.spec).passage.nearest.room >= 0.0
+
+    def test_a_wall_higher_than_the_rail_has_no_cure(self):
+        with pytest.raises(gp.InfeasibleProblem) as refusal:
+            gp.plan(quay([[20.0, 21.0, RAIL + 1.0]]))
+        assert refusal.value.suggestions == ()
+
+
+class TestCheck:
+    @pytest.mark.parametrize("name", ["quay.csv", "quay.st", "quay.log"])
+    def test_every_format_holds_both_axes_in_step(self, folder, name, plan):
+        judged = gp.check_artefact(folder / name)
+        assert judged.passed
+        near = judged.check.nearest
+        assert -NEARER <= near.room <= 0.05
+        document = judged.to_dict()["check"]
+        assert document["nearest"]["room_m"] == near.room
+        assert all(row["room_m"] is not None for row in document["scenarios"])
+        assert set(judged.check.groups) >= {"machines", "search", "samples"}
+
+    def test_a_higher_stack_fails_with_its_place_and_time(self, folder, plan):
+        higher = [*STACKS[:2], [25.0, 27.5, 18.7], *STACKS[3:]]
+        spec = quay(higher, move={"duration": plan.motion.duration})
+        judged = gp.check_artefact(folder / "quay.csv", spec)
+        assert not judged.passed
+        (sentence,) = (one for one in judged.check.reasons() if "path.clearance" in one)
+        assert "too near: payload at the stack from 25 to 27.5 m, 18.7 m high, after" in sentence
+        times = np.linspace(0.0, plan.motion.duration, 20001)
+        worst = max(
+            shortage(*followed(plan.motion, rope * ROPE, times)[:2], spec.path, *ends(plan))
+            for rope in (0.9, 1.1)
+        )
+        assert -judged.check.nearest.room == pytest.approx(worst, abs=1e-3)
+
+    def test_the_compiled_loop_finds_the_same_room(self, plan):
+        spec, setpoints = plan.spec, sample(plan.command, 0.01)
+        plant, feed = spec.machine(), Feed(times=setpoints.times, position=setpoints.position)
+        machines = [{**spec.plant.parameters, "L0": rope * ROPE} for rope in (0.9, 1.0, 1.1)]
+        rows = parameter_rows(plant, machines)
+        with many_machines(plant) as runs:
+            peaks = residual_peaks(runs, spec, feed, rows, tau=np.zeros(3), max_step=1e-3, since=1e9)
+        with PlantCosimulation(plant) as fmu:
+            for values, row, found in zip(machines, rows, peaks[:, -1], strict=True):
+                response = fmu.run(setpoints, values, max_step=1e-3, settle=0.01)
+                bodies = body_places(plant, response.q_u, response.position, row)
+                assert nearest(spec, response.times, bodies).room == pytest.approx(found, abs=1e-6)
