@@ -33,7 +33,7 @@ from gen_profile_exporters.can.scaling import Demand, travel_counts
 from gen_profile_exporters.exporter import Target
 
 QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
-RAMP_THEN_DISABLE = 2  # 605Ah
+RAMP_THEN_DISABLE, SLOW_DOWN_THEN_DISABLE = 2, 1  # 605Ah: on 6085h, and on 6084h
 OFF = 1 << 31  # of a PDO's COB-ID
 NO_REMOTE_REQUEST = 1 << 30
 PDO_PARAMETERS = {*range(0x1400, 0x1600), *range(0x1800, 0x1A00)}
@@ -54,6 +54,17 @@ NAMES = {
     "feed_forward": "feed-forward",
     "feedback": "feedback",
     "position": "actual position",
+}
+
+# what stands in for an object that a drive lacks, where can.without has it
+SUBSTITUTES = {
+    0x1016: "if this machine fails, missing setpoints alone stop the axis, as the drive's manual says",
+    0x1017: "its answers to SYNC alone tell that it is alive",
+    0x6007: "it reacts to a lost connection as its maker chose",
+    0x605A: "it must brake at a quick stop by itself, and is switched off once it stands",
+    0x6065: "this machine alone watches the following error, over the bus",
+    0x6085: "it brakes on 6084h at a quick stop (605Ah = 1), or, without 605Ah, on a ramp of its own",
+    0x60C2: "it must interpolate over can.sync_period by itself",
 }
 
 Lists = Mapping[int, "tuple[Entry, ...]"]
@@ -122,8 +133,13 @@ def heartbeat_ms(can: CanSpec) -> int:
 def startup_lists(demand: Demand, target: Target) -> dict[int, tuple[Entry, ...]]:
     """List by node what its drive must be set to, in the order in which it must be set."""
     drives = zip(frames.nodes(target), frames.cob_ids(target), strict=True)
+    lacking = {int(name[:4], 16) for name in target.can.without}
     return {
-        node: tuple(_entries(node, column, own, demand, target)) for column, (node, own) in enumerate(drives)
+        node: tuple(
+            attrs.evolve(entry, optional=entry.optional or entry.index in lacking)
+            for entry in _entries(node, column, own, demand, target)
+        )
+        for column, (node, own) in enumerate(drives)
     }
 
 
@@ -162,11 +178,15 @@ def _entries(
     yield Entry(0x60C2, 2, 8, exponent, "interpolation period: power of ten (s)")
     yield Entry(0x6060, 0, 8, MODES[can.mode], f"mode of operation: {can.mode}")
     yield Entry(0x6007, 0, 16, QUICK_STOP_ON_LOST_CONNECTION, "connection lost: quick stop")
-    yield Entry(0x605A, 0, 16, RAMP_THEN_DISABLE, "quick stop: brake on its ramp and disable")
+    ramp_of, action = (
+        (0x6084, SLOW_DOWN_THEN_DISABLE) if "6085h" in can.without else (0x6085, RAMP_THEN_DISABLE)
+    )
+    yield Entry(0x605A, 0, 16, action, "quick stop: brake on its ramp and disable")
     yield from _units(can)
     per = per_count(ACCELERATION_UNIT, can, axis)
     ramp, unit = ceil(demand.quick_stop[column] * per), stated_unit(ACCELERATION_UNIT, can).words
-    yield Entry(0x6085, 0, 32, ramp, f"deceleration of a quick stop ({unit})")
+    unknown = {"605Ah", "6085h"}.issubset(can.without)  # on which ramp, if on any, it brakes
+    yield Entry(ramp_of, 0, 32, ramp, f"deceleration of a quick stop ({unit})", optional=unknown)
     if can.following_error is not None:
         window = windows(demand, target)[column]
         watches = can.mode != "csv"  # there, the streamer does

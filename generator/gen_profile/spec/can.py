@@ -1,12 +1,15 @@
 """What a spec says of drives on a CAN bus."""
 
+import hashlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Literal
 
 import attrs
 
 from gen_profile.spec.structure import Checked
 from gen_profile.spec.values import NONE, AxisName, Bounds, CycleTime, Distance, Pattern, Positive, example
+from gen_profile.support.bounded_file import DOCUMENT, read_bounded
 
 Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
 NodeId = Annotated[int, Bounds(least=1, most=127)]
@@ -126,6 +129,33 @@ class CanSensorSpec(Checked, table="can.sensor"):
 
 
 @attrs.frozen(kw_only=True)
+class DataSheet:
+    """A drive's EDS or DCF (CiA 306): its file's name, without folders, and what it holds."""
+
+    name: str
+    content: bytes = attrs.field(repr=False)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the content, in hexadecimal."""
+        return hashlib.sha256(self.content).hexdigest()
+
+
+def read_data_sheet(path: Path) -> DataSheet:
+    """Read a drive's file, without understanding it.
+
+    Raises
+    ------
+    OSError
+    """
+    return DataSheet(name=path.name, content=read_bounded(path, DOCUMENT))
+
+
+# what streams can do without where a spec says so; `gen_profile_exporters.can.startup` has the substitutes
+Dispensable = Literal["1016h", "1017h", "6007h", "605Ah", "6065h", "6085h", "60C2h"]
+
+
+@attrs.frozen(kw_only=True)
 class CanSpec(Checked, table="can"):
     """The drives on the CAN bus, and how they are to be fed, watched and stopped.
 
@@ -182,6 +212,10 @@ class CanSpec(Checked, table="can"):
         Serial number 1018h:04 that the drive of an axis must have.
     homed : (int, int, int) or None
         Index, subindex and bits of the drive's object that are set once it knows where its axis is.
+    eds : DataSheet or None
+        The file of the drives, which all are of one kind; motion and settings must fit it.
+    without : tuple of str
+        Objects that the drives lack, and whose substitutes will do, such as ``"605Ah"``.
     sensor : CanSensorSpec or None
         From which node a streamed planner block learns what its sensors show.
     """
@@ -213,4 +247,6 @@ class CanSpec(Checked, table="can"):
     product: Unsigned32 | None = None
     serial: Annotated[Mapping[AxisName, Unsigned32], example("cart = 0x12345678")] = NONE
     homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
+    eds: DataSheet | None = None
+    without: tuple[Dispensable, ...] = ()
     sensor: CanSensorSpec | None = None

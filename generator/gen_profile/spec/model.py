@@ -449,6 +449,11 @@ class Spec(Drawable, Checked):
         if self.check.foreign is not None:
             del document["check"]["foreign"]
             document["check"] |= self.check.foreign.to_dict()
+        own_sheet = self.can.eds
+        if own_sheet is not None:
+            document["can"] |= {"eds": own_sheet.name, "eds_sha256": own_sheet.sha256}
+        if not self.can.without:
+            del document["can"]["without"]
         if not self.move.free:  # as a spec without hashes
             del document["move"]["free"]
         if document["move"].pop("shortest"):
@@ -456,9 +461,9 @@ class Spec(Drawable, Checked):
         return document
 
     def files(self) -> dict[str, bytes]:
-        """Read the files that it names, by their names: an own machine, an external FMU."""
-        own, judge = self.plant.file, self.check.foreign
-        files = {} if own is None else {own.name: own.content}
+        """Read the files that it names, by their names: an own machine, the drives', an external FMU."""
+        own, judge = (self.plant.file, self.can.eds), self.check.foreign
+        files = {file.name: file.content for file in own if file is not None}
         return files if judge is None else files | {judge.name: judge.path.read_bytes()}
 
     @property

@@ -12,6 +12,7 @@ import attrs
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.plants.registry import find_plant, plant_types
+from gen_profile.spec.can import read_data_sheet
 from gen_profile.spec.external_fmu import KEYS as FMU_KEYS
 from gen_profile.spec.external_fmu import external_fmu
 from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
@@ -62,6 +63,7 @@ def structure(document: Mapping[str, Any], folder: Path) -> Spec:
     plain = Structurer(faults)
     written = {key: dict(plain.fit(document.get(key, {}), Mapping, key, NONE)) for key in TABLES}
     file, plant = _machine(written["plant"], folder, faults)
+    _drives_file(written["can"], folder, faults)
     _misplaced(document, plant, faults)
     structurer = Structurer(faults, _names(plant) if plant else NONE)
     move = _move(written["move"], plant, structurer)
@@ -141,6 +143,24 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
             faults.add("plant.type", template, name=file.name, type=repr(plant.type), found=found(type_))
         return file, plant
     return None, None
+
+
+def _drives_file(table: Table, folder: Path, faults: Faults) -> None:
+    """Put the file that ``can.eds`` names in the place of its name."""
+    name, sha256 = table.pop("eds", None), table.pop("eds_sha256", None)
+    if name is None:
+        return
+    if not isinstance(name, str):
+        faults.add("can.eds", "must name an EDS or DCF, such as drive.eds, found {found}", found=found(name))
+        return
+    try:
+        table["eds"] = sheet = read_data_sheet(folder / name)
+    except (OSError, ValueError) as error:
+        problem = getattr(error, "strerror", error)
+        faults.add("can.eds", "{path} cannot be read ({problem})", path=folder / name, problem=problem)
+        return
+    if sha256 not in {None, sheet.sha256}:
+        faults.add("can.eds", "{path} is another file than was exported for", path=folder / name)
 
 
 def _names(plant: Plant) -> dict[str, dict[str, Any]]:

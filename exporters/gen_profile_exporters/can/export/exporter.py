@@ -13,12 +13,13 @@ import numpy as np
 
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.support.errors import ExportError
+from gen_profile.support.plugins import require_installed
 from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, per_count
 from gen_profile_exporters.can.export import candump, database, traces
 from gen_profile_exporters.can.export.candump import Frame, altered
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
-from gen_profile_exporters.can.scaling import Setpoints, demand_of, setpoints, travelled
+from gen_profile_exporters.can.scaling import Demand, Setpoints, demand_of, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
 
@@ -36,7 +37,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     frames.require_load(target)
     motion = setpoints(sampled(profile, target, target.can.sync_period, "can.sync_period"), target)
     cycles = tuple(cyclic_frames(motion, target))
-    lists = startup.startup_lists(demand_of(motion, target), target)
+    lists = _startup_lists(demand_of(motion, target), target)
     contents = {
         ".log": candump.write(cycles),
         ".asc": traces.asc(cycles),
@@ -46,6 +47,18 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         **{f".node{node}.cdcf": startup.concise_dcf(entries) for node, entries in lists.items()},
     }
     return tuple(File(f"{target.name}{suffix}", content) for suffix, content in contents.items())
+
+
+def _startup_lists(demand: Demand, target: Target) -> startup.Lists:
+    """List what the drives must be set to; where their file is stated, they must fit, and it is for them."""
+    lists, sheet = startup.startup_lists(demand, target), target.can.eds
+    if sheet is None:
+        return lists
+    require_installed("can.eds needs canopen", "can", "canopen")
+    from gen_profile_exporters.can.setup import data_sheet  # noqa: PLC0415  # canopen is an extra
+
+    data_sheet.require_fit(sheet, demand, target)
+    return data_sheet.fitted(sheet, lists, target)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:

@@ -5,8 +5,9 @@ period, what it does when setpoints cease, the window of the following error, li
 axis stands.
 """
 
+import json
 import struct
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
 
@@ -249,9 +250,7 @@ def _require_rest(node: Node) -> None:
 
 def _set(node: Node, entries: Sequence[startup.Entry], restoration: Restoration) -> None:
     """Write the list in its order where something differs, and require what the drive then holds."""
-    final = {(entry.index, entry.sub): entry for entry in entries}
-    held = _held(node, final)
-    entries = _with_its_exponent(entries, held)
+    entries, held = fitted(node, entries)
     final = {(entry.index, entry.sub): entry for entry in entries}
     changed = [(entry.index, entry.sub) for entry, _ in _differing(held, final)]
     if not changed:
@@ -266,6 +265,7 @@ def _set(node: Node, entries: Sequence[startup.Entry], restoration: Restoration)
         if pdo_of(entry.index) in touched and not entry.fixed:
             node.download(entry.index, entry.sub, _written(entry, held))
     if differing := _differing(_held(node, final), final):
+        _require_there(node, [entry.index for entry, kept in differing if kept is None])
         entry, kept = differing[0]
         show = "{:X}h".format if entry.is_code else _shown
         holds = "nothing" if kept is None else show(int.from_bytes(kept, "little"))
@@ -274,6 +274,26 @@ def _set(node: Node, entries: Sequence[startup.Entry], restoration: Restoration)
             f"{show(int.from_bytes(entry.data, 'little'))}, but the drive keeps {holds} there; set the "
             "drive, or adapt the spec to it."
         )
+
+
+def _require_there(node: Node, lacking: Iterable[int]) -> None:
+    """Refuse a drive that lacks objects which have a substitute, and say what is lost with them."""
+    lost = {f"{index:04X}h": startup.SUBSTITUTES.get(index, "") for index in lacking}
+    if lost and all(lost.values()):
+        without = "; ".join(f"{name}, {what}" for name, what in lost.items())
+        raise node.unfit(
+            f"the drive has no {', '.join(lost)}. Without {without}. If that will do, list "
+            f"{json.dumps([*lost])[1:-1]} in can.without, and export again."
+        )
+
+
+def fitted(
+    node: Node, entries: Sequence[startup.Entry]
+) -> tuple[tuple[startup.Entry, ...], dict[Place, bytes | None]]:
+    """Leave out what a drive lacks and need not have, and tell what it holds in the rest."""
+    held = _held(node, {(entry.index, entry.sub): entry for entry in entries})
+    there = [entry for entry in entries if held[entry.index, entry.sub] is not None or not entry.optional]
+    return _with_its_exponent(there, held), held
 
 
 def _written(entry: startup.Entry, held: Mapping[Place, bytes | None]) -> bytes:
@@ -320,7 +340,7 @@ def _same(entry: startup.Entry, data: bytes | None) -> bool:
 
 
 def _interpolation_period(objects: Mapping[Place, bytes | None]) -> Decimal | None:
-    digits, exponent = objects[PERIOD_DIGITS], objects[PERIOD_EXPONENT]
+    digits, exponent = objects.get(PERIOD_DIGITS), objects.get(PERIOD_EXPONENT)
     if digits is None or exponent is None:
         return None
     return Decimal(int.from_bytes(digits, "little")).scaleb(int.from_bytes(exponent, "little", signed=True))
@@ -347,7 +367,11 @@ def _with_its_exponent(
 
 def _require_window(node: Node, target: Target, demand: Demand) -> None:
     """Require a window that stops the axis soon; ours is beside it, but the drive's works without the bus."""
-    window, widest = node.read(0x6065), useful(demand, target)[node.column]
+    held, widest = node.upload(0x6065, 0, optional=True), useful(demand, target)[node.column]
+    if held is None:
+        _require_there(node, {0x6065} if "6065h" not in target.can.without else ())
+        return
+    window = int.from_bytes(held, "little")
     scale = abs(target.axes[node.column].counts_per_si)
     cure = f"set {widest / scale:.3g} ({widest} counts) or less there, or state can.following_error"
     if window in {0, WINDOW_OFF}:

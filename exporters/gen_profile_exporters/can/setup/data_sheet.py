@@ -6,10 +6,9 @@ the file says: which objects there are, what may be written, within which limits
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from configparser import Error as ParserError
 from io import StringIO
-from pathlib import Path
 from typing import Any, cast
 
 import attrs
@@ -18,24 +17,26 @@ import canopen
 from canopen import SdoAbortedError
 from canopen.objectdictionary.datatypes import INTEGER_TYPES, SIGNED_TYPES
 
-from gen_profile.support.bounded_file import DOCUMENT, read_bounded
+from gen_profile.spec.can import DataSheet
 from gen_profile.support.errors import ExportError, StreamAborted
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, startup
 from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.scaling import Demand
 from gen_profile_exporters.can.setup import configuration
-from gen_profile_exporters.can.setup.restoration import Restoration
+from gen_profile_exporters.can.setup.node import Node
+from gen_profile_exporters.can.setup.restoration import HEARTBEAT_WATCHED, MAPPING, Restoration
 from gen_profile_exporters.exporter import Target
 
 # SDO abort codes of CiA 301
-NO_OBJECT, NO_SUBINDEX, READ_ONLY = 0x0602_0000, 0x0609_0011, 0x0601_0002
+NO_OBJECT, NO_SUBINDEX, READ_ONLY, NOT_MAPPABLE = 0x0602_0000, 0x0609_0011, 0x0601_0002, 0x0604_0041
 WRONG_LENGTH, TOO_GREAT, TOO_SMALL = 0x0607_0010, 0x0609_0031, 0x0609_0032
 MODE, SHOWN_MODE, STATUSWORD, ACTUAL_POSITION = 0x6060, 0x6061, 0x6041, 0x6064
 SWITCH_ON_DISABLED = 0x0250  # a statusword
 MANY = 0xFFFF_FFFF  # modes
+MOST_TIME = 0xFFFF  # ms, of 1016h
 
 
-def require_fit(path: Path, demand: Demand, target: Target) -> None:
+def require_fit(sheet: DataSheet, demand: Demand, target: Target) -> None:
     """Require that drives of an EDS or DCF can be set up for a motion, and are fit to follow it.
 
     What their files do not say is taken to fit. Whether a drive is homed, and where its axis stands, no file
@@ -48,32 +49,58 @@ def require_fit(path: Path, demand: Demand, target: Target) -> None:
     """
     known = attrs.evolve(target, can=attrs.evolve(target.can, serial={}, homed=None))
     starts = demand.start or tuple(least for least, _ in demand.ends)
-    drives = {
-        node: _Sheet(_dictionary(path, node), start)
-        for node, start in zip(frames.nodes(target), starts, strict=True)
-    }
+    drives = _drives(sheet, target, starts)
     try:
         configuration.configure(
             cast("Link", _Desk(drives)), known, demand, Restoration(), lambda: None, reset_fault=False
         )
     except StreamAborted as error:
-        raise ExportError(f"{path.name}: {error}") from error
+        why = " ".join(words for drive in drives.values() for words in drive.refused_in(str(error)))
+        raise ExportError(f"{sheet.name}: {error} {why}".rstrip()) from error
 
 
-def _dictionary(path: Path, node: int) -> canopen.ObjectDictionary:
+def fitted(sheet: DataSheet, lists: startup.Lists, target: Target) -> startup.Lists:
+    """Fit start-up lists to drives of an EDS or DCF: without what they lack, and the period as they keep it.
+
+    Raises
+    ------
+    ExportError
+    """
+    desk = cast("Link", _Desk(_drives(sheet, target, (0,) * len(target.axes))))
+    return {
+        number: configuration.fitted(Node(desk, number, column, axis.name), lists[number])[0]
+        for column, (number, axis) in enumerate(zip(frames.nodes(target), target.axes, strict=True))
+    }
+
+
+def may_carry(objects: canopen.ObjectDictionary, mapping: int, entry: int) -> bool:
+    """Tell whether a PDO may carry an object: one that is there, whole, and to be written by an RPDO."""
+    sub, bits = entry >> 8 & 0xFF, entry & 0xFF
+    variable = objects.get_variable(entry >> 16, sub)
+    if variable is None or variable.subindex != sub or len(variable) != bits:
+        return False
+    return bool(variable.pdo_mappable and (variable.writable or mapping >= 0x1A00))
+
+
+def _drives(sheet: DataSheet, target: Target, starts: tuple[int, ...]) -> dict[int, _Sheet]:
+    return {
+        node: _Sheet(_dictionary(sheet, node), start)
+        for node, start in zip(frames.nodes(target), starts, strict=True)
+    }
+
+
+def _dictionary(sheet: DataSheet, node: int) -> canopen.ObjectDictionary:
+    text = sheet.content.decode("latin-1")
+    if "[deviceinfo]" not in text.lower():  # which every such file has
+        raise ExportError(f"{sheet.name} is no EDS or DCF: it has no section [DeviceInfo].")
+    file = StringIO(text)
+    file.name = sheet.name  # by which canopen tells the format
     try:
-        text = read_bounded(path, DOCUMENT).decode("latin-1")
-        if "[deviceinfo]" not in text.lower():  # which every such file has
-            raise ExportError(f"{path.name} is no EDS or DCF: it has no section [DeviceInfo].")
-        file = StringIO(text)
-        file.name = str(path)  # by which canopen tells the format
         objects = canopen.import_od(file, node)
-    except OSError as error:
-        raise ExportError(f"{path} cannot be read ({error.strerror}).") from error
     except (ValueError, KeyError, AttributeError, TypeError, ParserError) as error:
-        raise ExportError(f"{path.name} is no EDS or DCF that can be read ({error}).") from error
+        raise ExportError(f"{sheet.name} is no EDS or DCF that can be read ({error}).") from error
     if 0x1000 not in objects:
-        raise ExportError(f"{path.name} is no EDS or DCF: it has no object 1000h.")
+        raise ExportError(f"{sheet.name} is no EDS or DCF: it has no object 1000h.")
     return objects
 
 
@@ -83,9 +110,10 @@ class _Sheet:
     def __init__(self, objects: canopen.ObjectDictionary, start: int) -> None:
         self._objects = objects
         self._held: dict[tuple[int, int], bytes] = {}
+        self._refused: dict[tuple[int, int], str] = {}
         about = objects.device_information
         usual = {(0x1018, 1): about.vendor_number or 0, (0x1018, 2): about.product_number or 0}
-        usual |= {(0x6502, 0): MANY, (0x6065, 0): 1}
+        usual |= {(0x1000, 0): configuration.CIA_402, (0x6502, 0): MANY, (0x6065, 0): 1}
         usual |= {(STATUSWORD, 0): SWITCH_ON_DISABLED, (ACTUAL_POSITION, 0): start}
         always = {STATUSWORD, ACTUAL_POSITION}
         for place, value in usual.items():
@@ -95,6 +123,7 @@ class _Sheet:
 
     def upload(self, index: int, sub: int) -> bytes:
         """Read what the file says that an object holds, or what was written to it."""
+        index = MODE if index == SHOWN_MODE else index
         entry = self._entry(index, sub)
         value = _value(entry)
         return self._held.get((index, sub), _encoded(value, len(entry)))
@@ -103,18 +132,37 @@ class _Sheet:
         """Write to an object as far as the file lets it be."""
         entry = self._entry(index, sub)
         value = int.from_bytes(data, "little", signed=entry.data_type in SIGNED_TYPES)
+        if index == HEARTBEAT_WATCHED[0] and entry.max == MOST_TIME:
+            value &= MOST_TIME  # some files state the limits of its time alone
+        mapped = sub and index - MAPPING in startup.PDO_PARAMETERS and entry.writable
         refused = {
-            READ_ONLY: not entry.writable,
-            WRONG_LENGTH: len(data) * 8 != len(entry),
-            TOO_GREAT: entry.max is not None and value > entry.max,
-            TOO_SMALL: entry.min is not None and value < entry.min,
+            READ_ONLY: (not entry.writable, "cannot be written"),
+            WRONG_LENGTH: (len(data) * 8 != len(entry), f"has {len(entry)} bits"),
+            TOO_GREAT: (entry.max is not None and value > entry.max, f"takes {entry.max} at most"),
+            TOO_SMALL: (entry.min is not None and value < entry.min, f"takes {entry.min} at least"),
+            NOT_MAPPABLE: (
+                mapped and not may_carry(self._objects, index, value),
+                f"cannot carry {value >> 16:04X}h:{value >> 8 & 0xFF:02X}",
+            ),
         }
-        for code, holds in refused.items():
+        for code, (holds, words) in refused.items():
             if holds:
+                self._refused[index, sub] = words
                 raise SdoAbortedError(code)
         self._held[index, sub] = data
-        if index == MODE:
-            self._held[SHOWN_MODE, 0] = data
+
+    def refused_in(self, words: str) -> Iterator[str]:
+        """Say why the file refused what a sentence is of."""
+        for (index, sub), why in self._refused.items():
+            if f"{index:04X}h:{sub:02X}" in words:
+                yield f"By the file, {index:04X}h:{sub:02X} {why}."
+                if "written" in why and index - MAPPING in startup.PDO_PARAMETERS:
+                    entries = ", ".join(f"0x{entry:08X}" for entry in self._mapping(index))
+                    yield f"Its mapping is fixed: state can.fixed_pdos.{_pdo_name(index)} = [{entries}]."
+
+    def _mapping(self, index: int) -> Iterator[int]:
+        for sub in range(1, int.from_bytes(self.upload(index, 0), "little") + 1):
+            yield int.from_bytes(self.upload(index, sub), "little")
 
     def _entry(self, index: int, sub: int) -> Any:
         entry = self._objects.get_variable(index, sub)
@@ -142,6 +190,10 @@ class _Desk:
 
     def send(self, message: can.Message) -> None:
         """Take an NMT command, which no file answers."""
+
+
+def _pdo_name(mapping: int) -> str:
+    return f"{'rpdo' if mapping < 0x1A00 else 'tpdo'}{(mapping & 0x1FF) + 1}"
 
 
 def _value(entry: Any) -> int:

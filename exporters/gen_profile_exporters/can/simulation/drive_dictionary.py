@@ -1,7 +1,7 @@
 """Object dictionary of the simulated drive, its EDS, and what may not be written to it."""
 
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from io import StringIO
 from pathlib import Path
@@ -13,6 +13,7 @@ from canopen.objectdictionary import ODVariable
 from canopen.objectdictionary.eds import export_eds
 
 from gen_profile.spec.can import FixedPdosSpec
+from gen_profile_exporters.can.setup.data_sheet import may_carry
 from gen_profile_exporters.can.startup import AT_ONCE, NO_REMOTE_REQUEST, OFF, PDO_PARAMETERS
 
 PDOS = range(4)
@@ -20,11 +21,23 @@ MAPPED = 8  # entries of a mapping
 VENDOR, PRODUCT, REVISION = 0x0000_02E5, 0x4750_0001, 1
 PDO_BITS = 64  # what a frame carries
 # SDO abort codes of CiA 301
+NO_OBJECT = 0x0602_0000
 NOT_MAPPABLE, PDO_TOO_LONG = 0x0604_0041, 0x0604_0042
 OUT_OF_RANGE, WRONG_STATE = 0x0609_0030, 0x0800_0022
 TRANSMISSION_TYPES = {*range(241), *AT_ONCE}  # the others are reserved, or wait for remote requests
 PERIOD, SYNC_COUNTER = 0x60C2, 0x1019
+HEARTBEAT = 0x1017  # which canopen's node must have, and refuses by SDO where the drive lacks it
 RATE_UNITS = {0x60A9, 0x60AA}  # of velocity and acceleration
+# what a drive does that lacks the object: it faults when the connection is lost, brakes on a ramp of its own
+# and stays in quick stop, interpolates over 4 ms, and watches no following error
+OWN = {
+    (0x6007, 0): 1,
+    (0x605A, 0): 6,
+    (0x6065, 0): 0xFFFF_FFFF,
+    (0x6085, 0): 500_000,
+    (0x60C2, 1): 4,
+    (0x60C2, 2): -3,
+}
 WINDOW = 50_000  # counts; a drive's own following error window
 
 
@@ -64,6 +77,10 @@ class DriveVariant:
         608Fh, increments to revolutions of the motor.
     counts_per_si : float
         Of its axis, for units of 60A9h and 60AAh that measure that in m, rad or degrees.
+    lacks : tuple of int
+        Objects that it does not have; what it does instead is `OWN`.
+    limits : mapping of (int, int) to (int, int)
+        Least and greatest value that it takes, by index and subindex.
     remote_requests : bool
         Whether its TPDOs can be asked for by remote frames; where not, it takes no COB-ID that allows them.
     """
@@ -85,6 +102,8 @@ class DriveVariant:
     fixed_units: bool = False
     encoder: tuple[int, int] = (1, 1)
     counts_per_si: float = 1.0
+    lacks: tuple[int, ...] = ()
+    limits: Mapping[tuple[int, int], tuple[int, int]] = attrs.field(factory=dict)
     remote_requests: bool = True
 
 
@@ -105,6 +124,9 @@ def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
             variable.access_type = "ro"
         if variable.index - 0x200 in PDO_PARAMETERS and make.fixed_pdos.stated:
             variable.access_type = "const"
+        variable.min, variable.max = make.limits.get((variable.index, variable.subindex), (None, None))
+    for index in {*make.lacks} - {HEARTBEAT}:
+        del objects[index]
     return objects
 
 
@@ -149,6 +171,8 @@ def eds(node: int, make: DriveVariant, file_name: str = "drive.eds") -> str:
     for change in ("Creation", "Modification"):
         about |= {f"{change}Date": "01-01-2026", f"{change}Time": "12:00AM"}
     objects = dictionary(node, make)
+    if HEARTBEAT in make.lacks:
+        del objects[HEARTBEAT]
     for variable in _variables_of(objects):
         value = variable.default
         if variable.index in PDO_PARAMETERS and variable.subindex == 1:
@@ -181,6 +205,11 @@ def refusal(
         What is written to it, unsigned.
     """
     index, sub = place
+    if index in make.lacks:
+        return NO_OBJECT
+    least, greatest = make.limits.get(place, (value, value))
+    if not least <= value <= greatest:
+        return OUT_OF_RANGE
     if index == 0x6060:
         return None if value == 0 or supports(held(0x6502, 0), value) else OUT_OF_RANGE
     if index == SYNC_COUNTER:
@@ -200,7 +229,7 @@ def refusal(
         entries = [value] if sub else [held(index, n) for n in range(1, min(value, MAPPED) + 1)]
         if (not sub and value > MAPPED) or sum(entry & 0xFF for entry in entries) > PDO_BITS:
             return PDO_TOO_LONG
-        if not all(_may_carry(objects, index, entry) for entry in entries):
+        if not all(may_carry(objects, index, entry) for entry in entries):
             return NOT_MAPPABLE
     return None
 
@@ -217,15 +246,6 @@ def _refusal_of_parameter(index: int, cob_id: int, sub: int, value: int) -> int 
         return WRONG_STATE
     acyclic = index >= 0x1800 and value == 0  # a TPDO on SYNC after a change, which this drive does not do
     return OUT_OF_RANGE if sub == 2 and (acyclic or value not in TRANSMISSION_TYPES) else None
-
-
-def _may_carry(objects: canopen.ObjectDictionary, mapping: int, entry: int) -> bool:
-    """Tell whether a PDO may carry an object: one that is there, whole, and to be written by an RPDO."""
-    sub, bits = entry >> 8 & 0xFF, entry & 0xFF
-    variable = objects.get_variable(entry >> 16, sub)
-    if variable is None or variable.subindex != sub or len(variable) != bits:
-        return False
-    return bool(variable.pdo_mappable and (variable.writable or mapping >= 0x1A00))
 
 
 def _variables_of(objects: canopen.ObjectDictionary) -> Iterator[Any]:

@@ -26,16 +26,19 @@ from gen_profile_exporters.can.cia402 import (
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.simulation.drive_dictionary import (
     MAPPED,
+    NO_OBJECT,
+    OWN,
     PDOS,
     DriveVariant,
     dictionary,
     refusal,
     supports,
 )
-from gen_profile_exporters.can.startup import AT_ONCE, OFF
+from gen_profile_exporters.can.startup import AT_ONCE, OFF, SLOW_DOWN_THEN_DISABLE
 
 HEARTBEAT_LOST, SYNC_LENGTH, SETPOINT_LOST = 0x8130, 0x8240, 0x8250  # EMCY codes of CiA 301
 FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
+STAYS = 5  # of 605Ah: from here on a drive stays in quick stop
 MOST_SYNCS = 240  # a transmission type up to this is the number of SYNCs from one TPDO to the next
 INHIBIT_UNIT = NANOSECONDS // 10_000
 SETPOINTS = {0x607A, 0x60C1, 0x60FF}
@@ -93,6 +96,8 @@ class SimulatedDrive:
         """Read an object."""
         if (index, sub) not in self._values:
             entry = self.local.object_dictionary.get_variable(index, sub)
+            if entry is None:
+                return OWN.get((index, sub), 0)
             self._values[index, sub] = int(entry.decode_raw(self.local.get_data(index, sub)))
         return self._values[index, sub]
 
@@ -291,12 +296,15 @@ class SimulatedDrive:
         return 10.0 ** _signed_byte(held >> 24) * of_one.get(held >> 16 & 0xFF, 1.0) / per_minute
 
     def _brake(self) -> None:
-        change = self.value(0x6085) * self._counts(0x60AA) * self.period
+        slowly = self.value(0x605A) == SLOW_DOWN_THEN_DISABLE and self.state is State.QUICK_STOP
+        change = self.value(0x6084 if slowly else 0x6085) * self._counts(0x60AA) * self.period
         speed = max(0.0, abs(self.velocity) - change)
         self.velocity = speed if self.velocity > 0 else -speed
         self.command += self.velocity * self.period
-        if not speed:
-            self.state = State.FAULT if self.state is State.FAULT_REACTION else State.SWITCH_ON_DISABLED
+        if not speed and self.state is State.FAULT_REACTION:
+            self.state = State.FAULT
+        elif not speed and self.value(0x605A) < STAYS:
+            self.state = State.SWITCH_ON_DISABLED
 
     def _within_travel(self, position: float) -> float:
         low, high = self.value(0x607D, 1), self.value(0x607D, 2)
@@ -358,6 +366,11 @@ class _Node(canopen.LocalNode):
     def __init__(self, node: int, make: DriveVariant, held: Callable[[int, int], int]) -> None:
         super().__init__(node, dictionary(node, make))
         self._make, self._held = make, held
+
+    def get_data(self, index: int, subindex: int, check_readable: bool = False) -> bytes:
+        if check_readable and index in self._make.lacks:
+            raise canopen.SdoAbortedError(NO_OBJECT)
+        return bytes(super().get_data(index, subindex, check_readable))
 
     def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
         if check_writable:

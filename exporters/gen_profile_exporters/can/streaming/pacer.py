@@ -45,6 +45,10 @@ class Pacer:
         Instant of the next cycle, in ns.
     launch : int
         Instant of the latest cycle handed over, in ns.
+    watched : bool
+        Whether the drives watch our heartbeat.
+    left_powered : bool
+        Whether a drive may stay powered after a quick stop.
     last_sent : tuple of can.Message
         Setpoints that lead no axis any further: the latest ones, or no velocity.
     """
@@ -60,6 +64,7 @@ class Pacer:
         self.last_sent: Cycle = ()
         self.period = frames.period_microseconds(target.can) * 1000
         self.timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000
+        self.watched, self.left_powered = "1016h" not in target.can.without, "605Ah" in target.can.without
         self.due = self.launch = 0
         self._beat_due = 0
         self._heartbeat = frames.message(frames.HEARTBEAT + frames.MASTER, b"\x05")

@@ -2,10 +2,11 @@
 
 It is sent at once by PDO and repeated every cycle until every drive says, after it was sent, that it is not
 powered to move, and has reported one place for a while. The drives brake on their own ramp (6085h), which
-needs nothing more from a controller or a bus that just proved unreliable. A drive that does not obey at once,
-such as one that left the NMT state operational and takes no PDOs, gets it by SDO as well; and when one still
-does not after its time-out, our heartbeat ends, and it stops by itself, as it was set up to. What happened is
-given by a value, to be reported afterwards.
+needs nothing more from a controller or a bus that just proved unreliable; drives without 605Ah, which may
+stay powered, are switched off once all axes stand. A drive that does not obey at once, such as one that left
+the NMT state operational and takes no PDOs, gets it by SDO as well; and when one still does not after its
+time-out, our heartbeat ends, and it stops by itself, as it was set up to. What happened is given by a value,
+to be reported afterwards.
 """
 
 import itertools
@@ -35,10 +36,13 @@ class Stop:
 
     Attributes
     ----------
+    watched : bool
+        Whether the drives watch our heartbeat.
     unconfirmed : mapping of str to str
         What is known of each axis that is not known to stand.
     """
 
+    watched: bool
     unconfirmed: Mapping[str, str]
 
     @property
@@ -47,9 +51,10 @@ class Stop:
         if not self.unconfirmed:
             return "The axes were stopped."
         known = "; ".join(f"{name}: {what}" for name, what in self.unconfirmed.items())
+        ended = "our heartbeat ended, without which a drive is to stop by itself; " if self.watched else ""
         return (
-            f"Not every axis is known to stand ({known}): our heartbeat ended, without which a drive is to "
-            "stop by itself; make sure that the axes stand before you approach them."
+            f"Not every axis is known to stand ({known}): {ended}make sure that the axes stand before you "
+            "approach them."
         )
 
 
@@ -83,7 +88,11 @@ def quick_stop(pacer: Pacer, watch: Watch, patience: int) -> Stop:
             pacer.link.wait_until(clock.now() + pacer.period)
         unconfirmed = [axis for axis in watch.axes if not axis.stands(begun)]
         if not unconfirmed or clock.now() - begun > patience:
-            return Stop(unconfirmed={axis.name: axis.known(begun) for axis in unconfirmed})
+            return Stop(
+                watched=pacer.watched, unconfirmed={axis.name: axis.known(begun) for axis in unconfirmed}
+            )
+        if pacer.left_powered and all(axis.braked(begun) for axis in watch.axes):
+            stop = [*pacer.commands(Controlword.DISABLE_VOLTAGE), frames.message(frames.SYNC)]
         for service in services:
             if service.begun or not service.axis.obeys(begun):
                 service.ask()

@@ -82,6 +82,11 @@ class WatchedAxis:
         """Whether the drive said after an instant that it is not powered to move, and the axis stood."""
         return self.stated > since and self.state not in MOVING and self.standstill.proved(since)
 
+    def braked(self, since: int) -> bool:
+        """Whether the drive said after an instant that it no longer moves, and the axis stood."""
+        at_rest = self.state is State.QUICK_STOP or self.state not in MOVING
+        return self.stated > since and at_rest and self.standstill.proved(since)
+
     def obeys(self, since: int) -> bool:
         """Whether the drive said after an instant that it no longer follows setpoints."""
         return self.stated > since and self.state not in {State.ENABLED, State.UNKNOWN}
@@ -112,6 +117,7 @@ class Watch:
         self.fault: str | None = None
         self._clock, self._period = clock, frames.period_microseconds(target.can) * 1000
         self._heartbeat = startup.heartbeat_ms(target.can) * NANOSECONDS // 1000
+        self._beating = "1017h" not in target.can.without
         self._timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000  # for an answer to SYNC
         self._demanded = 0  # instant since when drives are to answer
         self._takers: dict[int, Callable[[bytes], None]] = {}
@@ -211,7 +217,7 @@ class Watch:
                     f"axis {axis.name}: no feedback for {(now - heard) / NANOSECONDS * 1e3:.3g} ms; "
                     "the drive, the cable or SYNC failed."
                 )
-            if now - beat > HEARTBEATS_MISSED * self._heartbeat + self._period:
+            if self._beating and now - beat > HEARTBEATS_MISSED * self._heartbeat + self._period:
                 self._find(f"axis {axis.name}: no heartbeat; the drive or the cable failed.")
 
     def _look_at(self, axis: WatchedAxis) -> None:

@@ -82,8 +82,7 @@ def stream(table: Path | None, **given: Any) -> None:
                 print_outcome(*at_start(source))
                 return
             source = slow
-        if request.eds is not None:
-            run.require_fit(source, request.eds)
+        run.require_fit(source, request.eds)
         if request.dry_run:
             plan = run.summary(source)
             print_outcome(plan, plan_words(plan, [axis.unit for axis in source.axes]))

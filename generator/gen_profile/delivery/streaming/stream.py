@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from gen_profile.delivery.streaming.outcome import Source, StreamOutcome
+from gen_profile.spec.can import read_data_sheet
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import received_spec
 from gen_profile.support.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.support.artefacts.reading import manifest_beside, read_motion, require_companions
-from gen_profile.support.errors import CheckFailed, SpecError, StreamAborted
+from gen_profile.support.errors import CheckFailed, ExportError, SpecError, StreamAborted
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_exporters.can import drive_units, frames
 from gen_profile_exporters.can.following_window import LEAST_USEFUL, useful
@@ -184,8 +185,8 @@ def summary(source: Source) -> dict[str, Any]:
     }
 
 
-def require_fit(source: Source, sheet: Path) -> None:
-    """Require that drives of an EDS or DCF can be set up for a motion, see `data_sheet.require_fit`.
+def require_fit(source: Source, path: Path | None) -> None:
+    """Require that drives can be set up for a motion, by an EDS or DCF: the one named here, or the spec's.
 
     Raises
     ------
@@ -193,7 +194,12 @@ def require_fit(source: Source, sheet: Path) -> None:
     """
     from gen_profile_exporters.can.setup import data_sheet  # noqa: PLC0415  # canopen is an extra
 
-    data_sheet.require_fit(sheet, source.plan.demand, source.plan.target)
+    try:
+        sheet = source.plan.target.can.eds if path is None else read_data_sheet(path)
+    except OSError as error:
+        raise ExportError(f"{path} cannot be read ({error.strerror}).") from error
+    if sheet is not None:
+        data_sheet.require_fit(sheet, source.plan.demand, source.plan.target)
 
 
 def rehearsed_cycles(source: Source) -> int:
