@@ -115,6 +115,40 @@ def test_a_clock_that_tells_whole_seconds_only(tmp_path):
     assert np.diff(log.times) == pytest.approx(0.05, abs=1e-9) and holds(rope_of(log))
 
 
+# ── controllers ──────────────────────────────────────────────────────────────────────────────────────────
+
+CONTROLLERS = {  # rows of a second column that is not the swing, as controllers and their tools export them
+    "CODESYS 2.3, trace in an ASCII file": (
+        "CoDeSys Trace\nC:\\PROJECTS\\CRANE.PRO\nCycle PLC_PRG.fAngle PLC_PRG.fLift\n",
+        lambda n, t, a: f"{1e3 * t:.0f} {a:.6f} 0.5",
+    ),
+    "a time beside each variable": (
+        "Timestamp [us];PLC_PRG.fAngle [rad];Timestamp [us];PLC_PRG.fLift\n",
+        lambda n, t, a: f"{1e6 * t:.0f};{a:.6f};{1e6 * t:.0f};0.5",
+    ),
+    "TIA Portal, rows that are counted": (
+        "Sample;Timestamp;fAngle [rad]\n",
+        lambda n, t, a: f"{n};{NOON + timedelta(seconds=t):%Y-%m-%d %H:%M:%S.%f};{a:.6f}".replace(".", ","),
+    ),
+    "S7 data log, past midnight": (
+        "Record,Date,UTC Time,fAngle [rad]\n",
+        lambda n, t, a: f"{n},{NOON + timedelta(seconds=t):%m/%d/%Y,%H:%M:%S.%f},{a:.6f}",
+    ),
+    "S7 data log, variables called otherwise": (
+        "Record,Date,UTC Time,Tag_1\n",
+        lambda n, t, a: f"{n},{NOON + timedelta(seconds=t):%m/%d/%Y,%H:%M:%S},{a:.6f}",
+    ),
+}
+
+
+@pytest.mark.parametrize("head, row", CONTROLLERS.values(), ids=CONTROLLERS)
+def test_exports_of_controllers(tmp_path, head, row):
+    times, angles, _ = swing()
+    rows = (row(n, t, a) for n, (t, a) in enumerate(zip(times.tolist(), angles.tolist(), strict=True)))
+    (tmp_path / "trace.csv").write_text(head + "\n".join(rows) + "\n", "utf-8")
+    assert holds(rope_of(read_swing(tmp_path / "trace.csv", SPEC)))
+
+
 # ── faults of rows ───────────────────────────────────────────────────────────────────────────────────────
 
 

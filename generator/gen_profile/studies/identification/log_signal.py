@@ -1,5 +1,6 @@
 """The signal of a swing among a logger's columns: which hold it, about which axis, and where it jumps."""
 
+import math
 import re
 
 import numpy as np
@@ -12,9 +13,10 @@ from gen_profile.support.phrase import Phrase
 
 _TIME = re.compile(
     r".*(time|zeit|temps|tempo|tiempo|stamp|elapsed|millis|micros|seconds|date|datum|uhr|epoch).*"
-    r"|t([ _\[(].*)?|#|no\.?|nr\.?|index|sample",
+    r"|t([ _\[(].*)?",
     re.IGNORECASE,
 )
+_COUNT = re.compile(r"#|no\.?|nr\.?|num|index|samples?|records?", re.IGNORECASE)  # of rows, and no time
 NAMES = {  # what columns are called that hold a quantity
     "angle": re.compile(r".*(angle|winkel|angol|ángulo|tilt|incl|pitch|roll).*", re.IGNORECASE),
     "sway": re.compile(r".*(sway|auslenk|oscill|oscilac|deflection).*", re.IGNORECASE),
@@ -34,10 +36,12 @@ def likely_columns(table: LogTable, quantity: str) -> tuple[str, str]:
     head = table.head(("1", "2"))
     names = list(table.rows[head]) if table.is_head(head) else []
     clocks = [place for place, name in enumerate(names) if _TIME.fullmatch(name)]
+    counts = [place for place, name in enumerate(names) if _COUNT.fullmatch(name)]
     first, last = min(head + 2, len(table.rows) - 1), len(table.rows) - 1
     running = [place for place in clocks if table.seconds(first, place) < table.seconds(last, place)]
-    time = next(iter(running or clocks), 0)
-    others = [place for place in range(len(names)) if place not in {*clocks, time}]
+    readable = [place for place in clocks if not math.isnan(table.seconds(last, place))]  # at midnight, too
+    time = next(iter(running or readable or clocks or counts), 0)
+    others = [place for place in range(len(names)) if place not in {*clocks, *counts, time}]
     named = [place for place in others if NAMES[quantity].fullmatch(names[place])]
     value = next(iter(named or others), 1)
     return str(time + 1), str(value + 1)
