@@ -1,7 +1,8 @@
 """Make this folder's helper modules importable, and leave out what needs a compiler that no registry has.
 
 Pytest's importlib mode leaves ``sys.path`` alone. The environment variable IEC2C names matiec's compiler, and
-MATIEC_LIB its folder ``lib``; without the first, ``test_compiled_*.py`` are not collected.
+MATIEC_LIB its folder ``lib``; without the first, ``test_compiled_*.py`` are not collected. STRUCPP names the
+folder of STruC++; without it, ``test_strucpp_*.py`` are not.
 """
 
 import os
@@ -14,14 +15,16 @@ from system_parts import missing
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-collect_ignore_glob = [] if os.environ.get("IEC2C") else ["test_compiled_*.py"]
+COMPILERS = {"IEC2C": "test_compiled_*.py", "STRUCPP": "test_strucpp_*.py"}
+collect_ignore_glob = [files for name, files in COMPILERS.items() if not os.environ.get(name)]
 
 
 def pytest_report_header():
-    state = (
-        "NOT compiled, as IEC2C is not set" if collect_ignore_glob else f"compiled by {os.environ['IEC2C']}"
-    )
-    return f"structured text: interpreted; {state}"
+    states = [
+        f"compiled by {os.environ[name]}" if os.environ.get(name) else f"NOT compiled, as {name} is not set"
+        for name in COMPILERS
+    ]
+    return f"structured text: interpreted; {'; '.join(states)}"
 
 
 @pytest.fixture(scope="session")

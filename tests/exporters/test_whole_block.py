@@ -12,7 +12,9 @@ from test_planner_forms import Exported
 from gen_profile.planner.design import planner_block, planner_constants
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block
+from gen_profile.planner.interface import block_axes, live_inputs
 from gen_profile.spec.reading import preset_spec
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.registry import containers
@@ -94,3 +96,29 @@ def test_exported_c_issues_the_same_bits_without_a_warning(spec, block, tmp_path
     exported = Exported(translate(block.text), ctypes.CDLL(tmp_path / "c.so"), "bay_crane")
     rows = random_rows(oracle.inputs, 20_000, seed=5)
     assert np.array_equal([exported.call(row) for row in rows.tolist()], oracle.call(rows))
+
+
+def test_its_interface_is_that_of_today_s_block_and_one_input_more(spec, block):
+    due = [*translate(planner_block(spec).text).inputs]
+    found = translate(block.text).inputs
+    assert [one for one in found if one.name != "bPromptStop"] == due
+    assert translate(block.text).outputs == translate(planner_block(spec).text).outputs
+    assert live_inputs(BlockInstance(block.text).inputs, block_axes(block.text)) == {"L1": "fL1", "m2": "fm2"}
+
+
+def test_it_is_short_enough_to_be_reviewed(block):
+    source = parse_function_block(block.text)
+    blocks = (*source.within, source)
+    own = [v for one in blocks for v in one.variables if v.section == "VAR"]
+    assert len([v for v in own if v.scalar_type == "BOOL"]) <= 40
+    ends = ("_planner", "_quick_stop", "_zones", "_event_log")
+    ours = [one for one in blocks if one.name.endswith(ends)]
+    assert len(ours) == 4
+    for one in ours:
+        assert one.body.count("\n") <= 450
+
+
+def test_what_it_does_not_do_yet_is_said():
+    spec = preset_spec("bay-crane", ["planner.live_rate={L1=0.1}"])
+    with pytest.raises(ExportError, match="take one axis, without live_rate and sensor, as yet"):
+        whole_text(spec)

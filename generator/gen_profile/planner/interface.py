@@ -18,6 +18,7 @@ LATER = (
     "fActVelocity",
     "fFollowingLimit",
     "bSensorCheck",
+    "bPromptStop",
 )  # inputs that the first blocks had not
 SENSOR = ("fSensor", "bSensorValid", "fSensorAge")  # of axes with one
 UNPROVEN = 8  # nSensorFault of a sensor that is used, and has not shown a motion of its axis yet
