@@ -59,9 +59,11 @@ def test_gusts_delay_and_offset_act_for_a_slow_period(spec):
 def test_another_rope_acts_on_what_swings_and_on_the_axis_own_motions(spec):
     (times, sway, _), (other, *_) = impulse(ROPE), impulse(ROPE * (1.0 - ERROR))
     apart = sway - impulse(ROPE * (1.0 - ERROR), times[-1])[1]
-    turned = SWING * 2.0 * np.sin(np.pi * (times[-1] / other[-1] - 1.0))
+    out_of_phase = SWING * 2.0 * np.sin(np.pi * (times[-1] / other[-1] - 1.0))
     moved = spec.limits.acceleration * np.trapezoid(np.abs(apart), times)
-    assert of_machines(spec, ROPE, ROPE * (1.0 - ERROR)).errors == pytest.approx(turned + moved, rel=2e-3)
+    assert of_machines(spec, ROPE, ROPE * (1.0 - ERROR)).errors == pytest.approx(
+        out_of_phase + moved, rel=2e-3
+    )
 
 
 def test_a_block_may_state_less_than_the_machine_allows_and_no_more(spec):

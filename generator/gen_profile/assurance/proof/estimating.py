@@ -84,13 +84,15 @@ def unknown(spec: Spec, machines: Sequence[Machine], direction: SensedDirection)
     times = np.linspace(0.0, 2.0 * np.pi / rates.min(), SAMPLES)
     sways, speeds = _responses(modes, direction.end_load, times)
     swing, shows = _slowest_mode(spec, machines[0], direction)
-    turned = 2.0 * np.sin(np.minimum(0.5 * np.abs(rates[:, 0] - slowest).max() * times[-1], 0.5 * np.pi))
+    out_of_phase = 2.0 * np.sin(
+        np.minimum(0.5 * np.abs(rates[:, 0] - slowest).max() * times[-1], 0.5 * np.pi)
+    )
     gusts = (disturbance.gust.acceleration if disturbance.gust else 0.0) * _integral(sways, times)
     fastest = acceleration * _integral(speeds, times) + swing * float(rates[:, 0].max())
     shown = shows * slowest ** int(sensor.quantity == "rate")
     return Unknown(
         gusts=gusts,
-        errors=acceleration * _integral(sways - sways[0], times) + swing * float(turned),
+        errors=acceleration * _integral(sways - sways[0], times) + swing * float(out_of_phase),
         delay=sensor.unknown_delay * fastest,
         offset=sensor.offset / shown,
         shown=shown * (swing + gusts) + sensor.offset + NOISES * sensor.noise,

@@ -295,11 +295,11 @@ def _machines(run: Followed) -> SwayModes | None:
 def _swings(run: Followed) -> dict[int, Complex]:
     """Tell what axes have made of these modes before orders, where nothing else has made loads swing."""
     machines = _machines(run)
-    begins = [order.begin for order in run.orders if 0 < order.begin < run.unknown_from]
-    if machines is None or run.zones or not begins:
+    starts = [order.begin for order in run.orders if 0 < order.begin < run.unknown_from]
+    if machines is None or run.zones or not starts:
         return {}
-    moved = machines.moved(run.acceleration, [begin - 1 for begin in begins], run.cycle)
-    return dict(zip(begins, moved, strict=True))
+    moved = machines.moved(run.acceleration, [begin - 1 for begin in starts], run.cycle)
+    return dict(zip(starts, moved, strict=True))
 
 
 def _case(run: Followed, order: TimedOrder, swings: Complex) -> ComparedCommand | None:

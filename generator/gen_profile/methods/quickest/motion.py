@@ -139,7 +139,7 @@ def motion(
         *_differences(shadows + machines, own, 1.0),
         *_differences(shadows + machines + pieces, own, -1.0),
     ]
-    turned = np.concatenate([(turn * waves[still:]).real for turn in SHADOWS])
+    shadowed = np.concatenate([(turn * waves[still:]).real for turn in SHADOWS])
     most = [
         *(-(turn * rests[still:]).real for turn in SHADOWS),
         np.ones(machines),
@@ -150,7 +150,7 @@ def motion(
     price[wide - 1] = shortest * np.sign(state.velocity or 1.0)
     found = linprog(
         price,
-        A_ub=_matrix(above, turned, 0, (shadows + machines + ends, total)),
+        A_ub=_matrix(above, shadowed, 0, (shadows + machines + ends, total)),
         b_ub=np.concatenate(most),
         A_eq=_matrix([*_moves(own, promise.piece)], parts, ends, (ends + len(parts), total)),
         b_eq=np.concatenate([np.zeros(ends), -past]),
