@@ -6,7 +6,16 @@ import attrs
 import numpy as np
 from generator.test_proof_obedience import CYCLES, STICK, STOPPED, TOLD, obedient
 
-from gen_profile.assurance.proof.exercised import STANDING, exercised, never, required, table
+from gen_profile.assurance.proof.exercised import (
+    ANYWHERE,
+    POWERED_UP,
+    STANDING,
+    exercised,
+    never,
+    required,
+    sensor_met,
+    table,
+)
 from gen_profile.assurance.proof.numbering import DRAWS, SEARCH
 from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
 from gen_profile.assurance.proof.prove import seed_of
@@ -42,6 +51,7 @@ def test_inputs_are_counted_by_the_state_in_which_they_change():
         ("fTarget", STANDING): 1,
         ("aSlowLow", POSITION): 1,
         ("fL1", POSITION): 1,
+        ("fL1", POWERED_UP): 1,
         ("bExecute", VELOCITY): 1,
         ("bStop", VELOCITY): 1,
     }
@@ -60,8 +70,42 @@ def test_outputs_are_counted_where_they_come():
 def test_pairs_that_never_came_are_named():
     found = counted()
     missing = never(found, required(["L1", "m2"]))
-    assert {"bExecute stopping", "bVelocity standing", "bQuickStop", "fm2"} <= {*missing}
+    assert {"bExecute stopping", "bVelocity standing", "bQuickStop to a target", "fm2"} <= {*missing}
+    assert {"fL1 for one cycle by a stick", "bStop at power-up", "bReset in a quick stop"} <= {*missing}
     assert not {"bExecute standing", "bStop by a stick", "fL1", "bDone"} & {*missing}
+    met = required(["L1"], [sensor_met(""), sensor_met("dead")])
+    assert {"a sensor: dead"} == {*never({(sensor_met(""), ANYWHERE): 1}, met)} & {
+        "a sensor: dead",
+        "a sensor: sound",
+        "bEnable standing",
+    }
+
+
+def test_what_is_rare_in_a_change_is_counted_beside_it():
+    names = ("fCycleTime", "fL1", "bStop")
+    rows = np.array(
+        [
+            [0.01, 3.0, 1.0],
+            [0.01 * (1.0 + 1e-6), 3.0, 0.0],
+            [0.01, NONE, 0.0],
+            [0.02, 4.0, 0.0],
+            [0.01, 3.0, 0.0],
+        ]
+    )
+    found = exercised(obedient(), [0, 200, 300, 301, 302], rows, names)
+    inputs = {
+        name: times for (name, state), times in found.items() if state == POSITION and name[1:] != "Done"
+    }
+    assert {name: times for name, times in inputs.items() if name.startswith(("fC", "fL", "bS"))} == {
+        "fCycleTime by a millionth": 2,
+        "fCycleTime": 2,
+        "fCycleTime for one cycle": 2,
+        "fL1": 3,
+        "fL1 that is no number": 1,
+        "fL1 for one cycle": 1,
+        "bStop": 1,
+    }
+    assert found["bStop", POWERED_UP] == 1
 
 
 def proof(count, fails=0, **known):

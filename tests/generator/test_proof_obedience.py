@@ -372,6 +372,27 @@ def test_wrong_values_count_once_they_have_lasted():
     assert changes(received.aborted) == {60: 1, 80: 0, 90: 1, 95: 0}
 
 
+def test_values_that_are_wrong_as_the_block_is_enabled_count_since_they_are():
+    lasting = read((0, {"bEnable": 0.0}), (10, {"fL": 3.0}), (60, {"bEnable": 1.0}), (80, {"fL": 1.5}))
+    assert changes(lasting.error) == {60: 2, 80: 0}
+    fresh = read((0, {"bEnable": 0.0}), (50, {"fL": 3.0}), (60, {"bEnable": 1.0}), (80, {"fL": 1.5}))
+    assert changes(fresh.error) == {70: 2, 80: 0}
+
+
+def test_an_axis_that_is_let_go_while_it_brakes_need_not_rest_where_it_would_have():
+    begin, braking = 400, obedient()
+    for end, still in ((402, DISABLED), (700, STOP)):
+        orders = (*braking.orders[:1], order(TOLD, begin, POSITION, TARGET), order(begin, end, QUICK_STOP))
+        brakes = attrs.evolve(braking, received=as_told(*orders, order(end, CYCLES, still)))
+        for name in ("fVelocity", "fAcceleration"):
+            brakes.issued[name][402:] = 0.0
+        brakes.issued["fPosition"][402:] = brakes.issued["fPosition"][402]
+        ahead = brakes.issued["fPosition"] + 0.5 * (abs(np.arange(CYCLES) - 396) < 6)
+        brakes.issued.update(fStopHigh=ahead, fStopLow=brakes.issued["fPosition"].copy())
+        brakes.issued["bEnabled"] = 1.0 * (np.arange(CYCLES) < end)
+        assert (kind_of(WORDS["loose"]) in kinds(brakes)) == (still == STOP)
+
+
 def test_what_commands_mean_depends_on_what_the_block_did():
     rows = (
         (0, {"bExecute": 1.0, "fTarget": 5.0}),
@@ -417,7 +438,8 @@ def test_histories_hold_what_operators_and_controllers_do():
     inputs = {name for history in drawn for change in history.changes for name in change.inputs}
     assert inputs == {
         *("rOverride", "fVelocityLimit", "fL1", "fm2", "bReset", "bExecute", "bLoadAtRest", "bEnable"),
-        *("fCycleTime", "fFollowingLimit", "fActPosition", "fActVelocity", "fVelocityCommand"),
+        *("fCycleTime", "fFollowingLimit", "fActPosition", "fActVelocity", "fVelocityCommand", "fTarget"),
+        *("bVelocity", "bStop", "bQuickStop"),
     }
     again = [sum(map(_same, history.commands, history.commands[1:])) for history in drawn]
     assert max(again) > 10

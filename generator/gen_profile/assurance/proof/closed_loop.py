@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.assurance.proof.estimating import estimation_error
+from gen_profile.assurance.proof.exercised import ANYWHERE, sensor_met
 from gen_profile.assurance.proof.followed import GivenMachine
 from gen_profile.assurance.proof.histories import SHIFT, SLOWEST, Histories, History
 from gen_profile.assurance.proof.judging import WatchedRun, judge_run
@@ -169,8 +170,11 @@ class ClosedLoop:
             return WatchedRun(run=run)
         judged = self._watch.judged(given, script, orders, block, run)
         faults = (*judged.faults, *self._sensor_faults(history, max(given.periods), run))
-        bare = attrs.evolve(run, trace=None, copies=None)
-        return attrs.evolve(judged, run=bare, faults=faults, unproven=self._unproven(run))
+        tried = dict(judged.exercised)
+        if history.sensed is not None:
+            tried[sensor_met(history.sensed.fault), ANYWHERE] = 1
+        bare, unproven = attrs.evolve(run, trace=None, copies=None), self._unproven(run)
+        return attrs.evolve(judged, run=bare, faults=faults, unproven=unproven, exercised=tried)
 
     def _unproven(self, run: BlockRun) -> bool:
         """Tell whether a sensor has not shown a motion of its axis until the end."""

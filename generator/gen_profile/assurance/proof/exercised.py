@@ -5,27 +5,40 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.assurance.proof.followed import Followed
 from gen_profile.assurance.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags
 from gen_profile.motion.profile import Array
 
-STANDING = "standing"
+STANDING, POWERED_UP, ANYWHERE = "standing", "powered up", ""
 STATES = {
+    POWERED_UP: "at power-up",
     DISABLED: "without bEnable",
     STANDING: "standing",
     POSITION: "to a target",
     VELOCITY: "by a stick",
     STOP: "stopping",
     QUICK_STOP: "in a quick stop",
+    ANYWHERE: "in any state",
 }
 GUIDED = (STANDING, POSITION, VELOCITY, STOP)  # in which any command may come
 COMMANDS = ("bExecute", "bVelocity", "bStop", "fTarget", "fVelocityCommand", "rOverride", "fVelocityLimit")
-SELDOM = ("bQuickStop", "bEnable", "bReset", "fFollowingLimit", "fCycleTime", "fActVelocity")  # in any state
+NO_NUMBER, SPIKE, MILLIONTH = " that is no number", " for one cycle", " by a millionth"
+EVENTS = (  # likewise, that no user need give, but some controller will
+    *("bReset", "bQuickStop", "fCycleTime", "fCycleTime" + MILLIONTH),
+    *("rOverride" + NO_NUMBER, "fVelocityLimit" + NO_NUMBER),
+)
+LOST = ("bEnable", "fFollowingLimit")  # after which nothing goes on as it was led to
+LATER = (("bReset", DISABLED), ("bReset", QUICK_STOP), ("fCycleTime", DISABLED))
+SELDOM = ("fActVelocity", "bLoadAtRest")  # in any state: one counts without bEnable alone, one as axes stand
 RISES = ("bDone", "bBusy", "bInVelocity", "bCommandAborted", "bError", "bPromise")
 CHANGES = ("nErrorId", "nPromise")
+OFF = 2e-6  # of fCycleTime, that is a millionth
 
 Pairs = Mapping[tuple[str, str], int]  # of an input or output and a state: how often
 
@@ -44,24 +57,36 @@ def exercised(
     names : sequence of str
         Of the inputs.
     """
-    found, states = Counter[tuple[str, str]](), [*_states(run)]
-    at = np.asarray(starts)
+    states = _states(run)
+    found = Counter((_plain(name), POWERED_UP) for name, value in zip(names, rows[0], strict=False) if value)
+    lasts = np.diff([*starts, run.cycles])
     same = (rows[1:] == rows[:-1]) | (np.isnan(rows[1:]) & np.isnan(rows[:-1]))
-    for column, name in enumerate(names):
-        for cycle in at[1:][~same[:, column]].tolist():
-            if cycle < run.cycles:
-                found[_plain(name), states[cycle - 1]] += 1
+    for row, column in np.argwhere(~same).tolist():
+        if starts[row + 1] < run.cycles:
+            state = states[starts[row + 1] - 1]
+            for name in _kinds(_plain(names[column]), rows[row : row + 2, column], lasts[row + 1] == 1):
+                found[name, state] += 1
     for name, flags in _came(run):
         for cycle in np.flatnonzero(flags).tolist():
             found[name, states[max(cycle - 1, 0)]] += 1
     return found
 
 
-def _states(run: Followed) -> Iterator[str]:
+def _kinds(name: str, values: Array, is_spike: bool) -> Iterator[str]:
+    """Name a change of an input, from a value to another, and what is rare in it."""
+    before, now = values.tolist()
+    millionth = name == "fCycleTime" and abs(now / before - 1.0) < OFF
+    yield f"{name}{MILLIONTH}" if millionth else name
+    if not isfinite(now):
+        yield name + NO_NUMBER
+    elif is_spike:
+        yield name + SPIKE
+
+
+def _states(run: Followed) -> NDArray[Any]:
     """Name the state of each cycle, (cycles,)."""
-    for order in run.orders:
-        for stands in run.stands[order.begin : order.end].tolist():
-            yield STANDING if stands and order.kind != DISABLED else order.kind
+    kinds = run.by_order([order.kind for order in run.orders])
+    return np.where(run.stands & (kinds != DISABLED), STANDING, kinds)
 
 
 def _plain(name: str) -> str:
@@ -80,16 +105,30 @@ def _came(run: Followed) -> Iterator[tuple[str, Flags]]:
             yield f"{name} {value:.0f}", changed & (values == value)
 
 
-def required(live: Iterable[str]) -> list[tuple[str, str]]:
-    """List the pairs of inputs, or outputs, and states that every proof must have tried; "" for any state.
+def required(live: Iterable[str], sensors: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """List the pairs of inputs, or outputs, and states that every proof must have tried.
 
     Parameters
     ----------
     live : iterable of str
         Names of the live parameters that change now and then.
+    sensors : sequence of str
+        What sensors must have met, by names of `sensor_met`. Histories with one have no events of `LOST`.
     """
-    anywhere = (*SELDOM, *(f"f{name}" for name in live), *RISES)
-    return [*((name, state) for name in COMMANDS for state in GUIDED), *((name, "") for name in anywhere)]
+    given = [f"f{name}" for name in live]
+    rare = (*EVENTS, *(name + how for name in given for how in (NO_NUMBER, SPIKE)))
+    return [
+        *((name, state) for name in (*COMMANDS, *rare) for state in GUIDED),
+        *((name, state) for name in LOST for state in (() if sensors else GUIDED)),
+        *((name, POWERED_UP) for name in ("bExecute", "bVelocity", "bStop", "bQuickStop", "bReset")),
+        *LATER,
+        *((name, ANYWHERE) for name in (*SELDOM, *LOST, *given, *RISES, *sensors)),
+    ]
+
+
+def sensor_met(fault: str) -> str:
+    """Name what a sensor meets in a history, which may be nothing."""
+    return f"a sensor: {fault or 'sound'}"
 
 
 def never(found: Pairs, pairs: Iterable[tuple[str, str]]) -> list[str]:

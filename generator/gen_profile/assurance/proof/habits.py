@@ -77,7 +77,7 @@ class Surroundings:
         Ranges of the live parameters.
     hoists : bool
         Whether they change on the way.
-    zones : bool
+    zones, sensors : bool
         Whether the block knows of any.
     rough : int
         How many of the habits may be taken that leave the load swinging.
@@ -91,6 +91,7 @@ class Surroundings:
     live: Mapping[str, tuple[float, float]]
     hoists: bool
     zones: bool
+    sensors: bool
     rough: int
 
     def zone(self, axis: int, place: float, width: float, number: int, *, slow: bool) -> dict[str, float]:
@@ -148,6 +149,11 @@ def between(ends: tuple[float, float], fraction: float) -> float:
     """Choose a value by its share of the way from one end to the other."""
     low, high = ends
     return float(low + fraction * (high - low)) if fraction < 1.0 else high
+
+
+def widened(fraction: float, margin: float = 0.05) -> float:
+    """Stretch, so that both ends are chosen with a share of `margin` each."""
+    return min(max((fraction - margin) / (1.0 - 2.0 * margin), 0.0), 1.0)
 
 
 def _fraction(fraction: float, number: int) -> float:

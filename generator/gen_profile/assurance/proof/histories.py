@@ -6,7 +6,7 @@ hypercube, corners are choices of 0 and 1, and a search moves through the same c
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import accumulate, islice, pairwise, product
+from itertools import islice, product
 from math import ceil, inf, isfinite
 from typing import Any, Self
 
@@ -14,9 +14,11 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.proof import habits
-from gen_profile.assurance.proof.habits import GOLDEN_RATIO, Change, Manner, Surroundings, between
+from gen_profile.assurance.proof.habits import GOLDEN_RATIO, Change, Manner, Surroundings, between, widened
 from gen_profile.assurance.proof.rhythms import rhythm
+from gen_profile.assurance.proof.ropes import LEGS, PER_LEG, hoisted_ropes
 from gen_profile.assurance.proof.sensing import CHOICES, SensedHistory, sensed
+from gen_profile.assurance.proof.tours import dealt_out, tour
 from gen_profile.dynamics.evaluation import phrases
 from gen_profile.dynamics.problem.hoisted_plant import hoisted
 from gen_profile.dynamics.problem.linearization import linearize
@@ -41,7 +43,6 @@ SLOWEST = 0.3  # override, and velocity limit as a share of the machine's
 OUTSIDE = 0.03  # share of the histories that begin before the travel, or behind it, by as much of it at most
 ROUGH_SHARE = 0.35  # share of the histories in which the load may be left swinging
 ALONE = 0.1  # half the share of stick commands that leave one of several axes alone
-LEGS = 8  # of one speed each, in which a live parameter changes on the way
 HOISTED_AFTER, RESTS = 0.4, 8.0  # share of the rhythms after which ropes change; and periods after the stop
 HOISTED_ON = 2.0  # periods after the last command in which it still may
 
@@ -49,7 +50,6 @@ Machine = tuple[dict[str, float], list[float]]  # parameters, and places of the 
 
 _PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
 _PER_HABIT = 2  # choices: which, and how
-_PER_LEG = 2  # choices: speed, how long
 
 
 @attrs.frozen(kw_only=True)
@@ -138,7 +138,7 @@ class History:
     def brakes(self) -> bool:
         """Whether it has a quick stop, after which nothing is promised."""
         stops = any(one.command == "quick-stop" for one in self.commands)
-        return stops or self._has("fFollowingLimit")
+        return stops or self._has("fFollowingLimit") or self._has("bQuickStop")
 
     @property
     def disturbed(self) -> bool:
@@ -248,12 +248,12 @@ class Histories:
         """Numbers of choices of a history, in their order.
 
         Where it starts; the box; when first, how and how often it is commanded; how it ends; then all
-        commands, all legs, and what a sensor meets.
+        commands, all legs, what a sensor meets, and its tour.
         """
         axes, planner = len(self.axes), self.spec.planner
         commands = MOST_COMMANDS * (_PER_COMMAND + axes + 1 + _PER_HABIT)
-        legs = LEGS * _PER_LEG * len(planner.live_rate)
-        return axes, self.box, 3, axes, commands, legs, CHOICES * (planner.sensor is not None)
+        legs = LEGS * PER_LEG * len(planner.live_rate)
+        return axes, self.box, 3, axes, commands, legs, CHOICES * (planner.sensor is not None), 1
 
     @property
     def choices(self) -> int:
@@ -281,14 +281,21 @@ class Histories:
         from scipy.stats import qmc  # noqa: PLC0415  # half a second
 
         random = np.random.default_rng(seed)
-        drawn: Array = qmc.LatinHypercube(self.choices, seed=random).random(count)
+        random_choices = qmc.LatinHypercube(self.choices - 1, seed=random).random(count)
+        drawn: Array = np.hstack([random_choices, np.zeros((count, 1))])
         corners = self.corners(count)
         every = 2 ** min(self._ends, 62)
         numbers = np.arange(every) if every == corners else random.integers(every, size=corners)
         ends = (numbers[:, None] >> np.arange(self._ends)) & 1
-        _, box, *_, legs, _ = np.split(drawn[:corners], np.cumsum(self.sizes)[:-1], axis=1)
+        edges = np.cumsum(self.sizes)[:-1]
+        _, box, *_, legs, _, _ = np.split(drawn[:corners], edges, axis=1)
         box[:] = ends[:, : self.box]
-        legs[:, ::_PER_LEG] = np.repeat(ends[:, self.box :], LEGS, axis=1)
+        legs[:, ::PER_LEG] = np.repeat(ends[:, self.box :], LEGS, axis=1)
+        *_, sensors, tours = np.split(drawn, edges, axis=1)
+        manners = drawn[:, edges[1] + 1]
+        tours[:, 0] = dealt_out(
+            np.array([_swings(manners[k]) + 2 * sensed(self.spec, one) for k, one in enumerate(sensors)])
+        )
         return drawn
 
     def corners(self, count: int) -> int:
@@ -302,7 +309,7 @@ class Histories:
         One that `lasts` so many seconds goes on in a rhythm, or by other choices each time for a `SHIFT`.
         """
         axes, live, uncertain = len(self.axes), self.spec.planner.live, self.uncertain
-        *parts, rows, legs, sensor = np.split(choices, np.cumsum(self.sizes)[:-1])
+        *parts, rows, legs, sensor, (touring,) = np.split(choices, np.cumsum(self.sizes)[:-1])
         starts, box, (first, manner, amount), ending = (part.tolist() for part in parts)
         live_values = {
             name: between(ends, fraction) for (name, ends), fraction in zip(live.items(), box, strict=False)
@@ -316,17 +323,16 @@ class Histories:
             travel = self.spec.limits.of(number).travel
             assert travel is not None
             beyond = max(start - 1.0 + OUTSIDE, 0.0) - max(OUTSIDE - start, 0.0)
-            places[number] = between(travel, _widened(start)) + beyond * (travel[1] - travel[0])
+            places[number] = between(travel, widened(start)) + beyond * (travel[1] - travel[0])
         rows = rows.reshape(MOST_COMMANDS, -1)
         is_sensed = not lasts and sensed(self.spec, sensor)
-        swings = not lasts and manner * len(MANNERS) % 1.0 < ROUGH_SHARE
-        rough = swings * (habits.BRAKING if is_sensed else len(habits.ROUGH))
+        rough = (not lasts and _swings(manner)) * (habits.BRAKING if is_sensed else len(habits.ROUGH))
         if 0.0 < lasts < SHIFT:
             given = rhythm(rows.ravel()[: 5 + axes], self._surroundings(rough=0), lasts)
             given += self._hoisted_at_rest(rows.ravel()[5 + axes], habits.commands_in(given)[-1].time)
         else:
             rows = rows[: int(amount * MOST_COMMANDS)] if lasts < SHIFT else _turned(rows, lasts)
-            given = tuple(self._given(rows, first, manner, ending, rough=rough, lasts=lasts))
+            given = tuple(self._given(rows, (first, manner, touring), ending, rough=rough, lasts=lasts))
         commands = habits.commands_in(given)
         found = None
         if is_sensed:
@@ -337,7 +343,9 @@ class Histories:
             places=tuple(places),
             commands=commands,
             axes=self.axes,
-            hoisting=self._hoisting(legs, live_values, commands[-1].time),
+            hoisting=hoisted_ropes(
+                self.spec.planner, legs, live_values, commands[-1].time + HOISTED_ON * self.period
+            ),
             changes=(*self._zones(starts, first, amount), *habits.changes_in(given)),
             sensed=found,
         )
@@ -349,31 +357,15 @@ class Histories:
         change = Change(time=last + RESTS * self.period, lasts=inf, inputs=given)
         return (change,) if given else ()
 
-    def _hoisting(
-        self, choices: Array, live_values: Mapping[str, float], last: float
-    ) -> dict[str, tuple[tuple[float, float], ...]]:
-        """Let live parameters change, leg by leg, at their greatest rates or below."""
-        rates = self.spec.planner.live_rate
-        until, hoisting = last + HOISTED_ON * self.period, {}
-        for (name, rate), legs in zip(
-            rates.items(), choices.reshape(len(rates), LEGS, _PER_LEG), strict=True
-        ):
-            speeds = [
-                rate * between((-1.0, 1.0), _widened(fraction, 0.25)) for fraction in legs[:, 0].tolist()
-            ]
-            shares = 0.1 + legs[:, 1]
-            times = list(accumulate((until * shares / shares.sum()).tolist(), initial=0.0))
-            hoisting[name] = _bouncing(live_values[name], speeds, times, self.spec.planner.live[name])
-        return hoisting
-
     def perturbed(self, history: History, errors: Mapping[str, float]) -> dict[str, float]:
         """Parameters of a machine that differs by some errors from what the block is given in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
     def _given(
-        self, rows: Array, first: float, manner: float, ending: Sequence[float], *, rough: int, lasts: float
+        self, rows: Array, how: Sequence[float], ending: Sequence[float], *, rough: int, lasts: float
     ) -> Iterator[Command | Change]:
-        """Follow the rows until their time is over, then come to rest."""
+        """Follow the rows until their time is over, and a tour, then come to rest."""
+        first, manner, touring = how
         within, longest = lasts or max(COMMANDED, PERIODS * self.period), PAUSE if lasts else LONGEST
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time, last = first * SOONEST, 1 + len(self.axes)
@@ -382,18 +374,22 @@ class Histories:
             if time > within:
                 break
             command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
-            slowed, which, how = row[last + 1 :]
-            behaviour = habits.habit(self._slowed(command, slowed), which, how, around)
+            slowed, which, habit = row[last + 1 :]
+            behaviour = habits.habit(self._slowed(command, slowed), which, habit, around)
             yield from behaviour
             time = habits.commands_in(behaviour)[-1].time
             earliest = time + 2.0 * around.cycle
             time += self.period * SHORTEST * (longest / SHORTEST) ** row[last]
         time = max(min(time, within), earliest)
-        how, *others = ending
-        if how < 0.05:
+        if not lasts:
+            led = tour(touring, time, around)
+            yield from led
+            time = habits.commands_in(led)[-1].time + 0.5 * self.period
+        end, *others = ending
+        if end < 0.05:
             yield Command(time=time, command="quick-stop")
         else:
-            yield self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
+            yield self._command(time, 0 if end < 0.5 else 2, [(end - 0.05) / 0.45, *others])
 
     def _zones(self, starts: Sequence[float], *shares: float) -> Iterator[Change]:
         """Block intervals beyond where the axes start, and make others slow."""
@@ -419,6 +415,7 @@ class Histories:
             live=self.spec.planner.live,
             hoists=bool(self.spec.planner.live_rate),
             zones=self.spec.planner.zones,
+            sensors=self.spec.planner.sensor is not None,
             rough=rough,
         )
 
@@ -435,7 +432,7 @@ class Histories:
         match which:
             case 0:
                 targets = (target_range(self.spec, number) for number in self.axes)
-                places = (between(ends, _widened(v)) for ends, v in zip(targets, values, strict=True))
+                places = (between(ends, widened(v)) for ends, v in zip(targets, values, strict=True))
                 return Command(time=time, command="position", values=tuple(places))
             case 1:
                 ends = ((-self._velocity(number), self._velocity(number)) for number in self.axes)
@@ -451,7 +448,7 @@ class Histories:
     def _stick(self, choice: float) -> float:
         """Choose a share from end to end; of several axes, each is left alone now and then."""
         alone = len(self.axes) > 1 and abs(choice - 0.5) < ALONE
-        return 0.5 if alone else _widened(choice, 0.25)
+        return 0.5 if alone else widened(choice, 0.25)
 
 
 def written(value: float) -> float | str:
@@ -459,35 +456,15 @@ def written(value: float) -> float | str:
     return value if isfinite(value) else str(value)
 
 
+def _swings(manner: float) -> bool:
+    """Whether the load may be left swinging in a history commanded in some manner."""
+    return manner * len(MANNERS) % 1.0 < ROUGH_SHARE
+
+
 def _turned(rows: Array, lasts: float) -> Array:
     """Repeat rows of choices, other ones each time, so many that each may last a second."""
     times = ceil(lasts / len(rows))
     return (np.tile(rows, (times, 1)) + GOLDEN_RATIO * np.repeat(np.arange(times), len(rows))[:, None]) % 1.0
-
-
-def _widened(fraction: float, margin: float = 0.05) -> float:
-    """Stretch, so that both ends are chosen with a share of `margin` each."""
-    return min(max((fraction - margin) / (1.0 - 2.0 * margin), 0.0), 1.0)
-
-
-def _bouncing(
-    value: float, speeds: Sequence[float], times: Sequence[float], ends: tuple[float, float]
-) -> tuple[tuple[float, float], ...]:
-    """Corners of a line of these speeds between rising times, which turns round at the ends of its range."""
-    corners, sign, (low, high) = [(times[0], value)], 1.0, ends
-    for speed, (begin, end) in zip(speeds, pairwise(times), strict=True):
-        time = begin
-        while speed:
-            bound = high if sign * speed > 0.0 else low
-            arrives = time + abs((bound - value) / speed)
-            if arrives >= end:
-                break
-            if arrives > time:
-                corners.append((arrives, bound))
-            time, value, sign = arrives, bound, -sign
-        value = min(max(value + sign * speed * (end - time), low), high)
-        corners.append((end, value))
-    return tuple(corners)
 
 
 def _machine(spec: Spec, live: Mapping[str, float], errors: Mapping[str, float]) -> Machine:

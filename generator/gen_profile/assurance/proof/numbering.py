@@ -107,6 +107,7 @@ class Numbering:
         searches = sum(numbers.start < self._edges[1] for numbers in self.rounds)
         step = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** (round_ / max(1, searches - 1))
         step, share = (RHYTHM_STEP, RHYTHM_CHANGED) if self.group(number) == RHYTHMS else (step, CHANGED)
-        before = self.choices(parents[place % len(parents)])
-        changed = random.random(before.shape) < share
-        return np.clip(before + changed * random.normal(scale=step, size=before.shape), 0.0, 1.0)
+        *before, touring = self.choices(parents[place % len(parents)]).tolist()
+        changed = random.random(len(before)) < share
+        stepped = np.clip(before + changed * random.normal(scale=step, size=len(before)), 0.0, 1.0)
+        return np.append(stepped, touring)

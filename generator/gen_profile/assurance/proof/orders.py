@@ -240,6 +240,8 @@ class _Reader:
             self.command = STOP
         if not (row["bExecute"] if self.aborted == 1 else self.aborted == 2 and row["bVelocity"]):
             self.aborted = 0
+        live = self._inputs.live.items()
+        self._count(LIVE, cycle, good=all(low <= row[f"f{name}"] <= high for name, (low, high) in live))
         if not row["bEnable"]:
             self._abort(done)
             self.error, self._latched, self._enabled, self._neutral = 0, False, False, False
@@ -268,6 +270,10 @@ class _Reader:
         if quick and not (facts is None or (cycle and facts.stands[cycle - 1])):
             self._braking = True
         return QUICK_STOP if quick or self.error == FOLLOWING else self.command
+
+    def _count(self, error: int, cycle: int, *, good: bool) -> None:
+        """Remember from when values are wrong."""
+        self._since[error] = -1 if good else cycle if self._since[error] < 0 else self._since[error]
 
     def _taken_over(self, row: Mapping[str, float]) -> Iterator[float]:
         """Tell how fast axes are as they are taken over."""
@@ -300,9 +306,7 @@ class _Reader:
                 min(row["rOverride"] * own.velocity, limit or own.velocity)
                 for own, limit in zip(self._inputs.limits, given, strict=True)
             )
-        live = all(low <= row[f"f{name}"] <= high for name, (low, high) in self._inputs.live.items())
-        for error, right in ((LIVE, live), (LIMITS, good)):
-            self._since[error] = -1 if right else cycle if self._since[error] < 0 else self._since[error]
+        self._count(LIMITS, cycle, good=good)
         counts = {since + self._inputs.held: error for error, since in self._since.items() if since >= 0}
         self.due = min((at for at in counts if at > cycle), default=None)
         if row.get("bReset"):

@@ -9,12 +9,13 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
-from gen_profile.assurance.proof.exercised import required
+from gen_profile.assurance.proof.exercised import required, sensor_met
 from gen_profile.assurance.proof.followed import LATENESS
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.judging import Judge
 from gen_profile.assurance.proof.lateness import chosen
 from gen_profile.assurance.proof.numbering import KEPT, LONG, RHYTHMS, Numbering
+from gen_profile.assurance.proof.sensing import faults_of
 from gen_profile.assurance.proof.verdict import HISTORIES, JudgedHistory, Proof
 from gen_profile.assurance.verification.cosimulation import ERROR_FLOOR
 from gen_profile.assurance.verification.monte_carlo import CURVATURE
@@ -160,7 +161,9 @@ def _compared(judged: Sequence[JudgedHistory], seed: int) -> tuple[JudgedHistory
 
 def _required(spec: Spec) -> list[tuple[str, str]]:
     """List what a proof of a spec's block must have tried; hoisting changes ropes in every cycle."""
-    return required([name for name in spec.planner.live if name not in spec.planner.live_rate])
+    live = [name for name in spec.planner.live if name not in spec.planner.live_rate]
+    kinds = faults_of(len(spec.planner.sensor.names)) if spec.planner.sensor else ()
+    return required(live, [sensor_met(kind) for kind in (("", *kinds) if kinds else ())])
 
 
 def _verdict(

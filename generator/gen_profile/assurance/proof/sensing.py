@@ -126,7 +126,7 @@ class SensedHistory:
         random, directions = np.random.default_rng([int(seed * 2**32), 1]), sensed_directions(spec)
         more = random.random((3, len(directions) - 1)).tolist()  # of the second sensor, and so on
         columns = [list(planned_axes(spec)).index(number) for number in directions]
-        fault, faults = "", (*FAULTS, *[EXCHANGED] * (len(directions) > 1))
+        fault, faults = "", faults_of(len(directions))
         if kind >= SOUND:
             fault = faults[min(int((kind - SOUND) / (1.0 - SOUND) * len(faults)), len(faults) - 1)]
         always = fault == EXCHANGED or (fault in FROM_START and seed < 0.5)
@@ -252,6 +252,11 @@ class SensedHistory:
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
         return attrs.asdict(self)
+
+
+def faults_of(sensors: int) -> tuple[str, ...]:
+    """List the faults that one of so many sensors may have."""
+    return (*FAULTS, *[EXCHANGED] * (sensors > 1))
 
 
 def sensed(spec: Spec, choices: Sequence[float] | Array) -> bool:

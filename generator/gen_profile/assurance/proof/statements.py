@@ -275,10 +275,12 @@ def stops(run: Followed) -> Iterator[Allowance]:
         if let_go:
             continue
         if order.kind == QUICK_STOP:
-            after = begin + np.flatnonzero(run.stands[begin:])[:1]  # it brakes on when another order comes
-            rest = run.position[:, [*after, order.end - 1][0]][:, None]
+            # it brakes on when another order comes, unless it is let go
+            after = begin + np.flatnonzero(run.stands[begin:] | ~run.guided[begin:])[:1]
+            last = [*after, order.end - 1][0]
+            rest = run.position[:, last][:, None]
             highest, lowest = np.maximum(highest, rest), np.minimum(lowest, rest)
-            wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own]
+            wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own] * run.guided[last]
             margin = max(limits.margin for limits in run.limits)
             yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)

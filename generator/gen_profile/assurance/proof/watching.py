@@ -159,7 +159,12 @@ class BlockWatch:
         met = [*measured(followed, reactions)]
         left = max((one.needed for one in met if one.what == LEFT), default=0.0)
         wrong = (*faults(met, followed.cycle), *self._understated(run, followed))
-        tried = exercised(followed, *self._changes(script), self.inputs)
+        planner = self.spec.planner
+        if planner.live_rate or planner.live_noise:  # live parameters change in every cycle
+            tried = exercised(followed, *self._changes(script), self.inputs)
+        else:
+            rows = script.inputs[:, : len(self.inputs)]
+            tried = exercised(followed, script.start_cycles, rows, self.inputs)
         return WatchedRun(run=run, faults=wrong, left=left, obeyed=obeyed(followed), exercised=tried)
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
