@@ -6,6 +6,7 @@ from exporters.driven_block import G
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.machine import OVERSTATED
 from gen_profile.spec.reading import preset_spec
 
 pytestmark = pytest.mark.slow
@@ -116,7 +117,8 @@ def test_nothing_is_forgotten_without_damping(text, rope, load, promised):
     for at in ends[:: -(len(ends) // 5)]:
         require_true(out, at, rope, load)
     for at in ends[ends < 80.0 / CYCLE]:  # what is between the machines watched is known
-        assert out["fSwayLeft"][at] <= 1.15 * worst(out["fVelocity"][:at], rope, load)
+        known = worst(out["fVelocity"][:at], rope, load)
+        assert out["fSwayLeft"][at] <= 1.065 * (1.0 + OVERSTATED) * known  # interpolated over live ranges
     assert out["bPromise"][200 : round(promised / CYCLE)].all()
 
 

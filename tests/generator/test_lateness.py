@@ -51,6 +51,8 @@ def test_a_late_block_is_refused_only_where_the_spec_demands_it():
     assert lateness.words().startswith(
         "1 of 2 commands takes more than 1.5 times the quickest and 1 s; the latest:"
     )
+    closed = Promptness(demanded=None, commands=[(7, attrs.evolve(quick, possible=None))])
+    assert "all 1 commands within 1.5 times the quickest and 1 s, all by the closed form" in closed.words()
     (reason,) = Promptness(demanded=1.2, commands=[(7, SLOW), (8, quick)]).reasons()
     assert reason.startswith(
         "In history 7, one of the stops (at 1 m, 1 m/s) takes 9 s at 3.00 s, where 4 s are possible, "

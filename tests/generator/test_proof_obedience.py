@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from generator.planned_machines import BAY
 
-from gen_profile.assurance.proof.followed import Followed, Zone
+from gen_profile.assurance.proof.followed import Followed, Zone, runs_of
 from gen_profile.assurance.proof.habits import GENTLE, ROUGH
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.left_swinging import GivenModes
@@ -27,6 +27,7 @@ from gen_profile.assurance.proof.orders import (
     TimedOrder,
     read_orders,
 )
+from gen_profile.assurance.proof.statements import OVERSTATED
 from gen_profile.assurance.proof.verdict import kind_of
 from gen_profile.assurance.proof.watching import BlockWatch
 from gen_profile.methods.quickest.modes import SwayModes
@@ -212,7 +213,13 @@ FAULTS = {
     "beyond": with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.7,)), STOPS),
     "unasked": with_orders(REST, attrs.evolve(MOVE, values=(0.0,)), STICKS, STOPS),
     "swings": attrs.evolve(obedient(), modes=MODES, sway_limit=0.05),
-    "sway left": attrs.evolve(with_output("fSwayLeft", slice(0, None), 9.0), modes=MODES, sway_limit=0.05),
+    "sway left": attrs.evolve(
+        with_output("fSwayLeft", np.arange(CYCLES), 9.0 - 4.5 * (np.arange(CYCLES) > 1000)),
+        modes=MODES,
+        last_modes=MODES,
+        live_changes=[(1000, 1040)],
+        last_known=1040,
+    ),
     "understated": attrs.evolve(with_output("fSwayLeft", 0, 0.0), modes=MODES, sway_limit=0.05),
     "event": with_output("nEvents", 0, 0.0),
     "promise": with_output("bPromise", 300, 0.0),
@@ -370,6 +377,16 @@ def test_wrong_values_count_once_they_have_lasted():
     assert [(one.begin, one.kind) for one in received.orders] == [(0, POSITION), (60, STOP), (99, POSITION)]
     assert changes(received.error) == {60: 5, 95: 0}
     assert changes(received.aborted) == {60: 1, 80: 0, 90: 1, 95: 0}
+
+
+def test_what_errors_leave_may_be_overstated_and_by_how_much_is_measured():
+    """A sound block was refused by 0.05 mm, and then the limit was raised to what it stated."""
+    loose = attrs.evolve(with_output("fSwayLeft", slice(0, None), 9.0), modes=MODES, sway_limit=0.05)
+    assert kind_of(WORDS["sway left"]) not in kinds(loose)
+    ends = [begin for begin, _ in runs_of(loose.stands) if begin]
+    *_, apart = MODES.left(loose.acceleration, ends, CYCLE)
+    (found,) = (one.needed for one in measured(loose, {}) if one.what == OVERSTATED)
+    assert found == pytest.approx(9.0 / max(min(apart), 0.01 * 0.05))
 
 
 def test_values_that_are_wrong_as_the_block_is_enabled_count_since_they_are():

@@ -17,7 +17,7 @@ from generator.test_proof_obedience import (
     with_orders,
 )
 
-from gen_profile.assurance.proof.numbering import DRAWS, SEARCH
+from gen_profile.assurance.proof.numbering import DRAWS, RHYTHMS, SEARCH
 from gen_profile.assurance.proof.obedience import WORDS
 from gen_profile.assurance.proof.orders import STOP, VELOCITY
 from gen_profile.assurance.proof.verdict import Proof, kind_of
@@ -77,7 +77,9 @@ def test_nothing_is_promised_while_what_was_measured_is_damped():
 
 def proof_of(count, promised):
     """A proof of so many histories without a fault, of which some end with a promise."""
-    one = SimpleNamespace(number=0, group=DRAWS, faults=(), obeyed=(), exercised={}, residual=ONE_LOAD)
+    one = SimpleNamespace(
+        number=0, group=DRAWS, faults=(), obeyed=(), exercised={}, residual=ONE_LOAD, overstated=0.0
+    )
     judged = [
         SimpleNamespace(**vars(one), promise=k < promised, fraction=lambda *_: 0.5) for k in range(count)
     ]
@@ -102,6 +104,17 @@ def test_few_histories_are_a_trial_and_all_verdicts_tell_how_many():
     }
     assert proof_of(200, 150).summary()["histories"] == "200 histories, 150 of them promised"
     assert (proof_of(199, 1).kind, proof_of(200, 1).kind) == ("trial", "proof")
+
+
+def test_how_tight_statements_are_is_told_of_short_histories_and_refuses_nothing():
+    assert proof_of(200, 150).tightness() == "fSwayLeft was compared in no history"
+    proof = proof_of(200, 150)
+    for k, (group, times) in enumerate([(DRAWS, 1.2), (DRAWS, 1.9), (RHYTHMS, 7.0)]):
+        proof.judged[k].number, proof.judged[k].group, proof.judged[k].overstated = k, group, times
+    assert proof.tightness().startswith(
+        "fSwayLeft states at most 1.9 times what errors may leave, in history 1:"
+    )
+    assert proof.reasons() == ()
 
 
 @pytest.mark.parametrize("count", [1, 250])

@@ -203,6 +203,7 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
         ("worst history", f"{proof.worst.number}: residual sway {_remains(proof.worst)}"),
         ("safe", "no" if proof.unsafe() else "in every history"),
         ("prompt", proof.lateness.words()),
+        ("tight", proof.tightness()),
         ("how sure", proof.sureness()),
         (proof.kind, f"{verdict} on {proof.carried_by}: {100.0 * document['share']:.3g} % of the limit"),
     ]

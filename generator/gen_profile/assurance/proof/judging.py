@@ -32,6 +32,8 @@ class WatchedRun:
         What the block did other than commanded, in words that end a sentence.
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
+    overstated : float
+        `fSwayLeft` by what stated errors leave if each axis and mode has a worst machine of its own, at most.
     obeyed : sequence of Obeyed
         How soon its commands were carried out.
     exercised : mapping
@@ -43,6 +45,7 @@ class WatchedRun:
     run: BlockRun
     faults: tuple[str, ...] = ()
     left: float = 0.0
+    overstated: float = 0.0
     obeyed: Sequence[Obeyed] = ()
     exercised: Pairs = attrs.field(factory=dict)
     unproven: bool = False
@@ -79,6 +82,7 @@ def judge_run(
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
         left=watched.left,
+        overstated=watched.overstated,
         obeyed=tuple(watched.obeyed),
         exercised=watched.exercised,
         faults=(*_faults(history, watched, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),

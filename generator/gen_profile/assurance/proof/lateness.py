@@ -68,6 +68,8 @@ class Promptness:
         within = f"{self.factor:g} times the quickest and {PLANNING:g} s"
         number, one = self.latest
         worst = f"the latest: {_sentence((number, one))[3:]}"
+        if not any(one.possible for _, one in self.commands):
+            within += ", all by the closed form, as zones, ropes that change and sensors leave no other"
         take = f"take{'s' * (late == 1)} more than" if late else "within"
         return f"{found} {take} {within}; {worst}"
 

@@ -17,7 +17,6 @@ from gen_profile.plants.plant import Plant
 
 TURN = 0.45  # rad, at most, between what machines next to each other do after a history: a block tries fewer
 USUAL = 9  # machines from the one as given to a corner, at least
-ONE_SIDED = 0.5  # of an error, below which the other one is not stated either way
 FEW_ERRORS = 0.01  # of the stated ones: what is left there is their first order
 
 Machine = tuple[Mapping[str, float], Sequence[float]]  # parameters, and places of the axes
@@ -82,20 +81,6 @@ class GivenModes:
             ends=ends,
             near=1 + len(others),
         )
-
-    @property
-    def turns(self) -> float:
-        """By how much the errors turn a mode at most, in rad/s."""
-        return float(np.abs(self.modes.poles.imag - self.modes.poles[0].imag).max())
-
-    @property
-    def skew(self) -> float:
-        """How much more an error may change a frequency one way than the other, at most."""
-        lead = self.modes.poles.imag / self.modes.poles[0].imag - 1.0
-        up, down = lead.max(axis=0), -lead.min(axis=0)
-        least = np.minimum(up, down)
-        both = least > ONE_SIDED * np.maximum(up, down)
-        return float((np.maximum(up, down)[both] / least[both]).max(initial=1.0))
 
     def left(self, acceleration: Array, ends: Sequence[int], cycle: float) -> tuple[Array, Array, Array]:
         """Find what sways on where axes stand.

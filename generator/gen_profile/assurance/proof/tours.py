@@ -157,7 +157,7 @@ def tour(choice: float, time: float, around: Surroundings) -> Manner:
     around : Surroundings
     """
     among = events(around)
-    event, how = among[int(choice * len(among))], choice * len(among) % 1.0
+    event, how = among[min(int(choice * len(among)), len(among) - 1)], choice * len(among) % 1.0
     part, given, at = BEGUN + PART * around.period, list[Command | Change](), [AT_ONCE * around.cycle]
     for command, values in _steps(how, around):
         given.append(Command(time=time, command=command, values=values))

@@ -57,6 +57,8 @@ class JudgedHistory:
         What else is wrong, in words that end a sentence.
     left : float
         m, that stated errors leave at most on the linear machine, as long as the block promises.
+    overstated : float
+        `fSwayLeft` by what stated errors leave if each axis and mode has a worst machine of its own, at most.
     obeyed : tuple of Obeyed
         How soon its commands were carried out.
     exercised : mapping
@@ -74,6 +76,7 @@ class JudgedHistory:
     limits: Mapping[str, float]
     faults: tuple[str, ...]
     left: float = 0.0
+    overstated: float = 0.0
     obeyed: tuple[Obeyed, ...] = ()
     exercised: Pairs = attrs.field(factory=dict)
 
@@ -198,6 +201,19 @@ class Proof(Summarised, Examination):
             commands=[(one.number, command) for one in self.judged for command in one.obeyed],
         )
 
+    @property
+    def loosest(self) -> JudgedHistory | None:
+        """The history, rhythms excepted, in which `fSwayLeft` is overstated most; none without any."""
+        judged = [one for one in self.judged if one.group not in (RHYTHMS, LONG) and one.overstated]
+        return max(judged, key=lambda one: one.overstated, default=None)
+
+    def tightness(self) -> str:
+        """Say how much higher than what stated errors leave the block says that they may."""
+        if (one := self.loosest) is None:
+            return "fSwayLeft was compared in no history"
+        times = f"fSwayLeft states at most {one.overstated:.3g} times what errors may leave"
+        return f"{times}, in history {one.number}: safe, but where that is much, promises are given up early"
+
     def reasons(self) -> tuple[str, ...]:
         """Say why the proof failed, a sentence each; none when it passed."""
         return (*self.unsafe(), *self.lateness.reasons())
@@ -282,6 +298,7 @@ class Proof(Summarised, Examination):
             "trial": self.kind == "trial",
             "safe": not self.unsafe(),
             "prompt": self.lateness.to_dict(),
+            "tight": (one := self.loosest) and {"history": one.number, "sway_left": one.overstated},
             "limits_m": dict(self.limit),
             "error_bound_m": self.error_bound,
             "histories": self.count,

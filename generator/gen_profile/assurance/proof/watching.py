@@ -38,7 +38,7 @@ from gen_profile.assurance.proof.orders import (
     read_orders,
 )
 from gen_profile.assurance.proof.promptness import obeyed
-from gen_profile.assurance.proof.statements import ADDED_UP, LEFT
+from gen_profile.assurance.proof.statements import ADDED_UP, LEFT, OVERSTATED
 from gen_profile.motion.profile import Array
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.stated import STEADY, quick_limits, target_range
@@ -157,7 +157,9 @@ class BlockWatch:
         """
         followed, reactions = self.followed(given, script, expected, block, run)
         met = [*measured(followed, reactions)]
-        left = max((one.needed for one in met if one.what == LEFT), default=0.0)
+        left, overstated = (
+            max((one.needed for one in met if one.what == what), default=0.0) for what in (LEFT, OVERSTATED)
+        )
         wrong = (*faults(met, followed.cycle), *self._understated(run, followed))
         planner = self.spec.planner
         if planner.live_rate or planner.live_noise:  # live parameters change in every cycle
@@ -165,7 +167,14 @@ class BlockWatch:
         else:
             rows = script.inputs[:, : len(self.inputs)]
             tried = exercised(followed, script.start_cycles, rows, self.inputs)
-        return WatchedRun(run=run, faults=wrong, left=left, obeyed=obeyed(followed), exercised=tried)
+        return WatchedRun(
+            run=run,
+            faults=wrong,
+            left=left,
+            overstated=overstated,
+            obeyed=obeyed(followed),
+            exercised=tried,
+        )
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""

@@ -175,7 +175,7 @@ def _sections(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -
     if proof.lateness.latest is not None:
         yield Section(
             title="How soon commands are obeyed",
-            words=[f"{proof.lateness.words()}."],
+            words=[f"{proof.lateness.words()}.", f"{proof.tightness()}."],
             blocks=[lateness_figure(proof), _lateness(proof)],
         )
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
