@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 import attrs
+from scipy.optimize import brentq
 
-BISECTIONS = 40  # of a velocity, to a millionth of a millionth
+EXACT = 1e-12  # of the greatest velocity, to which the one on the way is found
 
 
 @attrs.frozen(kw_only=True)
@@ -29,16 +30,16 @@ def to_velocity(velocity: float, acceleration: float, wanted: float, limits: Axi
 
 def to_place(way: float, velocity: float, acceleration: float, limits: AxisLimits) -> float:
     """Tell the time in s from a velocity and an acceleration to rest, so far away in m (or rad)."""
-    low, high = -limits.velocity, limits.velocity
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if _over(middle, velocity, acceleration, limits)[1] < way:
-            low = middle
-        else:
-            high = middle
-    time, led = _over(high, velocity, acceleration, limits)
-    cruise = (way - led) / high if abs(high) > 0.999 * limits.velocity else 0.0
-    return time + max(cruise, 0.0)
+    most = limits.velocity
+
+    def beyond(cruise: float) -> float:
+        return _over(cruise, velocity, acceleration, limits)[1] - way
+
+    cruise = most if beyond(most) <= 0.0 else -most
+    if beyond(-most) < 0.0 < beyond(most):
+        cruise = brentq(beyond, -most, most, xtol=EXACT * most)
+    time, led = _over(cruise, velocity, acceleration, limits)
+    return time + max((way - led) / cruise, 0.0) * (abs(cruise) == most)
 
 
 def _over(cruise: float, velocity: float, acceleration: float, limits: AxisLimits) -> tuple[float, float]:
