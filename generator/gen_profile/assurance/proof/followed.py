@@ -243,15 +243,9 @@ class Followed:
 
     def sensed(self, name: str) -> Flags:
         """Tell when an output of a block with sensors is set, of any axis; never of one without."""
-        if name not in self._sensed:
-            outputs = [name, *(axis.of(name) for axis in self.axes)]
-            issued = [self.issued[output] for output in outputs if output in self.issued]
-            self._sensed[name] = np.any([np.zeros(self.cycles), *issued], axis=0)
-        return self._sensed[name]
-
-    @cached_property
-    def _sensed(self) -> dict[str, Flags]:
-        return {}
+        outputs = [name, *(axis.of(name) for axis in self.axes)]
+        issued = [self.issued[output] for output in outputs if output in self.issued]
+        return np.any(issued, axis=0) if issued else np.zeros(self.cycles, dtype=bool)
 
     @property
     def lost_sensors(self) -> Flags:

@@ -39,7 +39,7 @@ def to_place(way: float, velocity: float, acceleration: float, limits: AxisLimit
     if beyond(-most) < 0.0 < beyond(most):
         cruise = brentq(beyond, -most, most, xtol=EXACT * most)
     time, led = _over(cruise, velocity, acceleration, limits)
-    return time + max((way - led) / cruise, 0.0) * (abs(cruise) == most)
+    return time + (max((way - led) / cruise, 0.0) if abs(cruise) == most else 0.0)
 
 
 def _over(cruise: float, velocity: float, acceleration: float, limits: AxisLimits) -> tuple[float, float]:
