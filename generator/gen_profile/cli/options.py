@@ -113,7 +113,11 @@ class PictureFile(OutputFile):
 
         path = super().convert(value, param, ctx)
         if ctx is None or not ctx.resilient_parsing:
-            require_drawable(path)
+            try:
+                require_drawable(path)
+            except OutputError as error:
+                _name_by_option(error, param.opts if param else ())
+                raise
         return path
 
 
@@ -335,14 +339,14 @@ def output(command: Command) -> Command:
         try:
             return command(**values)
         except GenProfileError as error:
-            error.args = tuple(_by_option(context, sentence) for sentence in error.sentences)
+            _name_by_option(error, _given(context))
             raise
 
     return cast("Command", careful)
 
 
-def _by_option(context: click.Context, sentence: str) -> str:
-    """Name an argument that a sentence begins with by its option: ``vary: …`` becomes ``--vary: …``."""
+def _given(context: click.Context) -> list[str]:
+    """List the options that a command was given."""
     given = [
         parameter.opts[0]
         for parameter in context.command.params
@@ -350,10 +354,16 @@ def _by_option(context: click.Context, sentence: str) -> str:
     ]
     if context.ignore_unknown_options:  # which are words of an argument
         given += [word.partition("=")[0] for word in context.params["words"]]
+    return given
+
+
+def _name_by_option(error: GenProfileError, given: Iterable[str]) -> None:
+    """Name an argument that a sentence begins with by its option: ``vary: …`` becomes ``--vary: …``."""
     flags = {option.removeprefix("--"): option for option in given if option.startswith("--")}
     flags |= {name.replace("-", "_"): option for name, option in flags.items()}
-    return re.sub(
-        r"^[\w.]+(?=[: ,])", lambda match: flags.get(match[0], match[0]), sentence, flags=re.MULTILINE
+    begin = re.compile(r"^[\w.]+(?=[: ,])", re.MULTILINE)
+    error.args = tuple(
+        begin.sub(lambda match: flags.get(match[0], match[0]), sentence) for sentence in error.sentences
     )
 
 
