@@ -44,9 +44,9 @@ EXACT = attrs.evolve(ROUGH, precision=8e-4, close=1e-3)
 DECIDED_BY_HOIST = 0.3  # s, beyond the hoist's own least time, up to which no other height is quicker
 LOWER = (0.0, 0.25, 0.5, 0.75)  # of the way from the height that is needed to the top, as other heights
 WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # s before the hoist begins, and after it ends
-WORTH = 2e-3  # of the duration, that another height must save
+WORTH = 2e-3  # of the duration, that another height must save; then twice as much, and so on
 ROUNDS = 8  # of linearising anew
-SETTLED = 1e-6  # m, rad and their rates, by which states change from one program to the next
+SETTLED = 1e-7  # m, rad and their rates, by which a machine may be elsewhere after an interval
 LONGER = 2e-3  # of the duration that is added where the machines themselves have too little room
 TRIES = 12
 WATCHED = 4001  # times at which machines are looked at
@@ -127,17 +127,18 @@ class _Planner:
         raise _none_found()
 
     def otherwise_lifted(self, best: Course, lifted: Lifted) -> tuple[Course, Lifted]:
-        """Look for a lower top, or for waits of the hoist, that are quicker, as where the trolley decides."""
-        bay = self.bay
+        """Look for a lower top, then for waits of the hoist, that are quicker: where the trolley decides."""
+        bay, top = self.bay, self.bay.top
         tops = [bay.needed + share * (bay.top - bay.needed) for share in LOWER]
-        for top in tops:
-            for waits in WAITS:
-                way: Lifted = partial(bay.lifted, top=top, waits=waits)
-                while (up := way(best.up.duration * (1.0 - WORTH))) is not None:
-                    course = self.solved(resting(bay, up))
-                    if course is None or not has_room(course):
-                        break
-                    best, lifted = course, way
+        for lower, waits in [*((lower, WAITS[0]) for lower in tops), *((None, waits) for waits in WAITS[1:])]:
+            way: Lifted = partial(bay.lifted, top=top if lower is None else lower, waits=waits)
+            saved = WORTH
+            while (up := way(best.up.duration * (1.0 - saved))) is not None:
+                course = self.solved(resting(bay, up))
+                if course is None or not has_room(course):
+                    break
+                best, lifted, top = course, way, top if lower is None else lower
+                saved *= 2.0
         return best, lifted
 
     def in_time(self, duration: float) -> Course | None:
@@ -155,14 +156,14 @@ class _Planner:
     def settled(self, course: Course) -> Course | None:
         """Linearise anew until machines do what the program says; the smoothest such course, with room."""
         for _ in range(ROUNDS):
-            smoother = self.solved(course, smooth=True)
+            program = Program(bay=self.bay, about=course)
+            if course.smooth and program.defect < SETTLED:
+                break
+            self.programs += 1
+            smoother = program.solve(smooth=True)
             if smoother is None:
                 return None
-            pairs = zip(smoother.begins, course.begins, strict=True)
-            moved = max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs)
             course = smoother
-            if moved < SETTLED:
-                break
         return course if has_room(course) else None
 
 

@@ -49,6 +49,8 @@ class Course:
         m, that is left to the stacks beyond the clearance; negative where it is missing.
     miss : float
         m, by which the target is missed.
+    smooth : bool
+        Whether it is the smoothest one.
     """
 
     up: Pieces
@@ -56,6 +58,7 @@ class Course:
     begins: tuple[Array, Array]
     room: float = -math.inf
     miss: float = 0.0
+    smooth: bool = False
 
 
 def resting(bay: Bay, up: Pieces) -> Course:
@@ -98,6 +101,13 @@ class Program:
             first,
             *(Followed(**{k: v[m : m + 1] for k, v in each.items()}) for m in range(len(others))),
         ]
+
+    @property
+    def defect(self) -> float:
+        """By how much machines are elsewhere after an interval than the next one begins, in SI units."""
+        begins = [self.about.begins[0], *self.about.begins[1]]
+        pairs = zip(self.followed, begins, strict=True)
+        return max(float(np.abs(one.states[0, :, -1] - begin[1:]).max()) for one, begin in pairs)
 
     @property
     def width(self) -> int:
@@ -159,7 +169,7 @@ class Program:
         solution = program.solve(sparse.diags(weight, format="csc"), linear)
         if solution.verdict is not ConicStatus.SOLVED:
             return None
-        return self._course(solution.x, jerks)
+        return attrs.evolve(self._course(solution.x, jerks), smooth=smooth)
 
     def _course(self, x: Array, jerks: Numbers) -> Course:
         """Take the states and jerks that a program found."""
