@@ -13,7 +13,7 @@ from sphinx.util.typing import ExtensionMetadata
 import gen_profile
 
 NAVIGATION = {
-    "Tutorials": "tutorial-crane over-stacks tutorial-research tutorial-drive",
+    "Tutorials": "tutorial-crane over-stacks tutorial-tia tutorial-logix tutorial-research tutorial-drive",
     "How to": (
         "standalone machines plc sweeps planner planner-sensor soft-plc deploy can fmu studio report python"
         " troubleshooting"

@@ -65,6 +65,13 @@ def run(block: Block, scope: dict[str, Any]) -> None:
             Path(name).write_text(block.text, "utf-8")
         case Block(language="c"):
             _compile(block.text)
+        case Block(language="st") if (
+            '"' in block.text
+        ):  # SCL, in which blocks of other makers are called, too
+            (wrapper,) = Path().rglob("*_velocity.scl")
+            called = " ".join(re.findall(r'(?s)"Crane"\((.*?)\);', block.text))
+            declared = wrapper.read_text("utf-8")
+            assert [name for name in re.findall(r"(\w+) :=", called) if f"{name} : " not in declared] == []
         case Block(language="st"):
             wrappers = "".join(path.read_text("utf-8") for path in Path().rglob("*_Axis.TcPOU"))
             named = set(re.findall(r"(\w+) :=", block.text)) - {"Axis"}

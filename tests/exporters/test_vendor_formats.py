@@ -263,7 +263,7 @@ class TestSiemens:
 
     def test_points_of_the_cam(self):
         goal = goal_of(TWO_MOVES, unit="mm")
-        text = siemens_scl.encode(TWO_MOVES, goal)[1].content.decode()
+        text = siemens_scl.encode(TWO_MOVES, goal)[-1].content.decode()
         points = {
             name: np.array(
                 re.findall(rf"{name}\[\d+\]\.x := (\S+);\n\s+{name}\[\d+\]\.y := (\S+);", text), float

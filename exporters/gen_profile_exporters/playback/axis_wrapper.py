@@ -1,10 +1,14 @@
-"""A function block around the playback block that hands its outputs to the axes of a vendor's motion library.
+"""Function blocks around the playback block, for axes of a vendor's motion library or frequency converters.
 
 The vendor's block first takes the axes where they stand, so that no setpoint is a step; then the motion
 begins, under watch: an axis in error, without power or no longer this block's is let go at once, the others
 stop on the path, and nothing goes on before another rising edge and the check of the start.
 The calls follow the vendors' public manuals; they were not tried on a controller.
 """
+
+import re
+
+import attrs
 
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
@@ -16,6 +20,10 @@ STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
 TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
 SETPOINTS = {"fPosition", "fVelocity", "fAcceleration", "nPosition"}  # what goes to them
+MEASURED = {
+    ACTUAL: "measured",
+    "fFollowingLimit": "greatest distance from its setpoint",
+}  # of a converter's axis
 MAILBOX = {REQUEST, REPLY, STATE}  # reached from outside in the playback block itself
 STATES = {"bBusy", "bDone", "bAborted", "bError", "nErrorId"}  # outputs that depend on the axes, too
 
@@ -28,21 +36,35 @@ def axis_wrappers(block: BlockSource, axes: int, library: MotionLibrary) -> tupl
 
 def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> BlockSource:
     """Write the block around a playback block, with the same inputs and outputs but the axes' own."""
-    inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name not in {ACTUAL, *MAILBOX}]
-    outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS | MAILBOX]
     several = axes > 1
     places = [{"n": f"{n}" * several, "i": f"[{n}]" * several} for n in range(1, axes + 1)]
-    name = f"{block.name}_Axis"
+    inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name not in {ACTUAL, *MAILBOX}]
+    outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS | MAILBOX]
+    by_velocity = not library.axis_type
+    name, kind = (f"{block.name}_Velocity", "velocity") if by_velocity else (f"{block.name}_Axis", "axis")
+    body = _body([v.name for v in inputs], [v.name for v in outputs], places, library)
+    axis = [BlockVariable("VAR_IN_OUT", "Axis{n}", library.axis_type)]
+    if by_velocity:  # the converter is powered, and its axis homed, by others
+        axis = [
+            BlockVariable("VAR_INPUT", f"{key}{{n}}", "LREAL", comment=of) for key, of in MEASURED.items()
+        ]
+        axis += [v for v in library.variables if v.name.removesuffix("{n}") in re.findall(r"[a-zA-Z]+", body)]
     return BlockSource(
-        header=TEXTS["header"].format(name=name, block=block.name, guide=library.guide) + "\n",
+        header=TEXTS["header"].format(
+            name=name,
+            block=block.name,
+            guide=library.guide,
+            **{k: TEXTS[f"{kind}_{k}"] for k in ("on", "more")},
+        )
+        + "\n",
         name=name,
         variables=(
-            *(BlockVariable("VAR_IN_OUT", f"Axis{place['n']}", library.axis_type) for place in places),
+            *(attrs.evolve(v, name=v.name.format(**place)) for place in places for v in axis),
             *inputs,
             *outputs,
             *_own(block.name, [v.name for v in inputs], places, library),
         ),
-        body=_body([v.name for v in inputs], [v.name for v in outputs], places, library),
+        body=body,
     )
 
 
@@ -74,7 +96,9 @@ def _body(inputs: list[str], outputs: list[str], places: list[dict[str, str]], l
     triggers = _triggers(inputs)
     several = len(places) > 1
     stand = each("fStand{i} := " + library.setpoint + ";", places) if several else ""
-    prepare, feed = (each(around(TEXTS, part, library), places) for part in ("prepare", "feed"))
+    following = "" if library.axis_type else f"{TEXTS['following']}\n"
+    texts = {**TEXTS, "feed": TEXTS["feed"].replace("{following}", following)}
+    prepare, feed = (each(around(texts, part, library), places) for part in ("prepare", "feed"))
     given = {key: f"{key}Now" if key in triggers else key for key in inputs}
     given |= {
         "bAbort": "bAbort OR (nStage = cStopping)",

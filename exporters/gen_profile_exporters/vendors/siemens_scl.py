@@ -2,9 +2,10 @@
 
 SCL differs from the portable text: names of the block's own are marked by ``#``, arrays cannot be constants
 and so stand among the static variables. Replay undoes that and reads the rest.
-The wrapper calls ``MC_MOTIONINPOSITION`` of the S7-1500T. The data block holds an array of
-``TO_Cam_Struct_PointData`` per axis, to be copied into a TO_Cam (up to 1000 points) or TO_Cam_10k, whose
-spline through points at a regular distance keeps within the error stated.
+The wrapper calls ``MC_MOTIONINPOSITION`` of the S7-1500T; the one in a file of its own has velocity setpoints
+for converters, which any S7-1500 gives. The data block holds an array of ``TO_Cam_Struct_PointData`` per
+axis, to be copied into a TO_Cam (up to 1000 points) or TO_Cam_10k, whose spline through points at a regular
+distance keeps within the error stated.
 """
 
 import re
@@ -24,7 +25,7 @@ from gen_profile_exporters.block_source import (
     with_blocks_within,
 )
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.motion_libraries import SIEMENS
+from gen_profile_exporters.motion_libraries import SIEMENS, VELOCITY
 from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
 from gen_profile_exporters.playback.block import layout_of, variable_names
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, is_buffered
@@ -87,12 +88,14 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
             f"siemens-scl: the block's numbers take {size / 1e6:.2f} MB, an optimised data block "
             f"of an S7-1500 holds {MOST_BYTES / 1e6:g} MB; take {cure}."
         )
-    wrappers, others = axis_wrappers(source, len(target.axes), SIEMENS), []
+    wrappers, others = [axis_wrappers(source, len(target.axes), one) for one in (SIEMENS, VELOCITY)], []
     if is_buffered(source):
-        wrappers = tuple(_wired(wrapper, source) for wrapper in wrappers)
+        wrappers = [tuple(_wired(wrapper, source) for wrapper in own) for own in wrappers]
         others = [_mailbox(source)]
-    text = "\n".join([*map(_scl, (*source.within, source, *wrappers)), *others])
-    return (File(f"{target.name}.scl", text.encode("ascii")),)
+    on_axes, on_converters = (list(map(_scl, own)) for own in wrappers)
+    text = "\n".join([*map(_scl, (*source.within, source)), *on_axes, *others])
+    converters = (File(f"{target.name}_velocity.scl", one.encode("ascii")) for one in on_converters)
+    return (File(f"{target.name}.scl", text.encode("ascii")), *converters)
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
