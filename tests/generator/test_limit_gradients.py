@@ -77,9 +77,9 @@ def gradients(transcription, local, change):
     moved = [np.zeros_like(machine.start)]
     for transition, drive, along in zip(maps.transition, maps.drive, change, strict=True):
         moved.append(transition @ moved[-1] + drive @ along)
-    found, matrix, _ = transcription.end_sway(iterate, maps, transcription.variables)
-    slopes = matrix @ np.concatenate([change.ravel(), np.ravel(moved)])
-    return slopes.reshape(found.shape), moved[-1] * machine.scale
+    found, blocks, _ = transcription.end_sway(iterate, maps)
+    along = np.concatenate([change.ravel(), np.ravel(moved)])[transcription.coupled]
+    return np.einsum("kax,kx->ka", blocks, along).reshape(found.shape), moved[-1] * machine.scale
 
 
 def lagranges(problem, type_, paths, times):

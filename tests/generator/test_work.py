@@ -5,11 +5,10 @@ import signal
 import numpy as np
 import pytest
 from generator.crane_problems import crane_problem
-from scipy import sparse
 
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers.direct import solver as direct
-from gen_profile.methods.solvers.direct.conic import ConicProgram
+from gen_profile.methods.solvers.direct.conic import ConicProgram, place
 from gen_profile.methods.solvers.direct.set_up import DirectOptions
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
@@ -94,6 +93,7 @@ def test_a_program_ends_at_once_when_interrupted(monkeypatch):
 
     monkeypatch.setattr("gen_profile.methods.solvers.direct.conic.clarabel.DefaultSolver", Solver)
     program = ConicProgram(np.ones(1))
-    program.equal(sparse.csc_matrix([[1.0]]), np.ones(1))
+    one = place(np.ones((1, 1, 1)), np.zeros(1, dtype=int))
+    program.equal(one, np.ones(1))
     with pytest.raises(KeyboardInterrupt):
-        program.solve(sparse.csc_matrix([[1.0]]), np.zeros(1))
+        program.solve(one, np.zeros(1))

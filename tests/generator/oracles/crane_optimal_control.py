@@ -96,12 +96,14 @@ def direct_program(
     swung: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     final_velocity: float = 0.0,
     limit: tuple[Sequence[float], float] | None = None,
+    degree: int = 5,
 ) -> tuple[ca.Function, np.ndarray, np.ndarray]:
     """IPOPT's program of `direct_cost`, its first guess, and bounds of its constraints: zero for equations.
 
+    Expanded to scalar operations, with CasADi's exact Hessian, which is quickest.
+
     The first multipliers are the costates at the start.
     """
-    degree = 5
     points = np.array(ca.collocation_points(degree, "legendre"))
     C, D, B = _lagrange(points)
     h = duration / intervals
@@ -144,7 +146,7 @@ def direct_program(
         "solver",
         "ipopt",
         {"x": ca.vertcat(*variables), "f": cost, "g": ca.vertcat(*equations, *limited)},
-        {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-9},
+        {"expand": True, "ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-9},
     )
     bounds = np.concatenate([np.zeros(sum(e.numel() for e in equations)), np.full(len(limited), bound)])
     return solver, np.concatenate(guess), bounds

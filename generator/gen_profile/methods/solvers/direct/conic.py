@@ -1,5 +1,8 @@
 """Conic quadratic programs: a thin typed layer over the solver Clarabel."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from enum import Enum
 from itertools import count
 from typing import Any
@@ -7,14 +10,13 @@ from typing import Any
 import attrs
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from gen_profile.methods.solvers.collocation import IntArray
 from gen_profile.motion.profile import Array
 from gen_profile.support.interrupts import interrupts_collected
 from gen_profile.support.work import spend
 
-Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10  # of gap and feasibility, relative; 1e-8 changes costs by up to 9e-8
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
 PROGRAM, POSING = 4e-3, 8e-7  # s of work for a program, and for each entry of its constraints
@@ -57,6 +59,104 @@ class ConicSolution:
     multipliers: list[Array]
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class Entries:
+    """Entries of a sparse matrix, in any order; those at the same place add up, zeros count for nothing.
+
+    SciPy's constructors and products take longer than the programs themselves, so blocks are put into place
+    by their indices.
+    """
+
+    rows: IntArray
+    columns: IntArray
+    values: Array
+
+    def __add__(self, other: Entries) -> Entries:
+        return joined([self, other])
+
+    def __neg__(self) -> Entries:
+        return -1.0 * self
+
+    def __rmul__(self, factor: float) -> Entries:
+        return Entries(rows=self.rows, columns=self.columns, values=factor * self.values)
+
+    def below(self, rows: int) -> Entries:
+        """Move them down by some rows."""
+        return Entries(rows=self.rows + rows, columns=self.columns, values=self.values)
+
+    def without_zeros(self, wanted: Any = True) -> Entries:
+        """Leave out zeros, and what is not wanted."""
+        kept = (self.values != 0.0) & wanted
+        return Entries(rows=self.rows[kept], columns=self.columns[kept], values=self.values[kept])
+
+
+def joined(parts: Sequence[Entries]) -> Entries:
+    """Put entries of one matrix together."""
+    return Entries(
+        rows=np.concatenate([part.rows for part in parts]),
+        columns=np.concatenate([part.columns for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Sparsity:
+    """Where entries stand in a matrix by columns, found once for all programs that have them there."""
+
+    entries: Entries
+    order: IntArray
+    starts: IntArray
+    indices: IntArray
+    ends: IntArray
+
+    @classmethod
+    def of(cls, entries: Entries, variables: int) -> Sparsity:
+        """Sort entries by columns and rows."""
+        order = np.lexsort((entries.rows, entries.columns))
+        rows, columns = entries.rows[order], entries.columns[order]
+        new = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))[: len(rows)]
+        starts = np.flatnonzero(new)
+        ends = np.searchsorted(columns[starts], np.arange(variables + 1))
+        return cls(entries=entries, order=order, starts=starts, indices=rows[starts], ends=ends)
+
+    def fits(self, entries: Entries) -> bool:
+        """Whether others stand at the same places, in the same order."""
+        own = self.entries
+        return np.array_equal(own.rows, entries.rows) and np.array_equal(own.columns, entries.columns)
+
+    def data(self, entries: Entries) -> Array:
+        """Put their values in order."""
+        return (
+            np.add.reduceat(entries.values[self.order], self.starts) if len(self.starts) else entries.values
+        )
+
+    def matrix(self, entries: Entries, rows: int) -> Any:
+        """Give the matrix of such entries as Clarabel takes it."""
+        shape = (rows, len(self.ends) - 1)
+        return sparse.csc_matrix((self.data(entries), self.indices, self.ends), shape=shape)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Posed:
+    """A program that Clarabel holds, with its factors' structure."""
+
+    solver: Any
+    quadratic: Sparsity
+    matrix: Sparsity
+    cones: tuple[tuple[str, int], ...]
+
+    def fits(self, quadratic: Entries, matrix: Entries, cones: tuple[tuple[str, int], ...]) -> bool:
+        """Whether another one differs by its numbers only."""
+        return self.cones == cones and self.matrix.fits(matrix) and self.quadratic.fits(quadratic)
+
+
+@attrs.define(eq=False)
+class Workspace:
+    """The last of some programs, whose structure the next one takes over if it has the same."""
+
+    posed: _Posed | None = None
+
+
 class ConicProgram:
     """Minimise ``½ xᵀ P x + qᵀ x`` under constraints that are added one by one.
 
@@ -64,41 +164,44 @@ class ConicProgram:
     ----------
     units : (variables,) array
         About how large each variable is; the solver works with their quotients.
+    workspace : Workspace, optional
+        Of the programs before.
     """
 
-    def __init__(self, units: Array) -> None:
+    def __init__(self, units: Array, workspace: Workspace | None = None) -> None:
         self.variables = len(units)
         self._units = units
-        self._rows: list[Matrix] = []
+        self._workspace = workspace or Workspace()
+        self._rows: list[Entries] = []
         self._sides: list[Array] = []
-        self._cones: list[Any] = []
+        self._cones: list[tuple[str, int]] = []
 
-    def equal(self, matrix: Matrix, side: Array) -> None:
+    def equal(self, matrix: Entries, side: Array) -> None:
         """Require ``matrix x = side``."""
-        self._add(matrix, side, clarabel.ZeroConeT(len(side)))
+        self._add(matrix, side, ("ZeroConeT", len(side)))
 
-    def at_most(self, matrix: Matrix, side: Array, give: float = 0.0) -> None:
+    def at_most(self, matrix: Entries, side: Array, give: float = 0.0) -> None:
         """Require ``matrix x ≤ side``, or ``side + give (s − 1)`` with the last variable s."""
-        self._add(*self._giving(matrix, side, np.full(len(side), give)), clarabel.NonnegativeConeT(len(side)))
+        self._add(*self._giving(matrix, side, np.full(len(side), give)), ("NonnegativeConeT", len(side)))
 
-    def within_cones(self, matrix: Matrix, sides: Array, give: float = 0.0) -> None:
+    def within_cones(self, matrix: Entries, sides: Array, give: float = 0.0) -> None:
         """Require that ``side − matrix x`` has a first entry no smaller than the length of the rest.
 
         The first entry is greater by ``give (s − 1)`` with the last variable s.
 
         Parameters
         ----------
-        matrix : (cones * size, variables) sparse matrix
+        matrix : Entries
             Of all cones, below one another.
         sides : (cones, size) array
         give : float
         """
         gives = np.zeros_like(sides)
         gives[:, 0] = give
-        cones = (clarabel.SecondOrderConeT(sides.shape[1]) for _ in sides)
+        cones = len(sides) * [("SecondOrderConeT", sides.shape[1])]
         self._add(*self._giving(matrix, sides.ravel(), gives.ravel()), *cones)
 
-    def solve(self, quadratic: Matrix, linear: Array) -> ConicSolution:
+    def solve(self, quadratic: Entries, linear: Array) -> ConicSolution:
         """Solve for a cost, P given whole and symmetric; it should be of the order of 1 or more.
 
         What is much smaller is not minimised: programs end when the cost is right to the tolerance.
@@ -108,18 +211,15 @@ class ConicProgram:
         settings.max_iter = MAX_ITERATIONS
         settings.max_threads = 1  # the same bits whatever the machine
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-        units, slope = self._units, self._units * linear
-        scaled = _in_units(sparse.triu(quadratic, format="csc"), units)
-        scaled.data *= units[scaled.indices]
-        matrix = _in_units(sparse.vstack(self._rows, format="csr").tocsc(), units)
         settings.iterative_refinement_enable = False  # which takes a third of the time, mostly in vain
-        solution = self._run(scaled, slope, matrix, settings)
+        settings.presolve_enable = False  # which would forbid to take over its structure
+        solution = self._solved(quadratic, linear, settings, self._workspace)
         if str(solution.status) not in ("Solved", "AlmostSolved", "PrimalInfeasible"):
             settings.iterative_refinement_enable = True
-            solution = self._run(scaled, slope, matrix, settings)
+            solution = self._solved(quadratic, linear, settings, Workspace())
         if str(solution.status) == "NumericalError":  # steepest costs are better scaled by our units alone
             settings.equilibrate_enable = False
-            solution = self._run(scaled, slope, matrix, settings)
+            solution = self._solved(quadratic, linear, settings, Workspace())
         ends = np.cumsum([len(side) for side in self._sides])[:-1]
         return ConicSolution(
             verdict=_VERDICTS.get(str(solution.status), ConicStatus.FAILED),
@@ -128,43 +228,52 @@ class ConicProgram:
             multipliers=np.split(np.array(solution.z), ends),
         )
 
-    def _run(self, quadratic: Matrix, linear: Array, matrix: Matrix, settings: Any) -> Any:
+    def _solved(self, quadratic: Entries, linear: Array, settings: Any, workspace: Workspace) -> Any:
         """Run Clarabel, whose work counts, and which an interrupt ends."""
-        spend(PROGRAM + POSING * matrix.nnz)
-        solver = clarabel.DefaultSolver(
-            quadratic, linear, matrix, np.concatenate(self._sides), self._cones, settings
-        )
+        units, sides, cones = self._units, np.concatenate(self._sides), tuple(self._cones)
+        matrix = joined(self._rows)
+        matrix = attrs.evolve(matrix, values=matrix.values * units[matrix.columns]).without_zeros()
+        quadratic = quadratic.without_zeros(quadratic.rows <= quadratic.columns)
+        scaled = quadratic.values * units[quadratic.rows] * units[quadratic.columns]
+        quadratic = attrs.evolve(quadratic, values=scaled)
+        spend(PROGRAM + POSING * len(matrix.values))
+        posed = workspace.posed
+        if posed is not None and posed.fits(quadratic, matrix, cones):
+            costs, coefficients = posed.quadratic.data(quadratic), posed.matrix.data(matrix)
+            posed.solver.update(P=costs, q=units * linear, A=coefficients, b=sides)
+        else:
+            by_column = Sparsity.of(quadratic, self.variables), Sparsity.of(matrix, self.variables)
+            solver = clarabel.DefaultSolver(
+                by_column[0].matrix(quadratic, self.variables),
+                units * linear,
+                by_column[1].matrix(matrix, len(sides)),
+                sides,
+                [getattr(clarabel, kind)(size) for kind, size in cones],
+                settings,
+            )
+            posed = _Posed(solver=solver, quadratic=by_column[0], matrix=by_column[1], cones=cones)
+            workspace.posed = posed
         calls = count()  # for Clarabel can circle without counting its iterations
         with interrupts_collected() as came:
-            solver.set_termination_callback(lambda _: bool(came) or next(calls) > 2 * MAX_ITERATIONS)
-            solution = solver.solve()
-        spend(ITERATION * (matrix.nnz + quadratic.nnz) * solution.iterations)
+            posed.solver.set_termination_callback(lambda _: bool(came) or next(calls) > 2 * MAX_ITERATIONS)
+            solution = posed.solver.solve()
+        spend(ITERATION * (len(matrix.values) + len(quadratic.values)) * solution.iterations)
         return solution
 
-    def _giving(self, matrix: Matrix, side: Array, gives: Array) -> tuple[Matrix, Array]:
+    def _giving(self, matrix: Entries, side: Array, gives: Array) -> tuple[Entries, Array]:
         """Let the last variable widen rows."""
         if not gives.any():
             return matrix, side
-        column = sparse.csr_matrix(
-            (gives, (np.arange(len(gives)), np.full(len(gives), self.variables - 1))),
-            shape=(len(gives), self.variables),
-        )
-        return matrix - column, side - gives
+        last = np.full(len(gives), self.variables - 1)
+        return matrix + Entries(rows=np.arange(len(gives)), columns=last, values=-gives), side - gives
 
-    def _add(self, matrix: Matrix, side: Array, *cones: Any) -> None:
-        self._rows.append(sparse.csr_matrix(matrix, shape=(len(side), self.variables)))
+    def _add(self, matrix: Entries, side: Array, *cones: tuple[str, int]) -> None:
+        self._rows.append(matrix.below(sum(map(len, self._sides))))
         self._sides.append(np.asarray(side, dtype=np.float64))
         self._cones.extend(cones)
 
 
-def _in_units(matrix: Matrix, units: Array) -> Matrix:
-    """Multiply the columns of a matrix that is stored by columns, in its place, without what is zero."""
-    matrix.eliminate_zeros()
-    matrix.data *= units.repeat(np.diff(matrix.indptr))
-    return matrix
-
-
-def place(blocks: Array, columns: NDArray[Any], width: int) -> Matrix:
+def place(blocks: Array, columns: IntArray) -> Entries:
     """Stack blocks below one another, each with its own first column.
 
     Parameters
@@ -172,14 +281,18 @@ def place(blocks: Array, columns: NDArray[Any], width: int) -> Matrix:
     blocks : (count, rows, columns) array
     columns : (count,) array of int
         Where each block begins.
-    width : int
-        Columns of the result.
-
-    Returns
-    -------
-    (count * rows, width) sparse matrix
     """
     count, height, breadth = blocks.shape
-    ends = np.arange(count * height + 1) * breadth
-    across = (np.asarray(columns, dtype=np.intp)[:, None, None] + np.arange(breadth)).repeat(height, axis=1)
-    return sparse.csr_matrix((blocks.ravel(), across.ravel(), ends), shape=(count * height, width))
+    across = (columns[:, None, None] + np.arange(breadth)).repeat(height, axis=1)
+    return Entries(
+        rows=np.arange(count * height).repeat(breadth), columns=across.ravel(), values=blocks.ravel()
+    )
+
+
+def squares(blocks: Array, places: IntArray) -> Entries:
+    """Put square blocks on the diagonal: each couples the variables at its places, shape (count, size)."""
+    return Entries(
+        rows=np.broadcast_to(places[:, :, None], blocks.shape).ravel(),
+        columns=np.broadcast_to(places[:, None, :], blocks.shape).ravel(),
+        values=blocks.ravel(),
+    )

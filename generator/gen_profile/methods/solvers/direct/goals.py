@@ -4,7 +4,6 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 
 import attrs
 import numpy as np
-from scipy import sparse
 
 from gen_profile.dynamics.problem.cost import SwayCost, axis_reach
 from gen_profile.dynamics.problem.linearization import linearize
@@ -12,9 +11,10 @@ from gen_profile.dynamics.problem.pontryagin import SNAP_TIME
 from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct.bezier import Piece, gram
 from gen_profile.methods.solvers.direct.condensing import IntervalMaps
-from gen_profile.methods.solvers.direct.conic import ConicProgram, Matrix, place
+from gen_profile.methods.solvers.direct.conic import ConicProgram, Entries, place, squares
 from gen_profile.methods.solvers.direct.transcription import Iterate, Transcription
 from gen_profile.motion.profile import Array
+from gen_profile.support.one_thread import one_thread
 
 WITHIN = 1.0 - 1e-6  # fraction of a limit that a program may use: its own tolerance must not break the limit
 
@@ -52,34 +52,38 @@ def usual_effort(problem: Problem) -> float:
 
 
 def cost(
-    transcription: Transcription, effort: Matrix, sway_cost: SwayCost, iterate: Iterate, maps: IntervalMaps
-) -> tuple[Matrix, Array]:
+    transcription: Transcription, effort: Entries, sway_cost: SwayCost, iterate: Iterate, maps: IntervalMaps
+) -> tuple[Entries, Array]:
     """Expand eq. (26) about an iterate to second order: P and q of ``½ xᵀ P x + qᵀ x``.
 
     Parameters
     ----------
-    effort : (variables, variables) sparse matrix
+    effort : Entries
         Twice the effort as a quadratic form, dimensionless.
     sway_cost : SwayCost
         Divided by the cost's scale.
     """
-    width = transcription.variables
-    quadratic, linear = effort, np.zeros(width)
+    quadratic, linear = effort, np.zeros(transcription.variables, dtype=np.float64)
     if sway_cost.beta > 0.0:
-        sway, matrix, offset = transcription.end_sway(iterate, maps, width)
-        points, directions = sway.shape
+        sway, blocks, offset = transcription.end_sway(iterate, maps)
         weights = transcription.quadrature()
         slope, curvature = sway_cost.derivatives(sway)
         slope, curvature = weights[:, None] * slope, weights[:, None, None] * curvature
-        hessian = place(curvature, np.arange(points) * directions, points * directions)
-        quadratic = quadratic + matrix.T @ hessian @ matrix
-        linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))
+        slope = slope + np.einsum("pab,pb->pa", curvature, offset.reshape(sway.shape) - sway)
+        intervals, _, width = blocks.shape
+        by_point = blocks.reshape(*sway.shape, width)
+        curved = np.einsum("pab,pbx->pax", curvature, by_point).reshape(blocks.shape)
+        with one_thread:
+            quadratic = quadratic + squares(blocks.swapaxes(1, 2) @ curved, transcription.coupled)
+        pulls = np.einsum("kax,ka->kx", blocks, slope.reshape(intervals, -1))
+        summed = np.bincount(transcription.coupled.ravel(), pulls.ravel(), transcription.variables)
+        linear = summed.astype(np.float64)
     return quadratic, linear
 
 
 def held(
-    quadratic: Matrix, linear: Array, transcription: Transcription, iterate: Iterate
-) -> tuple[Matrix, Array]:
+    quadratic: Entries, linear: Array, transcription: Transcription, iterate: Iterate
+) -> tuple[Entries, Array]:
     """Let it cost a little to leave the last motion's highest derivative.
 
     An effort that sees lower derivatives only leaves programs nearly singular. With this proximal term they
@@ -90,7 +94,8 @@ def held(
     sizes = transcription.units[:columns].reshape(-1, piece.size)
     weights = np.where(np.arange(piece.size) < piece.order, 0.0, HELD / sizes**2).ravel()
     padding = (0, len(linear) - columns)
-    whole = sparse.diags(np.pad(weights, padding), format="csr")
+    diagonal = np.arange(columns)
+    whole = Entries(rows=diagonal, columns=diagonal, values=weights)
     return quadratic + whole, linear - np.pad(weights * iterate.local.ravel(), padding)
 
 
@@ -174,19 +179,16 @@ def keep_sway(
     widened : bool
         Whether the program's last variable widens it so many times.
     """
-    sway, matrix, offset = transcription.end_sway(iterate, maps, program.variables)
+    sway, blocks, offset = transcription.end_sway(iterate, maps)
     points, directions = sway.shape
-    give = float(widened)
+    give, matrix = float(widened), transcription.of_coupled(blocks / limit)
     if directions == 1:
-        program.at_most(matrix / limit, 1.0 - offset / limit, give)
-        program.at_most(-matrix / limit, 1.0 + offset / limit, give)
+        program.at_most(matrix, 1.0 - offset / limit, give)
+        program.at_most(-matrix, 1.0 + offset / limit, give)
         return
-    entries = sparse.coo_matrix(matrix)
-    below = entries.row + entries.row // directions + 1  # the first row of each cone is empty
-    shape = (points * (directions + 1), program.variables)
-    rows = sparse.csr_matrix((-entries.data / limit, (below, entries.col)), shape=shape)
+    below = matrix.rows + matrix.rows // directions + 1  # the first row of each cone is empty
     sides = np.column_stack([np.ones(points), offset.reshape(points, directions) / limit])
-    program.within_cones(rows, sides, give)
+    program.within_cones(attrs.evolve(-matrix, rows=below), sides, give)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -239,18 +241,20 @@ def bound_worst(
     column = transcription.variables
     worst = column + worst_case_variables(tried) - 1
     for index, machine in enumerate(tried):
-        end, offset = transcription.end_state(index, maps, program.variables)
+        block, first, offset = transcription.end_state(index, maps)
         modes = np.arange(column, column + len(machine.rows))
         for mode, rows in zip(modes, machine.rows, strict=True):
-            radius = place(-np.ones((1, 1, 1)), np.array([mode]), program.variables)
+            radius = place(-np.ones((1, 1, 1)), np.array([mode]))
             sides = np.append(0.0, rows @ offset)
-            program.within_cones(sparse.vstack([radius, -sparse.csr_matrix(rows) @ end]), sides[None])
-        sums = place(machine.fractions[None], modes[:1], program.variables)
-        all_fractions = place(np.ones((1, len(machine.fractions), 1)), np.array([worst]), program.variables)
-        program.at_most(sums - all_fractions, np.zeros(len(machine.fractions)))
+            with one_thread:
+                ends = place(-(rows @ block)[None], first)
+            program.within_cones(radius + ends.below(1), sides[None])
+        sums = place(machine.fractions[None], modes[:1])
+        all_fractions = place(-np.ones((1, len(machine.fractions), 1)), np.array([worst]))
+        program.at_most(sums + all_fractions, np.zeros(len(machine.fractions)))
         column += len(modes)
     if most is not None:
-        program.at_most(place(np.ones((1, 1, 1)), np.array([worst]), program.variables), np.array([most]))
+        program.at_most(place(np.ones((1, 1, 1)), np.array([worst])), np.array([most]))
 
 
 def worst_case_variables(tried: Sequence[Amplitudes]) -> int:

@@ -17,7 +17,7 @@ from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct import goals
 from gen_profile.methods.solvers.direct.bezier import Piece
 from gen_profile.methods.solvers.direct.condensing import axes_map
-from gen_profile.methods.solvers.direct.conic import Matrix
+from gen_profile.methods.solvers.direct.conic import Entries
 from gen_profile.methods.solvers.direct.transcription import Iterate, TranscribedMachine, Transcription
 from gen_profile.methods.solvers.indirect.boundary_value_problem import (
     BoundaryValueProblem,
@@ -101,7 +101,7 @@ class Setup:
         return self.problem.effort != "reference" or self.transcription.piece.order == 3
 
     @cached_property
-    def effort_form(self) -> Matrix:
+    def effort_form(self) -> Entries:
         """Twice the effort of a motion as a quadratic form of a program's variables but the goal's."""
         return self.transcription.effort(self.forms)
 

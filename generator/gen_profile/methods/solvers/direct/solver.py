@@ -19,7 +19,14 @@ from gen_profile.methods.solvers.direct import goals
 from gen_profile.methods.solvers.direct.acceleration import accelerate
 from gen_profile.methods.solvers.direct.bezier import power_basis
 from gen_profile.methods.solvers.direct.condensing import IntervalMaps
-from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
+from gen_profile.methods.solvers.direct.conic import (
+    ConicProgram,
+    ConicSolution,
+    ConicStatus,
+    Entries,
+    Workspace,
+    place,
+)
 from gen_profile.methods.solvers.direct.refinement import bisected, switching
 from gen_profile.methods.solvers.direct.set_up import DirectOptions, Setup, on_mesh, set_up
 from gen_profile.methods.solvers.direct.transcription import Iterate
@@ -27,6 +34,7 @@ from gen_profile.methods.solvers.direct.transient_sway import sway_on_the_way, w
 from gen_profile.methods.solvers.solution import HORIZONTAL, LATER, LONGER, WIDER, Optimum, Solution, Status
 from gen_profile.motion.profile import Array
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.support.one_thread import one_thread
 from gen_profile.support.work import OutOfWork, afford, left
 
 METHOD = "direct"
@@ -83,7 +91,7 @@ class Goal:
 
     def pose(
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
-    ) -> tuple[Matrix, Array]:
+    ) -> tuple[Entries, Array]:
         """Add the bounds to a program and expand the cost: P and q."""
         setup, transcription = self.setup, self.setup.transcription
         goals.keep_limits(program, setup.problem, transcription, self.widened)
@@ -96,13 +104,12 @@ class Goal:
         if self.effort_price is not None:
             linear[-1] = 1.0
             if self.widened:
-                program.at_most(-linear[None], np.zeros(1))
+                program.at_most(place(-linear[None, None], np.zeros(1, dtype=np.intp)), np.zeros(1))
             quadratic = self.effort_price * setup.effort_form
         else:
             scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
             expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
-            quadratic, linear[: len(slope)] = expanded.copy(), slope
-        quadratic.resize(program.variables, program.variables)
+            quadratic, linear[: len(slope)] = expanded, slope
         return quadratic, linear
 
     def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
@@ -274,6 +281,7 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     return attrs.evolve(result, solutions=solutions)
 
 
+@one_thread
 def sequence(start: Iterate, goal: Goal, tolerance: float | None = None) -> ProgramSequence:
     """Solve programs linearised about one another's motion until what counts changes by little enough."""
     transcription, iterate, options = goal.setup.transcription, start, goal.setup.options
@@ -281,10 +289,10 @@ def sequence(start: Iterate, goal: Goal, tolerance: float | None = None) -> Prog
     solutions: list[ConicSolution] = []
     points: list[Array] = []
     images: list[Array] = []
-    step, verdict = float("inf"), ConicStatus.FAILED
+    step, verdict, workspace = float("inf"), ConicStatus.FAILED, Workspace()
     while verdict is ConicStatus.FAILED and len(solutions) < options.max_iterations:
         maps = transcription.maps(iterate)
-        program = transcription.program(maps, goal.extra)
+        program = transcription.program(maps, goal.extra, workspace)
         cost = goal.pose(program, iterate, maps)
         if not goal.setup.sees_all:
             cost = goals.held(*cost, transcription, iterate)

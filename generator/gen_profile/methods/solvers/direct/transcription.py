@@ -24,13 +24,12 @@ from functools import cached_property
 
 import attrs
 import numpy as np
-from scipy import sparse
 
 from gen_profile.dynamics.problem.motion_equations import MotionEquations
 from gen_profile.methods.solvers.collocation import GAUSS, STAGES, IntArray
 from gen_profile.methods.solvers.direct.bezier import Piece
 from gen_profile.methods.solvers.direct.condensing import AxesMap, IntervalMaps, interval_maps
-from gen_profile.methods.solvers.direct.conic import ConicProgram, Matrix, place
+from gen_profile.methods.solvers.direct.conic import ConicProgram, Entries, Workspace, place, squares
 from gen_profile.motion.profile import Array
 
 QUINTIC_PEAKS = np.array([1.0, 1.9, 5.8, 60.0])  # of position, velocity, acceleration and jerk
@@ -178,38 +177,39 @@ class Transcription:
             for machine, stages in zip(self.machines, iterate.stages, strict=True)
         )
 
-    def program(self, maps: Sequence[IntervalMaps], extra: int = 0) -> ConicProgram:
+    def program(
+        self, maps: Sequence[IntervalMaps], extra: int = 0, workspace: Workspace | None = None
+    ) -> ConicProgram:
         """Pose the motion: continuous, from rest to its target, and the nominal machine moved by it.
 
         The constraints, in the order of their multipliers: continuity of the axes, their end, then the
         machine's states (the costates at the nodes, negative) and its end.
         """
-        width = self.variables + extra
-        program = ConicProgram(np.concatenate([self.units, np.ones(extra)]))
+        program = ConicProgram(np.concatenate([self.units, np.ones(extra)]), workspace)
         columns, (joints, end) = self.local_columns, self._joints
-        program.equal(joints, np.zeros(joints.shape[0]))
+        program.equal(joints, np.zeros(self.intervals * len(self.target) * self.piece.order))
         reached = np.zeros((len(self.target), self.piece.order))
         reached[:, 0], reached[:, 1] = self.target, self.final_velocity
         program.equal(end, reached.ravel())
         machine, linear, nodes = self.machines[0], maps[0], self.node_columns
         n = len(machine.scale)
-        moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
+        moved = place(-linear.transition, nodes[:-1]) + place(-linear.drive, columns)
         program.equal(
-            _repeated(np.eye(n), nodes, width) - _after(moved, n),
+            _repeated(np.eye(n), nodes) + moved.below(n),
             np.concatenate([machine.start, linear.offset.ravel()]),
         )
-        program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
+        program.equal(place(machine.end[None], nodes[-1:]), np.zeros(len(machine.end)))
         return program
 
     @cached_property
-    def _joints(self) -> tuple[Matrix, Matrix]:
+    def _joints(self) -> tuple[Entries, Entries]:
         """From the variables to leaps of the axes' motion and derivatives at nodes, and these at the end."""
-        orders, columns, width = self.piece.order, self.local_columns, self.variables
+        orders, columns = self.piece.order, self.local_columns
         first = self._per_axis(np.eye(self.piece.size)[:orders])
         ends = [self.piece.derivative(order)[:, -1] for order in range(orders)]
         last = self._per_axis(np.stack(ends, axis=1))
-        before = _after(place(last[:-1], columns[:-1], width), len(first))
-        return _repeated(first, columns, width) - before, place(last[-1:], columns[-1:], width)
+        before = place(-last[:-1], columns[:-1]).below(len(first))
+        return _repeated(first, columns) + before, place(last[-1:], columns[-1:])
 
     def bound(
         self, program: ConicProgram, rows: Array, bounds: tuple[float, float], axis: int, give: float = 0.0
@@ -226,30 +226,37 @@ class Transcription:
         """
         wide = np.zeros((*rows.shape[:2], len(self.target), self.piece.size))
         wide[:, :, axis] = rows
-        matrix = place(wide.reshape(*rows.shape[:2], -1), self.local_columns, program.variables)
-        lower, upper = (np.full(matrix.shape[0], bound) for bound in bounds)
+        matrix = place(wide.reshape(*rows.shape[:2], -1), self.local_columns)
+        lower, upper = (np.full(rows.shape[0] * rows.shape[1], bound) for bound in bounds)
         program.at_most(matrix, upper, give)
         program.at_most(-matrix, -lower, give)
 
-    def effort(self, blocks: Sequence[Array]) -> Matrix:
+    def effort(self, blocks: Sequence[Array]) -> Entries:
         """Join quadratic forms per axis, of every interval's local coordinates, into one of all variables."""
         whole = np.zeros((self.intervals, *(len(self.target), self.piece.size) * 2))
         for axis, block in enumerate(blocks):
             whole[:, axis, :, axis] = block
-        square = place(whole.reshape(self.intervals, self.breadth, -1), self.local_columns, self.variables)
-        square.resize(self.variables, self.variables)
-        return square
+        places = self.local_columns[:, None] + np.arange(self.breadth)
+        return squares(whole.reshape(self.intervals, self.breadth, -1), places)
 
-    def end_sway(self, iterate: Iterate, maps: IntervalMaps, width: int) -> tuple[Array, Matrix, Array]:
+    @property
+    def coupled(self) -> IntArray:
+        """Columns of every interval's axis coordinates, then of the state at its beginning."""
+        n = len(self.machines[0].scale)
+        local = self.local_columns[:, None] + np.arange(self.breadth)
+        return np.concatenate([local, self.node_columns[:-1, None] + np.arange(n)], axis=1)
+
+    def end_sway(self, iterate: Iterate, maps: IntervalMaps) -> tuple[Array, Array, Array]:
         """Linearise the end load's sway of the nominal machine at the collocation points.
 
         Returns
         -------
         sway : (points, directions) array
             At the iterate, in m.
-        matrix : (points * directions, width) sparse matrix
+        blocks : (intervals, STAGES * directions, columns) array
+            Of the variables at the places `coupled`.
         offset : (points * directions,) array
-            The sway is ``matrix x + offset``, the directions of a point side by side.
+            The sway is ``blocks x + offset``, the directions of a point side by side.
         """
         machine, stages = self.machines[0], iterate.stages[0]
         n, axis_inputs = len(machine.scale), self.axes(iterate.local)
@@ -260,15 +267,19 @@ class Transcription:
         by_local = by_axes @ self.axes.matrix + by_state @ maps.stage_drive
         by_node = by_state @ maps.stage_transition
         directions = sway.shape[2]
-        rows = (self.intervals, STAGES * directions, -1)
-        matrix = place(by_local.reshape(rows), self.local_columns, width)
-        matrix = matrix + place(by_node.reshape(rows), self.node_columns[:-1], width)
+        blocks = np.concatenate([by_local, by_node], axis=-1)
         offset = (
             sway
             + np.einsum("ksda,ksa->ksd", by_state, maps.stage_offset - stages)
             + np.einsum("ksda,ksa->ksd", by_axes, self.axes.offset - axis_inputs)
         )
-        return sway.reshape(points, directions), matrix, offset.ravel()
+        shape = (self.intervals, STAGES * directions, -1)
+        return sway.reshape(points, directions), blocks.reshape(shape), offset.ravel()
+
+    def of_coupled(self, blocks: Array) -> Entries:
+        """Stack blocks of every interval's rows below one another, by the places `coupled`."""
+        local, node = np.split(blocks, [self.breadth], axis=-1)
+        return place(local, self.local_columns) + place(node, self.node_columns[:-1])
 
     def end_sway_found(self, iterate: Iterate) -> Array:
         """Evaluate the end load's sway of the nominal machine in m, shape (points, directions)."""
@@ -304,18 +315,18 @@ class Transcription:
             states.append(transition @ states[-1] + added)
         return np.array(states)
 
-    def end_state(self, index: int, maps: Sequence[IntervalMaps], width: int) -> tuple[Matrix, Array]:
-        """Give a machine's dimensionless state at the end as ``matrix x + offset``."""
+    def end_state(self, index: int, maps: Sequence[IntervalMaps]) -> tuple[Array, IntArray, Array]:
+        """Give a machine's dimensionless state at the end as ``block x + offset``, x from some column on."""
         machine, linear = self.machines[index], maps[index]
         n = len(machine.scale)
         if index == 0:
-            return place(np.eye(n)[None], self.node_columns[-1:], width), np.zeros(n)
+            return np.eye(n), self.node_columns[-1:], np.zeros(n)
         onwards, matrix, offset = np.eye(n), np.zeros((n, self.intervals, self.breadth)), np.zeros(n)
         for k in reversed(range(self.intervals)):
             matrix[:, k] = onwards @ linear.drive[k]
             offset += onwards @ linear.offset[k]
             onwards = onwards @ linear.transition[k]
-        return place(matrix.reshape(1, n, -1), np.zeros(1), width), offset + onwards @ machine.start
+        return matrix.reshape(n, -1), np.zeros(1, dtype=np.intp), offset + onwards @ machine.start
 
     def quadrature(self) -> Array:
         """Weights of the collocation points for integrals over dimensionless time, shape (points,)."""
@@ -327,10 +338,5 @@ class Transcription:
         return np.asarray(whole.reshape(*rows.shape[:-2], axes * count, axes * size))
 
 
-def _after(matrix: Matrix, rows: int) -> Matrix:
-    """Move a matrix down by some rows of zeros."""
-    return sparse.vstack([sparse.csr_matrix((rows, matrix.shape[1])), matrix], format="csr")
-
-
-def _repeated(block: Array, columns: IntArray, width: int) -> Matrix:
-    return place(np.broadcast_to(block, (len(columns), *block.shape)), columns, width)
+def _repeated(block: Array, columns: IntArray) -> Entries:
+    return place(np.broadcast_to(block, (len(columns), *block.shape)), columns)

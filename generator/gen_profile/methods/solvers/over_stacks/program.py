@@ -10,11 +10,10 @@ from functools import cached_property, partial
 import attrs
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.linalg import expm
 
 from gen_profile.dynamics.problem.linearization import linear_terms, linearize
-from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Matrix, place
+from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Entries, place, squares
 from gen_profile.methods.solvers.over_stacks.bay import Bay
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
 from gen_profile.methods.solvers.over_stacks.swing import TROLLEY, Followed, followed
@@ -124,7 +123,7 @@ class Program:
         swing = first + (machine - 1) * own + np.arange(own)
         return np.concatenate([np.arange(TROLLEY), swing, [self.width]])
 
-    def _rows(self, intervals: Numbers, blocks: Array, machine: int = 0) -> Matrix:
+    def _rows(self, intervals: Numbers, blocks: Array, machine: int = 0) -> Entries:
         """Place rows on a machine's state at the begin of intervals, and on the jerk there.
 
         Parameters
@@ -134,7 +133,12 @@ class Program:
         """
         wide = np.zeros((*blocks.shape[:2], self.width + 1))
         wide[:, :, self._columns(machine)[: blocks.shape[2]]] = blocks
-        return place(wide, intervals * (self.width + 1), self.variables)
+        return place(wide, intervals * (self.width + 1))
+
+    @staticmethod
+    def _alone(column: int) -> Entries:
+        """Take one variable by itself."""
+        return place(np.ones((1, 1, 1)), np.array([column]))
 
     @property
     def variables(self) -> int:
@@ -158,7 +162,7 @@ class Program:
             self._sway(program, machine)
             if machine and self.bay.spec.robustness.method != "none":
                 self._left(program, machine)
-        least = sparse.csr_matrix(([-1.0], ([0], [self.variables - 1])), shape=(1, self.variables))
+        least = -self._alone(self.variables - 1)
         program.at_most(least, np.array([-1.0 if smooth else MARGIN - 1.0]))
         intervals = len(self.about.jerks)
         jerks = np.arange(intervals) * (self.width + 1) + self.width
@@ -166,7 +170,8 @@ class Program:
         scale = (self.bay.limits.jerk or 1.0) ** 2 * intervals / (1.0 if smooth else SMOOTH)
         weight[jerks], linear[jerks] = 1.0 / scale, self.about.jerks / scale
         linear[-1], linear[-2] = (DEAR, 0.0) if smooth else (1.0, MISSING)
-        solution = program.solve(sparse.diags(weight, format="csc"), linear)
+        costs = squares(weight[:, None, None], np.arange(self.variables)[:, None])
+        solution = program.solve(costs, linear)
         if solution.verdict is not ConicStatus.SOLVED:
             return None
         return attrs.evolve(self._course(solution.x, jerks), smooth=smooth)
@@ -186,7 +191,7 @@ class Program:
 
     def _dynamics(self, program: ConicProgram) -> None:
         """Let every interval begin where the one before it ended, and the first at the start."""
-        first = sparse.eye(self.width, self.variables, format="csr")
+        first = place(np.eye(self.width)[None], np.zeros(1, dtype=np.intp))
         program.equal(first, np.zeros(self.width))
         intervals = np.arange(len(self.about.jerks))
         starts = [self.about.begins[0], *self.about.begins[1]]
@@ -198,7 +203,7 @@ class Program:
             blocks[:, :, columns] = along
             own = self.width + 1 + columns[skipped:-1]
             blocks[:, np.arange(along.shape[1]), own] = -1.0
-            matrix = place(blocks, intervals * (self.width + 1), self.variables)
+            matrix = place(blocks, intervals * (self.width + 1))
             program.equal(matrix, (begins[1:, skipped:] - ends).ravel())
 
     def _trolley(self, program: ConicProgram) -> None:
@@ -227,13 +232,12 @@ class Program:
         asked[0] = self.bay.target
         left = asked - self.about.begins[0][-1]
         at = len(self.about.jerks) * (self.width + 1)
-        matrix = sparse.eye(states, self.variables, k=at, format="csr")
-        program.equal(matrix[1:], left[1:])
-        missed = sparse.csr_matrix(([1.0], ([0], [self.variables - 2])), shape=(1, self.variables))
+        program.equal(place(np.eye(states)[None, 1:], np.array([at])), left[1:])
+        reached, missed = self._alone(at), self._alone(self.variables - 2)
         if not free:
             program.equal(missed, np.zeros(1))
-        program.at_most(matrix[:1] - missed, left[:1])
-        program.at_most(-matrix[:1] - missed, -left[:1])
+        program.at_most(reached + (-missed), left[:1])
+        program.at_most(-(reached + missed), -left[:1])
 
     def _beside(self, program: ConicProgram, machine: int) -> None:
         """Keep the bodies of a machine beside stacks while they are low."""
@@ -282,7 +286,7 @@ class Program:
         at = len(self.about.jerks) * (self.width + 1)
         wide = np.zeros((len(shown), self.width))
         wide[:, columns] = shown
-        matrix = place(wide[None], np.array([at]), self.variables)
+        matrix = place(wide[None], np.array([at]))
         now = shown @ self.about.begins[1][machine - 1][-1, TROLLEY:]
         program.at_most(matrix, limits - now)
         program.at_most(-matrix, limits + now)
