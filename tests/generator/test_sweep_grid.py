@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gen_profile.spec.reading import preset_spec
+from gen_profile.studies.sweep import run
 from gen_profile.studies.sweep.grid import GridAxis, grid_of_values, overrides, parse_grid
 from gen_profile.support.errors import SpecError
 
@@ -112,3 +113,20 @@ def test_steps_count_from_value_to_value_however_far_apart_they_are():
         [0, 1, 2, 0.5, 1.5, 0, 2]
     )
     assert GridAxis(key="plant.L1", values=(0.5,)).steps(0.5) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "cases", "processes"),
+    [
+        ([], 1, 1),
+        ([], 20, 1),  # where a second process took longer to start than it saved
+        ([], 40, 3),
+        ([], 1000, 4),
+        (["move.duration='minimum'", "limits.velocity=0.3"], 1, 1),
+        (["move.duration='minimum'", "limits.velocity=0.3"], 4, 3),
+        (["robustness.method='range'"], 20, 4),
+    ],
+)
+def test_as_many_processes_start_as_pay(monkeypatch, overrides, cases, processes):
+    monkeypatch.setattr(run, "CPU_COUNT", 4)
+    assert run.worthwhile(preset_spec("paper", overrides), cases) == processes

@@ -42,7 +42,7 @@ def run_sweep(
     folder : Path or str
         To write to.
     workers : int, optional
-        Processes of this computer; by default one for each of its processors.
+        Processes of this computer; by default as many as pay, one for each of its processors at most.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers to use instead.
 

@@ -34,7 +34,7 @@ from gen_profile.cli.progress import progress
     default="gen-profile-sweep",
 )
 @options.scheduler("do it")
-@option("--workers", "Processes of this computer; one per processor by default.", Count(min=1))
+@option("--workers", "Processes of this computer; as many as pay by default.", Count(min=1))
 @options.output
 def sweep(
     chosen: SpecChoice,

@@ -15,6 +15,7 @@ import attrs
 from dask.system import CPU_COUNT
 from distributed import Client, Future, KilledWorker, as_completed
 
+from gen_profile.spec.model import Spec
 from gen_profile.studies.sweep.case import CRASHED, PASSED, CaseOutcome, Recipe, failed, run_cases
 from gen_profile.studies.sweep.grid import Grid
 from gen_profile.studies.sweep.store import Keeper, Store, opened, swept_table
@@ -27,6 +28,8 @@ from gen_profile_exporters.registry import find_exporter
 
 STAGE = "designing cases"
 CASES_PER_TASK = 8  # at most; Dask's work for a task is a fifth of that for a case
+# s of work for a case, one with a search, and what makes a process worth its start (docs/sweeps.md)
+CASE, SEARCHED, WORTH = 0.06, 0.6, 0.65
 TASKS_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
 
 
@@ -140,7 +143,7 @@ def sweep(
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``; processes of this computer by default.
     workers : int, optional
-        How many of those; one per processor by default.
+        How many of those; by default as many as pay, one per processor at most.
     progress : callable
         Told after every case.
 
@@ -190,7 +193,8 @@ def _work(
             done, failures = done + 1, failures + (not outcome.passed)
             progress(STAGE, done, total, f"{failures} failed" if failures else "")
 
-    with client_of(scheduler, min(workers or CPU_COUNT, len(unfinished))) as client:
+    asked = workers or worthwhile(store.recipe.spec({}), len(unfinished))
+    with client_of(scheduler, min(asked, len(unfinished))) as client:
         ahead = TASKS_AHEAD * processes(client)
         size = max(1, min(CASES_PER_TASK, len(unfinished) // ahead))
         tasks = (unfinished[first : first + size] for first in range(0, len(unfinished), size))
@@ -206,6 +210,13 @@ def _work(
             except KilledWorker:
                 reason = "Every process that worked at it ended: it lacks memory, or a library crashes."
                 keep([failed(case, grid[case], CRASHED, reason)])
+
+
+def worthwhile(spec: Spec, cases: int) -> int:
+    """Estimate how many processes of this computer do so many cases soonest: each takes time to start."""
+    searched = spec.move.shortest or spec.robustness.method == "range"
+    work = cases * (SEARCHED if searched else CASE)
+    return max(1, min(int(CPU_COUNT), int(work / WORTH)))
 
 
 def _worked(
