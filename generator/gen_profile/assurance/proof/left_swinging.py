@@ -15,7 +15,9 @@ from gen_profile.methods.quickest.modes import SwayModes
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 
-TURN = 0.45  # rad, at most, between what machines next to each other do after a history: a block tries fewer
+TURN = (
+    0.45  # rad, at most, between what machines next to each other do after a history: 1 − cos half of it, 3 %
+)
 USUAL = 9  # machines from the one as given to a corner, at least
 FEW_ERRORS = 0.01  # of the stated ones: what is left there is their first order
 

@@ -46,7 +46,6 @@ from gen_profile.spec.model import Spec
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 
 LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block does not know
-STATED = 1.05  # sway by what the block states: between the machines that it watches
 MOST_COPIES = 32  # of the block in a history
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 SURELY = 3  # times that the block needs to see a live parameter change
@@ -184,7 +183,7 @@ class BlockWatch:
         if states is None or not known or any(one.kind in (QUICK_STOP, DISABLED) for one in followed.orders):
             return  # it is not known how the load swings
         stated = float(states[run.stands :].max(initial=0.0))  # a damped load's falls
-        if left > STATED * stated + LARGE_SWINGS * followed.sway_limit:
+        if left > stated + LARGE_SWINGS * followed.sway_limit:
             yield f"a load sways by {left:.3g} m, where fSwayLeft states {stated:.3g} m"
 
     def followed(
