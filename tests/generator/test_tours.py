@@ -61,6 +61,19 @@ def test_rare_inputs_come_in_every_state(machine, seed):
     assert all(found[name, STANDING] for name in powered_up)
 
 
+@pytest.mark.parametrize("machine", MACHINES)
+def test_errors_are_acknowledged_and_cycles_wrong_without_enable_too(machine):
+    histories, found = Histories.of(preset_spec("bay-crane", MACHINES[machine])), Counter()
+    for choices in histories.drawn(150, 1):
+        changes = histories.history(choices).changes
+        off = [(one.time, one.time + one.lasts) for one in changes if one.inputs.get("bEnable") == 0.0]
+        for one in changes:
+            within = any(begin < one.time < end for begin, end in off)
+            found.update(name for name in one.inputs if within)
+    assert found["bReset"]
+    assert found["fCycleTime"]
+
+
 def test_commands_come_in_every_cycle():
     histories = Histories.of(preset_spec("bay-crane"))
     cycle = histories.spec.export.cycle_time

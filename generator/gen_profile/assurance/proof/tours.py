@@ -141,7 +141,7 @@ def events(around: Surroundings) -> tuple[Event, ...]:
         return (*GENTLE, *live)
     others = () if around.rough == len(BRAKING) else ROUGH[: 1 if around.hoists else 3 if around.live else 2]
     if others and around.sensors:  # the rest comes in histories with a sensor
-        return others
+        return (*others, *ALSO)
     return (*BRAKING, *others, *ALSO, *live[:1])
 
 
