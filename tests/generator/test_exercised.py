@@ -18,7 +18,7 @@ from gen_profile.assurance.proof.exercised import (
 )
 from gen_profile.assurance.proof.numbering import DRAWS, SEARCH
 from gen_profile.assurance.proof.orders import POSITION, STOP, VELOCITY
-from gen_profile.assurance.proof.prove import seed_of
+from gen_profile.assurance.proof.prove import _required, seed_of
 from gen_profile.assurance.proof.verdict import Proof
 from gen_profile.spec.reading import preset_spec
 
@@ -145,6 +145,13 @@ def test_no_failure_in_so_many_bounds_the_share_that_would_fail():
         proof(200).sureness() == "none of 150 drawn by chance fails: fewer than 2 % of such would (at 95 %)"
     )
     assert proof(200, fails=2).sureness() == "1 of 150 drawn by chance fail, with the seed 7"
+
+
+def test_live_parameters_that_change_in_every_cycle_need_no_events_of_their_own():
+    """No tour gives them any, so every proof of 200 histories would fail."""
+    changes = ([], ["planner.live_rate={L1=0.1}"], ["planner.live_noise={m2=20.0}"])
+    pairs = [_required(preset_spec("bay-crane", change)) for change in changes]
+    assert [any(name.startswith("fm2") for name, _ in one) for one in pairs] == [True, False, False]
 
 
 def test_specs_that_differ_meet_other_histories():

@@ -161,7 +161,8 @@ def _compared(judged: Sequence[JudgedHistory], seed: int) -> tuple[JudgedHistory
 
 def _required(spec: Spec) -> list[tuple[str, str]]:
     """List what a proof of a spec's block must have tried; hoisting changes ropes in every cycle."""
-    live = [name for name in spec.planner.live if name not in spec.planner.live_rate]
+    changing = spec.planner.live_rate or spec.planner.live_noise
+    live = () if changing else tuple(spec.planner.live)
     kinds = faults_of(len(spec.planner.sensor.names)) if spec.planner.sensor else ()
     return required(live, [sensor_met(kind) for kind in (("", *kinds) if kinds else ())])
 
