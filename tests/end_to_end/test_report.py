@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 from html.parser import HTMLParser
+from importlib.metadata import version
 from pathlib import Path
 
 import attrs
@@ -216,6 +217,14 @@ def test_a_report_is_printed_the_same_twice_and_says_what_else_it_shall(tmp_path
     """Once by the program, once by the browser of the tests' own from the page that the program writes."""
     words = (*QUICK, "--set", "axis.unit=mm", "--field", "Customer=A & B", "--field", "Signature, operator")
     _, content, text = report(tmp_path, *words)
+    first = text[: text.index("Passed.")]  # above the verdict
+    for words in (
+        "Customer A & B",
+        "L1 0.45 m",
+        "m2 0.2 kg",
+        f"Made by gen-profile {version('gen-profile')}",
+    ):
+        assert words in first
     assert "Customer A & B" in text and "Signature, operator" in text and "cart 300 mm in 3 s" in text
     assert '"text":"position (mm)"' in content
     page = (tmp_path / "report.html").read_bytes()

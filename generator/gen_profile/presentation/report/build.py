@@ -11,7 +11,7 @@ from gen_profile.assurance.verification.check import provenance, spec_and_manife
 from gen_profile.assurance.verification.verdict import Check
 from gen_profile.delivery.designs.design import Design, design
 from gen_profile.dynamics.evaluation.phrases import move, uncertain
-from gen_profile.presentation.report.content import Page
+from gen_profile.presentation.report.content import Page, machine_data
 from gen_profile.presentation.report.log import read_log
 from gen_profile.presentation.report.measured import Measured, compare_measured
 from gen_profile.presentation.report.measured_section import measured_verdict
@@ -154,6 +154,7 @@ def _page(outcome: Design, comparison: Comparison | None, measured: Measured | N
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",
+        machine=machine_data(spec),
         verdicts=[verdict(check), *([] if measured is None else [measured_verdict(measured)])],
         facts=facts(spec, outcome.plan.evaluation, outcome.figures, check),
         sections=list(sections(outcome, check, comparison, measured)),

@@ -11,8 +11,10 @@ from typing import TypeVar
 import attrs
 from attrs.validators import instance_of
 
+from gen_profile.dynamics.evaluation.phrases import number
 from gen_profile.presentation.charts.figure import Figure
 from gen_profile.presentation.report.animation import Animation
+from gen_profile.spec.model import Spec
 from gen_profile.support.artefacts.manifest import versions
 
 LEAST_SHARE = 1e-3
@@ -131,6 +133,14 @@ class Section:
         return "".join(letter if letter.isalnum() else "-" for letter in self.title.lower())
 
 
+def machine_data(spec: Spec) -> list[tuple[str, str]]:
+    """Name the machine's parameters, in SI units, and the version that made the page."""
+    units, (program, release) = spec.machine().units, versions()[0]
+    parameters = spec.plant.parameters.items()
+    stated = [(name, f"{number(value)} {units[name]}".rstrip()) for name, value in parameters]
+    return [*stated, ("Made by", f"{program} {release}")]
+
+
 def _libraries() -> str:
     return f"Made by {', '.join(f'{library} {number}' for library, number in versions())}."
 
@@ -148,6 +158,8 @@ class Page:
     sections : sequence of Section
     colophon : str
         What made the page.
+    machine : sequence of (str, str)
+        Its parameters, and the program's version.
     papers : sequence of (str, str)
         What the reader wants to have on it, such as a customer.
     signatures : sequence of str
@@ -160,6 +172,7 @@ class Page:
     facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
     colophon: str = attrs.field(factory=_libraries)
+    machine: Sequence[tuple[str, str]] = ()
     papers: Sequence[tuple[str, str]] = ()
     signatures: Sequence[str] = ()
 

@@ -29,6 +29,7 @@ from gen_profile.presentation.report.content import (
     TableRow,
     Terms,
     Verdict,
+    machine_data,
 )
 from gen_profile.presentation.report.page import render, require_pages
 from gen_profile.spec.model import Spec
@@ -93,6 +94,7 @@ def _page(judgement: BlockJudgement, followed: Trace, gusty: Trace | None) -> Pa
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
+        machine=machine_data(spec),
         verdicts=[_verdict(proof, judgement.path)],
         facts=_facts(proof),
         sections=[*_sections(judgement, followed, gusty)],
