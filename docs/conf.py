@@ -15,8 +15,8 @@ import gen_profile
 NAVIGATION = {
     "Tutorials": "tutorial-crane over-stacks tutorial-tia tutorial-logix tutorial-research tutorial-drive",
     "How to": (
-        "standalone machines plc sweeps planner planner-sensor soft-plc deploy can fmu studio report python"
-        " troubleshooting"
+        "standalone machines plc sweeps planner planner-sensor planner-history soft-plc deploy can fmu studio"
+        " report python troubleshooting"
     ),
     "Examples": "/examples/README",
     "Reference": "command-line spec formats api glossary",
