@@ -74,7 +74,7 @@ class History:
         assert np.abs(v).max() <= limits.velocity * ROUNDING
         assert np.abs(a).max() <= limits.acceleration * ROUNDING
         assert np.abs(jerk).max() <= limits.jerk * (1.0 + 1e-6)
-        assert limits.travel[0] - 1e-9 <= x.min() and x.max() <= limits.travel[1] + 1e-9
+        assert limits.travel[0] - 1e-7 <= x.min() and x.max() <= limits.travel[1] + 1e-7
         assert np.allclose(
             np.diff(x), self.cycle * (v[1:] + v[:-1]) / 2, rtol=0, atol=limits.jerk * self.cycle**3
         )

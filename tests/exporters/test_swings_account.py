@@ -10,7 +10,7 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.planner.blocks.texts import Sizes, planner
 
 SLOTS = 64  # of the longest programme
-SIZES = Sizes(watched=(-1.0, -0.5, 0.5, 1.0))
+SIZES = Sizes(watched=(-1.0, -0.5, 0.5, 1.0), more=0)
 SWINGS = 10
 
 
@@ -113,7 +113,7 @@ VAR_OUTPUT
 END_VAR
 VAR account : bay_crane_account; i : DINT; {own} END_VAR
 {copies}
-account(nOperations := 900, fUnit := 2.0, {handed});
+account(nOperations := 1500, fUnit := 2.0, {handed});
 bBusy := account.bBusy;
 fWorst := account.fWorst;
 fLeft := account.fLeft;
@@ -127,7 +127,7 @@ END_FUNCTION_BLOCK
         row = np.r_[orders, self.machine, trial, np.zeros(PLAN - len(trial))]
         for _ in range(100):
             busy, worst, left, spent, *arrays = self.block.call(row[None])[0]
-            assert spent <= (900 if order in (2, 3) else 100 * SWINGS)
+            assert spent <= (1500 if order in (2, 3) else 100 * SWINGS)
             if not busy:
                 radii, values, rows = np.split(np.array(arrays), [6, 6 + ROWS])
                 return worst, left, radii, values, rows.reshape(ROWS, SLOTS)

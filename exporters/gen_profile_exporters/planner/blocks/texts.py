@@ -19,7 +19,8 @@ LONGEST, FEWEST = (
     40,
 )  # slots of the longest programme, where there are operations for it, and where there are few
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
-STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave; the rest is for machines between
+STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
+BETWEEN = 1.2  # times that, of machines between both ends of the errors, which have no rows
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
 
@@ -97,7 +98,9 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
     rows, slots = sizes.rows(modes), longest(constants)
     plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
     share = constants.sway_share / len(constants.axes)
-    bounds = [share * part for part in _shares(constants)]
+    stops = _stop_share(constants)
+    parts = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in sizes.watched)]
+    bounds = np.outer(share * np.array(parts), _shares(constants)).ravel()
     lengths = {
         "live": max(1, len(constants.live)), "swing": swings, "shown": len(shown), "slot": slots,
         "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
@@ -111,8 +114,9 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
         "shown": len(shown),
         "mode_count": modes,
         "slots": slots,
+        "stop_share": literal(_stop_share(constants)),
         "polygon": literal(float(np.cos(np.pi / SIDES))),
-        "bounds": initialiser([literal(float(v)) for v in np.tile(bounds, 1 + len(sizes.watched))]),
+        "bounds": initialiser([literal(float(v)) for v in bounds]),
         "shown_swings": initialiser([str(v) for v in shown]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, sizes)),
@@ -124,6 +128,10 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
             *(filled(part, **values) for part in ("modes", "account", "planner")),
         ]
     )
+
+
+def _stop_share(c: PlannerConstants) -> float:
+    return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share) if c.sway_share else 1.0
 
 
 def _shares(c: PlannerConstants) -> Array:
@@ -171,13 +179,16 @@ def _of_motion(c: PlannerConstants, swings: int, sizes: Sizes, slots: int, plan:
         "cSlots": slots,
         "cPlan": plan,
         "cFuture": plan + 4,
-        "cOwnWork": 80 + (50 * swings),  # operations of every cycle
+        "cOwnWork": 80,  # operations of every cycle
+        "cFoundWork": 250
+        + 5 * slots
+        + 15 * swings,  # operations where a programme is found, and the next begins
         "cReserve": 150 + 11 * plan + 30 * swings,  # operations where a plan was found
         "cSlotWork": 650 + rows * (rows + 10),  # operations of an iteration, for each slot
         "cVelocity": [axis.velocity for axis in c.axes],
         "cAcceleration": [axis.acceleration for axis in c.axes],
         "cJerk": [axis.jerk for axis in c.axes],
-        "cStopShare": max(1.0, STOP_SHARE * c.sway_limit / c.sway_share) if c.sway_share else 1.0,
+        "cStopShare": _stop_share(c),
         "cSwayLimit": c.sway_limit / len(c.axes),
     }
 
