@@ -1,6 +1,7 @@
 """The shell of the planner of the folder of blocks, around a motion that plans nothing."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -261,6 +262,8 @@ def test_random_inputs_keep_the_rules_of_the_signals(text):
     block = CountedBlock(compile_counting(text), bEnable=0.0)
     rows = random_rows(block.inputs, 200_000, seed=2)
     issued = block._played(rows)
+    (counted,) = map(int, re.findall(r"cShellWork : DINT := (\d+);", text))
+    assert issued["operations"].max() <= counted + 30  # of the motion that plans nothing
     finite = np.column_stack([values for name, values in issued.items()])
     assert np.isfinite(finite).all()
     shown = [issued[name] for name in ("bBusy", "bDone", "bError", "bInVelocity")]

@@ -120,5 +120,5 @@ def test_it_is_short_enough_to_be_reviewed(block):
 
 def test_what_it_does_not_do_yet_is_said():
     spec = preset_spec("bay-crane", ["planner.live_rate={L1=0.1}"])
-    with pytest.raises(ExportError, match="take one axis, without live_rate and sensor, as yet"):
+    with pytest.raises(ExportError, match="take neither live_rate nor a sensor, as yet"):
         whole_text(spec)

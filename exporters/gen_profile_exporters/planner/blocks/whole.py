@@ -25,7 +25,7 @@ from gen_profile_exporters.planner.blocks.texts import (
 from gen_profile_exporters.playback.structured_text import block_name, literal
 
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command
-SHELL_WORK, ZONES_WORK = 80, 300  # operations of every cycle: of an axis, and where it has zones
+SHELL_WORK, ZONES_WORK = 200, 150  # operations of every cycle: of an axis, and where it has zones
 EACH = re.compile(r"(?ms)^ *@each_axis\n(.*?)^ *@end_axis\n")
 TOLERANCE = ("is not the cycle time of this block", "is not within 0.1 % of the cycle time of this block")
 
@@ -38,8 +38,8 @@ def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
     ExportError
         It asks for what these blocks do not do yet.
     """
-    if constants.rates or constants.sensor is not None or len(constants.axes) > 1:
-        raise ExportError("The blocks within blocks take one axis, without live_rate and sensor, as yet.")
+    if constants.rates or constants.sensor is not None:
+        raise ExportError("The blocks within blocks take neither live_rate nor a sensor, as yet.")
     motion = _renamed(planner(constants, sizes or Sizes()), constants.name, block_name(constants.name))
     return around(motion, constants)
 
