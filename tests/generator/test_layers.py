@@ -117,6 +117,12 @@ def test_a_fault_of_a_spec_waits_for_nothing_heavy(arguments):
     assert not {"casadi", "scipy", "fmpy", "rich", "filelock", "lxml", "can"} & {*loaded}
 
 
+def test_help_waits_for_no_library_of_other_commands():
+    code, *loaded = printed(FAULTY.format(arguments=["--help"])).split("\n")[-2].split()
+    assert code == "0"
+    assert not {"numpy", "importlib.metadata", "email", "zipfile", "socket"} & {*loaded}
+
+
 def test_that_test_would_see_casadi():
     assert "casadi" in loaded_by("gen_profile.dynamics.problem.linearization")
 

@@ -1,10 +1,14 @@
 """What other distributions bring along: by entry points, and libraries that extras need."""
 
-from importlib.metadata import EntryPoint
+from __future__ import annotations
+
 from importlib.util import find_spec
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from gen_profile.support.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint  # which takes an eighth of what --help does
 
 CURE = "update or uninstall the package that provides it."
 
