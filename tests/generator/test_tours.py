@@ -6,9 +6,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from gen_profile.assurance.proof.exercised import LOST, MILLIONTH, NO_NUMBER, STANDING
+from gen_profile.assurance.proof.exercised import LOST, MILLIONTH, NO_NUMBER, RISES, STANDING
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.numbering import Numbering
+from gen_profile.assurance.proof.prove import _required
 from gen_profile.spec.reading import preset_spec
 
 SENSOR = [
@@ -59,6 +60,15 @@ def test_rare_inputs_come_in_every_state(machine, seed):
     assert found["bReset", "quick-stop"]
     powered_up = ("bExecute", "bVelocity", "bStop", "bReset", "bQuickStop")
     assert all(found[name, STANDING] for name in powered_up)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_what_a_proof_requires_in_any_state_is_given(machine):
+    spec = preset_spec("bay-crane", MACHINES[machine])
+    due = {name for name, state in _required(spec) if not state and not name.startswith("a sensor")}
+    histories = Histories.of(spec)
+    found = {name for name, _ in given(histories, histories.drawn(150, 1))}
+    assert due - {*RISES} <= found
 
 
 @pytest.mark.parametrize("machine", MACHINES)

@@ -105,7 +105,9 @@ def _came(run: Followed) -> Iterator[tuple[str, Flags]]:
             yield f"{name} {value:.0f}", changed & (values == value)
 
 
-def required(live: Iterable[str], sensors: Sequence[str] = ()) -> list[tuple[str, str]]:
+def required(
+    live: Iterable[str], sensors: Sequence[str] = (), *, hoists: bool = False
+) -> list[tuple[str, str]]:
     """List the pairs of inputs, or outputs, and states that every proof must have tried.
 
     Parameters
@@ -114,15 +116,17 @@ def required(live: Iterable[str], sensors: Sequence[str] = ()) -> list[tuple[str
         Names of the live parameters that change now and then.
     sensors : sequence of str
         What sensors must have met, by names of `sensor_met`. Histories with one have no events of `LOST`.
+    hoists : bool
+        Whether ropes change on the way: a block that calms by its model believes that the load hangs still.
     """
-    given = [f"f{name}" for name in live]
+    given, seldom = [f"f{name}" for name in live], SELDOM[: len(SELDOM) - hoists]
     rare = (*EVENTS, *(name + how for name in given for how in (NO_NUMBER, SPIKE)))
     return [
         *((name, state) for name in (*COMMANDS, *rare) for state in GUIDED),
         *((name, state) for name in LOST for state in (() if sensors else GUIDED)),
         *((name, POWERED_UP) for name in ("bExecute", "bVelocity", "bStop", "bQuickStop", "bReset")),
         *LATER,
-        *((name, ANYWHERE) for name in (*SELDOM, *LOST, *given, *RISES, *sensors)),
+        *((name, ANYWHERE) for name in (*seldom, *LOST, *given, *RISES, *sensors)),
     ]
 
 

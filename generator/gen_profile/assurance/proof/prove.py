@@ -164,7 +164,8 @@ def _required(spec: Spec) -> list[tuple[str, str]]:
     changing = spec.planner.live_rate or spec.planner.live_noise
     live = () if changing else tuple(spec.planner.live)
     kinds = faults_of(len(spec.planner.sensor.names)) if spec.planner.sensor else ()
-    return required(live, [sensor_met(kind) for kind in (("", *kinds) if kinds else ())])
+    met = [sensor_met(kind) for kind in (("", *kinds) if kinds else ())]
+    return required(live, met, hoists=bool(spec.planner.live_rate))
 
 
 def _verdict(
