@@ -1,9 +1,13 @@
 """Trolley and hoist together over stacks, against another integrator, and as written to files."""
 
+import re
+from pathlib import Path
+
 import attrs
 import numpy as np
 import pytest
 from generator.quay import RAIL, ROPE, STACKS, followed, quay, shortage
+from scipy.integrate import solve_ivp
 
 import gen_profile as gp
 from gen_profile.assurance.verification.batch import Feed, many_machines, residual_peaks
@@ -11,6 +15,8 @@ from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.dynamics.evaluation.simulation import body_places
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.profile import sample
+from gen_profile.presentation.charts.curves import path_figure, select_machines
+from gen_profile.presentation.report.build import report
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 pytestmark = pytest.mark.slow
@@ -85,6 +91,30 @@ class TestMotion:
         assert shortage(x, z, back.spec.path, 36.0, 0.0) <= NEARER
 
 
+class TestLook:
+    def test_the_picture_shows_ways_that_keep_out_of_what_is_dashed(self, plan):
+        shown = select_machines(plan.evaluation)
+        (panel,) = path_figure(plan.spec, plan.evaluation, shown).panels
+        ways = [line for line in panel.lines if line.name not in ("stacks", "clearance")]
+        kept_out = [line for line in panel.lines if line.name == "clearance"]
+        assert len(ways) == len(shown)
+        assert len(kept_out) == len(STACKS)
+        for zone in kept_out[:-1]:  # the last one is what the load is set down on
+            for way in ways:
+                inside = (way.x > zone.x[0]) & (way.x < zone.x[2])
+                assert inside.any()
+                assert way.y[inside].min() >= zone.y.max() - NEARER
+
+    def test_report_and_picture_tell_of_the_stacks(self, plan, tmp_path):
+        spec = attrs.evolve(plan.spec, check=attrs.evolve(plan.spec.check, samples=0))
+        made = report(spec, ["csv"])
+        page = made.content.decode("utf-8")
+        assert "Over the stacks" in page
+        assert "less than one axis after the other" in page
+        gp.plot(plan, tmp_path / "way.png")
+        assert (tmp_path / "way.png").stat().st_size > 10_000
+
+
 class TestRefusals:
     def test_too_quick_names_the_stack_and_a_time_that_does(self, plan):
         with pytest.raises(gp.InfeasibleProblem) as refusal:
@@ -148,3 +178,47 @@ class TestCheck:
                 response = fmu.run(setpoints, values, max_step=1e-3, settle=0.01)
                 bodies = body_places(plant, response.q_u, response.position, row)
                 assert nearest(spec, response.times, bodies).room == pytest.approx(found, abs=1e-6)
+
+
+def test_hook_and_load_of_a_machine_of_ones_own_keep_the_clearance(tmp_path):
+    """Against the motion of two masses on rods, by their places, with the rods' forces as unknowns."""
+    folder = Path(__file__).parents[2] / "examples"
+    (text,) = re.findall(r'SPEC = """(.*?)"""', (folder / "13_over_stacks.py").read_text("utf-8"), re.DOTALL)
+    plan = gp.plan(gp.parse_spec(text, folder=folder))
+    times = np.linspace(0.0, plan.motion.duration, 8001)
+    for scale in (0.9, 1.0, 1.1):
+        parameters = {**plan.spec.plant.parameters, "L0": 2.0 * scale}
+        bodies = two_masses(plan.motion, parameters, times)
+        for body, size in enumerate((plan.spec.path.hook, plan.spec.path.load)):
+            path = attrs.evolve(plan.spec.path, load=size)
+            assert shortage(*bodies[body], path, *ends(plan)) <= NEARER
+
+
+def two_masses(motion, p, times):
+    """Integrate places and velocities of hook and load, with accelerations by the rods' two forces."""
+
+    def rates(t, state):
+        x1, z1, x2, z2, vx1, vz1, vx2, vz2 = state
+        (y, h), (v, paid), (a, pull) = (motion.derivative([t], order)[0] for order in range(3))
+        upper, lower = np.array([y - x1, -z1]), np.array([x1 - x2, z1 - z2])
+        fast, slow = np.array([v - vx1, -vz1]), np.array([vx1 - vx2, vz1 - vz2])
+        down, top = np.array([0.0, -p["g"]]), np.array([a, 0.0])
+        rope = p["L0"] + h
+        # |upper| = rope and |lower| = d, twice derived, are linear in the forces per length
+        matrix = [
+            [upper @ upper / p["m1"], -(upper @ lower) / p["m1"]],
+            [-(lower @ upper) / p["m1"], lower @ lower * (1.0 / p["m1"] + 1.0 / p["m2"])],
+        ]
+        side = [upper @ (top - down) + fast @ fast - paid**2 - rope * pull, slow @ slow]
+        above, below = np.linalg.solve(matrix, side)
+        first = (above * upper - below * lower) / p["m1"] + down
+        second = below * lower / p["m2"] + down
+        return [vx1, vz1, vx2, vz2, *first, *second]
+
+    y, h = motion.start
+    low = -(p["L0"] + h)
+    begin = [y, low, y, low - p["d"], 0.0, 0.0, 0.0, 0.0]
+    x1, z1, x2, z2, *_ = solve_ivp(
+        rates, (0.0, times[-1]), begin, t_eval=times, rtol=1e-9, atol=1e-10, max_step=0.05
+    ).y
+    return (x1, z1), (x2, z2)

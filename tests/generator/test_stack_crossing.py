@@ -1,0 +1,77 @@
+"""Random bays, beside a nonlinear program with a free hoist; STACK_BAYS=100 tries as many as that."""
+
+import os
+
+import numpy as np
+import pytest
+from generator.oracles.stack_crossing import one_by_one, quickest
+from generator.quay import HEIGHT, LIMITS, RAIL, ROPE, WIDTH, followed, quay, shortage
+
+import gen_profile as gp
+
+BAYS = int(os.environ.get("STACK_BAYS", "2"))
+NEARER = 5e-4  # m, by which no load may come nearer to a stack than the clearance
+LONGER = 1.03  # times the nonlinear program's duration, which is held off stacks at some instants only
+FREE = {"sway": None, "axis": {axis: {**limits, "travel": None} for axis, limits in LIMITS["axis"].items()}}
+NODES = 31
+
+
+def random_bay(number):
+    """One to four stacks of any height and distance, and ends that are clear of them."""
+    random, x, stacks = np.random.default_rng([20, number]), 5.0, []
+    for _ in range(random.integers(1, 5)):
+        left = x + random.uniform(2.5, 6.0)
+        x = left + random.uniform(2.0, 6.0)
+        stacks.append([left, x, random.uniform(5.0, 30.0)])
+    start, target = (
+        [0.0, random.uniform(22.0, 30.0)],
+        [x + random.uniform(4.0, 10.0), random.uniform(8.0, 28.0)],
+    )
+    no_ranges = {"method": None, "uncertain": None}
+    return quay(
+        stacks,
+        move={"start": start, "target": target},
+        path={"clearance": 0.5},
+        limits=FREE,
+        robustness=no_ranges,
+    )
+
+
+def as_the_oracle_takes_it(spec):
+    beside, above = WIDTH / 2.0 + 0.5, HEIGHT / 2.0 + 0.5
+    rates = [
+        [LIMITS["axis"][axis][rate] for rate in ("velocity", "acceleration", "jerk")]
+        for axis in ("cart", "hoist")
+    ]
+    (x0, paid0), (x1, paid1) = spec.move.start, spec.move.target
+    return {
+        "start": (x0, ROPE + paid0),
+        "target": (x1, ROPE + paid1),
+        "zones": [
+            (left - beside, right + beside, RAIL - top - above) for left, right, top in spec.path.stacks
+        ],
+        "limits": rates,
+        "rope": ROPE,
+    }
+
+
+def guess_of(plan):
+    """The states of a plan at even times, for the other program to begin at."""
+    times = np.linspace(0.0, plan.motion.duration, NODES)
+    (cart, hoist), (v, paid), (a, push) = (plan.motion.derivative(times, order).T for order in range(3))
+    swing = plan.evaluation.swing.at(times)[0]
+    return np.stack([cart, v, a, ROPE + hoist, paid, push, swing.q_u[:, 0], swing.dq_u[:, 0]]), times[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(BAYS))
+def test_no_other_program_is_much_quicker(number):
+    spec = random_bay(number)
+    plan, bay = gp.plan(spec), as_the_oracle_takes_it(spec)
+    times = np.linspace(0.0, plan.motion.duration, 20001)
+    x, z, _ = followed(plan.motion, ROPE, times)
+    assert shortage(x, z, spec.path, spec.move.start[0], spec.move.target[0]) <= NEARER
+    guesses = [guess_of(plan), one_by_one(bay, plan.passage.one_by_one, NODES)]
+    others = [found for guess in guesses if (found := quickest(bay, guess, NODES - 1)) is not None]
+    assert others
+    assert plan.motion.duration <= LONGER * min(others)
