@@ -115,11 +115,12 @@ def required(
     live : iterable of str
         Names of the live parameters that change now and then.
     sensors : sequence of str
-        What sensors must have met, by names of `sensor_met`. Histories with one have no events of `LOST`.
+        What sensors must have met, by names of `sensor_met`. Histories with one have no events of `LOST`,
+        and no axis that goes as it is taken over.
     hoists : bool
         Whether ropes change on the way: a block that calms by its model believes that the load hangs still.
     """
-    given, seldom = [f"f{name}" for name in live], SELDOM[: len(SELDOM) - hoists]
+    given, seldom = [f"f{name}" for name in live], SELDOM[bool(sensors) : len(SELDOM) - hoists]
     rare = (*EVENTS, *(name + how for name in given for how in (NO_NUMBER, SPIKE)))
     return [
         *((name, state) for name in (*COMMANDS, *rare) for state in GUIDED),
