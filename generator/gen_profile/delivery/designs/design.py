@@ -119,8 +119,8 @@ class Design(Drawable):
         passage = self.plan.passage
         if passage is not None:
             passed = {"status": "converged", "method": "over-stacks", "iterations": passage.programs}
-            told = {"one_by_one_s": passage.one_by_one, "lift_m": passage.lift}
-            return {**passed, "residual": None, **seconds, "cost": None, **told}
+            more = {"one_by_one_s": passage.one_by_one, "lift_m": passage.lift}
+            return {**passed, "residual": None, **seconds, "cost": None, **more}
         if solution is None:
             shaped = {"status": "shaped", "method": spec.method, "base": spec.base, "iterations": 0}
             return {**shaped, "residual": None, **seconds, "cost": None}

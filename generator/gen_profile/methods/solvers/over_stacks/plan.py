@@ -43,7 +43,7 @@ ROUGH = Search(precision=4e-3, close=8e-3, slope=2.0, believed=(0.2, 20.0), long
 EXACT = attrs.evolve(ROUGH, precision=8e-4, close=1e-3)
 DECIDED_BY_HOIST = 0.3  # s, beyond the hoist's own least time, up to which no other height is quicker
 LOWER = (0.0, 0.25, 0.5, 0.75)  # of the way from the height that is needed to the top, as other heights
-WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # s before the hoist begins, and after it ends
+WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # s before the hoist starts, and after it ends
 WORTH = 2e-3  # of the duration, that another height must save; then twice as much, and so on
 ROUNDS = 8  # of linearising anew
 SETTLED = 1e-7  # m, rad and their rates, by which a machine may be elsewhere after an interval
@@ -175,11 +175,11 @@ def has_room(course: Course) -> bool:
 def stretched(course: Course, up: Pieces) -> Course:
     """Let a course last as long as another motion of the hoist."""
     ratio = course.up.duration / up.duration
-    slower = np.ones(course.begins[0].shape[-1])
+    slower = np.ones(course.nodes[0].shape[-1])
     slower[:3] = ratio ** np.arange(3.0)
-    nominal, others = course.begins
-    begins = (nominal * slower, others * slower[: others.shape[-1]])
-    return attrs.evolve(course, up=up, jerks=course.jerks * ratio**3, begins=begins)
+    nominal, others = course.nodes
+    nodes = (nominal * slower, others * slower[: others.shape[-1]])
+    return attrs.evolve(course, up=up, jerks=course.jerks * ratio**3, nodes=nodes)
 
 
 def _there(course: Course | None) -> Course:
@@ -276,11 +276,9 @@ def _to_rest(lengths: Array, jerks: Array, start: float, target: float) -> Piece
     left = knots[-1] - knots
     powers = [-np.diff(left**order) / math.factorial(order) for order in (3, 2, 1)]
     ends = np.array(powers)
-    missed = np.array([target - start, 0.0, 0.0]) - ends @ jerks
+    off = np.array([target - start, 0.0, 0.0]) - ends @ jerks
     weights = lengths[:, None] * ends.T
-    return Pieces(
-        lengths=lengths, jerks=jerks + weights @ np.linalg.solve(ends @ weights, missed), start=start
-    )
+    return Pieces(lengths=lengths, jerks=jerks + weights @ np.linalg.solve(ends @ weights, off), start=start)
 
 
 def _require_height(bay: Bay) -> None:

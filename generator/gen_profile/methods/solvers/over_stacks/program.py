@@ -41,20 +41,20 @@ class Course:
     up : Pieces
         The hoist's motion, upwards.
     jerks : (intervals,) array
-    begins : tuple of arrays
+    nodes : tuple of arrays
         States of the nominal machine at the begin and end of every interval, (intervals + 1, n), and of the
         others, (machines, intervals + 1, n).
     room : float
         m, that is left to the stacks beyond the clearance; negative where it is missing.
     miss : float
-        m, by which the target is missed.
+        m, between its end and the target.
     smooth : bool
         Whether it is the smoothest one.
     """
 
     up: Pieces
     jerks: Array
-    begins: tuple[Array, Array]
+    nodes: tuple[Array, Array]
     room: float = -math.inf
     miss: float = 0.0
     smooth: bool = False
@@ -65,7 +65,7 @@ def resting(bay: Bay, up: Pieces) -> Course:
     intervals = max(math.ceil(up.duration / INTERVAL), 4)
     begin = np.tile(bay.begin, (intervals + 1, 1))
     other = np.tile(bay.begin[: bay.others.states], (len(bay.machines) - 1, intervals + 1, 1))
-    return Course(up=up, jerks=np.zeros(intervals), begins=(begin, other))
+    return Course(up=up, jerks=np.zeros(intervals), nodes=(begin, other))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -89,7 +89,7 @@ class Program:
         lifted = -about.up.at(half.astype(np.float64))[:, :3]
         lifted[:, 0] += bay.spec.move.start[bay.hoist]
         rows = np.arange(intervals)[:, None] * 2 * STEPS + np.arange(2 * STEPS + 1)
-        nominal, others = about.begins
+        nominal, others = about.nodes
         follow = partial(followed, jerks=about.jerks, hoist=lifted[rows], step=self.step)
         first = follow(bay.nominal, nominal[None, :-1], bay.machines[:1])
         if not len(others):
@@ -103,9 +103,9 @@ class Program:
 
     @property
     def defect(self) -> float:
-        """By how much machines are elsewhere after an interval than the next one begins, in SI units."""
-        begins = [self.about.begins[0], *self.about.begins[1]]
-        pairs = zip(self.followed, begins, strict=True)
+        """By how much machines are elsewhere after an interval than at the next node, in SI units."""
+        nodes = [self.about.nodes[0], *self.about.nodes[1]]
+        pairs = zip(self.followed, nodes, strict=True)
         return max(float(np.abs(one.states[0, :, -1] - begin[1:]).max()) for one, begin in pairs)
 
     @property
@@ -142,7 +142,7 @@ class Program:
 
     @property
     def variables(self) -> int:
-        """Number of them: states and jerks, how far the target is missed, and how much room is missing."""
+        """Number of them: states and jerks, how far from the target it ends, and how much room is missing."""
         return (len(self.about.jerks) + 1) * (self.width + 1) - 1 + 2
 
     def solve(self, *, smooth: bool) -> Course | None:
@@ -179,12 +179,12 @@ class Program:
     def _course(self, x: Array, jerks: Numbers) -> Course:
         """Take the states and jerks that a program found."""
         changes = np.append(x[:-2], 0.0).reshape(-1, self.width + 1)
-        nominal, others = self.about.begins
+        nominal, others = self.about.nodes
         moved = [changes[:, self._columns(m + 1)[:-1]] for m in range(len(others))]
         return attrs.evolve(
             self.about,
             jerks=self.about.jerks + x[jerks],
-            begins=(nominal + changes[:, : nominal.shape[1]], others + np.array(moved).reshape(others.shape)),
+            nodes=(nominal + changes[:, : nominal.shape[1]], others + np.array(moved).reshape(others.shape)),
             room=1.0 - float(x[-1]),
             miss=float(x[-2]),
         )
@@ -194,8 +194,8 @@ class Program:
         first = place(np.eye(self.width)[None], np.zeros(1, dtype=np.intp))
         program.equal(first, np.zeros(self.width))
         intervals = np.arange(len(self.about.jerks))
-        starts = [self.about.begins[0], *self.about.begins[1]]
-        for machine, (one, begins) in enumerate(zip(self.followed, starts, strict=True)):
+        starts = [self.about.nodes[0], *self.about.nodes[1]]
+        for machine, (one, nodes) in enumerate(zip(self.followed, starts, strict=True)):
             skipped = TROLLEY if machine else 0
             ends, along = one.states[0, :, -1, skipped:], one.along[0, :, -1, skipped:]
             columns = self._columns(machine)
@@ -204,13 +204,13 @@ class Program:
             own = self.width + 1 + columns[skipped:-1]
             blocks[:, np.arange(along.shape[1]), own] = -1.0
             matrix = place(blocks, intervals * (self.width + 1))
-            program.equal(matrix, (begins[1:, skipped:] - ends).ravel())
+            program.equal(matrix, (nodes[1:, skipped:] - ends).ravel())
 
     def _trolley(self, program: ConicProgram) -> None:
         """Hold travel, velocity, acceleration and jerk to limits, by control points of half intervals."""
         limits, jerks = self.bay.limits, self.about.jerks
         span = self.step * STEPS
-        begins = self.about.begins[0][:-1, :TROLLEY]
+        nodes = self.about.nodes[0][:-1, :TROLLEY]
         intervals = np.arange(len(jerks))
         ranges = [(limits.travel, 0), (limits.velocity, 1), (limits.acceleration, 2), (limits.jerk, 3)]
         for stated, order in ranges:
@@ -218,7 +218,7 @@ class Program:
                 continue
             low, high = stated if isinstance(stated, tuple) else (-stated, stated)
             points = _control_points(span, order)
-            now = np.concatenate([begins, jerks[:, None]], axis=1) @ points.T
+            now = np.concatenate([nodes, jerks[:, None]], axis=1) @ points.T
             blocks = np.zeros((len(jerks), len(points), self.bay.nominal.states + 1))
             blocks[:, :, [0, 1, 2, -1]] = points
             matrix = self._rows(intervals, blocks)
@@ -230,14 +230,14 @@ class Program:
         states = self.bay.nominal.states
         asked = np.zeros(states)
         asked[0] = self.bay.target
-        left = asked - self.about.begins[0][-1]
+        left = asked - self.about.nodes[0][-1]
         at = len(self.about.jerks) * (self.width + 1)
         program.equal(place(np.eye(states)[None, 1:], np.array([at])), left[1:])
-        reached, missed = self._alone(at), self._alone(self.variables - 2)
+        reached, off = self._alone(at), self._alone(self.variables - 2)
         if not free:
-            program.equal(missed, np.zeros(1))
-        program.at_most(reached + (-missed), left[:1])
-        program.at_most(-(reached + missed), -left[:1])
+            program.equal(off, np.zeros(1))
+        program.at_most(reached + (-off), left[:1])
+        program.at_most(-(reached + off), -left[:1])
 
     def _beside(self, program: ConicProgram, machine: int) -> None:
         """Keep the bodies of a machine beside stacks while they are low."""
@@ -287,7 +287,7 @@ class Program:
         wide = np.zeros((len(shown), self.width))
         wide[:, columns] = shown
         matrix = place(wide[None], np.array([at]))
-        now = shown @ self.about.begins[1][machine - 1][-1, TROLLEY:]
+        now = shown @ self.about.nodes[1][machine - 1][-1, TROLLEY:]
         program.at_most(matrix, limits - now)
         program.at_most(-matrix, limits + now)
 

@@ -79,13 +79,13 @@ class Followed:
     seen_along: Array
 
 
-def followed(swing: Swing, begins: Array, p: Array, *, jerks: Array, hoist: Array, step: float) -> Followed:
+def followed(swing: Swing, nodes: Array, p: Array, *, jerks: Array, hoist: Array, step: float) -> Followed:
     """Integrate by the classical method of Runge and Kutta, with the derivatives.
 
     Parameters
     ----------
     swing : Swing
-    begins : (machines, intervals, n) array
+    nodes : (machines, intervals, n) array
         States at which intervals begin.
     p : (machines, parameters) array
     jerks : (intervals,) array
@@ -95,10 +95,10 @@ def followed(swing: Swing, begins: Array, p: Array, *, jerks: Array, hoist: Arra
     step : float
         s.
     """
-    machines, intervals, n = begins.shape
+    machines, intervals, n = nodes.shape
     pushed = np.zeros((n, 1))
     pushed[TROLLEY - 1] = 1.0
-    z, along = begins, np.broadcast_to(np.eye(n, n + 1), (machines, intervals, n, n + 1))
+    z, along = nodes, np.broadcast_to(np.eye(n, n + 1), (machines, intervals, n, n + 1))
     states, alongs = [z], [along]
     parameters = p[:, None]
 
