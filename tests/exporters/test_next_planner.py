@@ -173,6 +173,51 @@ def test_a_speed_is_kept_until_the_stick_is_let_go_and_a_far_target_is_corrected
     history.keeps()
 
 
+@pytest.fixture(scope="module")
+def bay():
+    spec = preset_spec("bay-crane", [])
+    return spec, compile_counting(played_text(spec))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_prompt_stop_is_never_faster_than_the_axis_was_and_says_what_is_left(bay, seed):
+    spec, compiled = bay
+    random = np.random.default_rng([5, seed])
+    history = History(spec, compiled, random)
+    away = 2.0 if history.place > 20.0 else 38.0
+    moving = history.hold(random.uniform(1.0, 14.0), bExecute=1.0, fTarget=away)
+    speed, limits = abs(moving["fVelocity"][-1]), history.limits
+    led_to = speed + abs(moving["fAcceleration"][-1]) * spec.planner.live["L1"][1] ** 0.5 / 5.0  # in a slot
+    stop = history.hold(40.0, bStop=1.0, bPrompt=1.0)
+    assert np.abs(stop["fVelocity"]).max() <= min(limits.velocity * ROUNDING, led_to + 0.01)
+    assert stop["fVelocity"][-1] == 0.0
+    history.keeps()
+    _, ends, _ = history.left()
+    assert stop["fSwayLeft"][-1] == pytest.approx(ends, rel=0.1, abs=0.002)
+    assert stop["bPromise"][-1] == (stop["fSwayLeft"][-1] <= min(spec.check.residual_sway.values()))
+
+
+def test_a_lower_limit_is_come_to_on_the_way_and_a_place_that_is_closed_too_late_is_said(bay):
+    spec, compiled = bay
+    history = History(spec, compiled, np.random.default_rng(100))
+    away = 2.0 if history.place > 20.0 else 38.0
+    history.hold(6.0, bExecute=1.0, fTarget=away)
+    history.block.inputs["rOverride"] = 0.4
+    history.issued.append(history.block.play_on(round(60.0 / history.cycle)))
+    slow = np.abs(history.issued[-1]["fVelocity"][round(10.0 / history.cycle) :])
+    assert slow.max() <= 0.4 * history.limits.velocity * 1.001
+    assert history.issued[-1]["fPosition"][-1] == pytest.approx(away, abs=1e-9)
+    history.keeps()
+    for room, is_void in ((6.0, False), (1.0, True)):
+        history = History(spec, compiled, np.random.default_rng(3))
+        sign = 1.0 if history.place < 20.0 else -1.0
+        moving = history.hold(5.0, bExecute=1.0, fTarget=20.0 + 18.0 * sign)
+        end = moving["fPosition"][-1] + room * sign
+        stop = history.hold(20.0, bStop=1.0, **{"fHighest" if sign > 0 else "fLowest": end})
+        assert stop["bVoid"].any() == is_void
+        assert is_void or (stop["fPosition"][-1] - end) * sign <= 0.0
+
+
 @pytest.mark.slow
 def test_the_interpreter_issues_the_same_bits():
     spec = preset_spec("paper", list(PAPER))
