@@ -244,3 +244,8 @@ def test_an_interrupt_that_python_drops_comes_again():
         [sys.executable, "-c", INTERRUPTED_IN_A_FINALIZER], capture_output=True, encoding="utf-8", check=False
     )
     assert (done.returncode, done.stderr) == (130, "Error: Interrupted.\n")
+
+
+def test_a_cure_is_named_once():
+    refused = run_here("--set", "move.duration=1", "--set", "limits.acceleration=1")
+    assert refused.err.count("It can be done with") == 1

@@ -363,7 +363,7 @@ def _name_by_option(error: GenProfileError, given: Iterable[str]) -> None:
     flags |= {name.replace("-", "_"): option for name, option in flags.items()}
     begin = re.compile(r"^[\w.]+(?=[: ,])", re.MULTILINE)
     error.args = tuple(
-        begin.sub(lambda match: flags.get(match[0], match[0]), sentence) for sentence in error.sentences
+        begin.sub(lambda match: flags.get(match[0], match[0]), sentence) for sentence in error.args
     )
 
 
