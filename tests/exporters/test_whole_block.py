@@ -6,6 +6,7 @@ import subprocess
 import attrs
 import numpy as np
 import pytest
+from driven_block import BAY
 from system_parts import program
 from test_planner_forms import Exported
 
@@ -13,7 +14,7 @@ from gen_profile.planner.design import planner_block, planner_constants
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block
 from gen_profile.planner.interface import block_axes, live_inputs
-from gen_profile.spec.reading import preset_spec
+from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.blocks.whole import whole_block
@@ -122,3 +123,14 @@ def test_what_it_does_not_do_yet_is_said():
     spec = preset_spec("bay-crane", ["planner.live_rate={L1=0.1}"])
     with pytest.raises(ExportError, match="take neither live_rate nor a sensor, as yet"):
         whole_text(spec)
+
+
+@pytest.mark.slow
+def test_a_machine_without_stated_errors_moves_too():
+    block = BlockInstance(whole_text(parse_spec(BAY)))
+    given = block.inputs | {"fActPosition": 10.0}
+    rows = [given] + 100 * [given | {"bEnable": 1.0}]
+    rows += 3000 * [given | {"bEnable": 1.0, "bExecute": 1.0, "fTarget": 12.0}]
+    issued = block.call(np.array([list(row.values()) for row in rows]))[-1]
+    last = dict(zip(block.outputs, issued.tolist(), strict=True))
+    assert last["bDone"] == 1.0 and abs(last["fPosition"] - 12.0) < 1e-9

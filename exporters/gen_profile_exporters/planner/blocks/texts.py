@@ -21,6 +21,7 @@ LONGEST, FEWEST = (
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.2  # times that, of machines between both ends of the errors, which have no rows
+LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
 
@@ -97,7 +98,7 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
     shown = [*ends, *sizes.more * [2 * modes]]
     rows, slots = sizes.rows(modes), longest(constants)
     plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
-    share = constants.sway_share / len(constants.axes)
+    share = (constants.sway_share or LEAST_SHARE * constants.sway_limit) / len(constants.axes)
     stops = _stop_share(constants)
     parts = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in sizes.watched)]
     bounds = np.outer(share * np.array(parts), _shares(constants)).ravel()
