@@ -7,9 +7,8 @@ from .api.comparisons import compare as compare
 from .api.comparisons import robustness as robustness
 from .api.cosimulation import cosimulate as cosimulate
 from .api.cosimulation import residual_sways as residual_sways
-from .api.designs import deploy_planner as deploy_planner
 from .api.designs import design as design
-from .api.designs import export_fmu as export_fmu
+from .api.fmu import export_fmu as export_fmu
 from .api.measurements import identify as identify
 from .api.measurements import parse_period as parse_period
 from .api.measurements import parse_reading as parse_reading
@@ -18,6 +17,7 @@ from .api.motions import evaluate as evaluate
 from .api.motions import linearize as linearize
 from .api.motions import plan as plan
 from .api.pictures import plot as plot
+from .api.planner import deploy_planner as deploy_planner
 from .api.sweeps import lookup as lookup
 from .api.sweeps import run_sweep as run_sweep
 from .api.sweeps import write_library as write_library
