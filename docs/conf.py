@@ -67,8 +67,8 @@ def add_navigation(_: Sphinx, page: str, source: list[str]) -> None:
 
 
 def show_titles(_: Sphinx, __: str, source: list[str]) -> None:
-    """Show a block's title, which tells where it goes; there are no colours for CSV."""
-    source[0] = source[0].replace("```csv", "```text")
+    """Show a block's title, which tells where it goes; there are no colours for CSV and Structured Text."""
+    source[0] = source[0].replace("```csv", "```text").replace("```st\n", "```text\n")
     source[0] = re.sub(
         r'^```(\w+) title="(.+)"$', r"```{code-block} \1\n:caption: \2\n", source[0], flags=re.MULTILINE
     )

@@ -46,8 +46,9 @@ def main(folder: Path) -> None:
     )
     print(f"at {np.abs(velocity).max():.3f} m/s, within {np.abs(np.diff(position)).max() / 0.01:.3f} m/s")
     print(f"EtherCAT's shape: from {counts[0]} over {counts.max()} to {counts[-1]} counts")
-    moves = np.flatnonzero(np.diff(counts))[0] - np.flatnonzero(np.diff(position))[0]
-    same = np.rint(1e6 * position)[: len(counts) - moves] == counts[moves:]
+    rounded = np.rint(1e6 * position)
+    moves = np.flatnonzero(np.diff(counts))[0] - np.flatnonzero(np.diff(rounded))[0]
+    same = rounded[: len(counts) - moves] == counts[moves:]
     if not same[:240].all() or abs(position[-1] - 0.4) > 1e-6 or counts[-1] != 400_000:
         sys.exit("The programs do not issue the same setpoints, or do not arrive.")
     print(f"up to the other target the same setpoints, {moves} cycles later")
