@@ -23,7 +23,7 @@ from gen_profile_exporters.registry import containers, formats
 SPEC = preset_spec("paper", ["export.cycle_time=0.01"])
 COMPANIONS = {
     "paper.log": ["paper.asc", "paper.blf", "paper.dbc", "paper.startup.csv", "paper.node1.cdcf"],
-    "paper.scl": ["paper_cam.scl"],
+    "paper.scl": ["paper_velocity.scl", "paper_cam.scl"],
     "FB_paper.TcPOU": ["FB_paper_Axis.TcPOU", "GVL_paper.TcGVL"],
 }
 PAIRS = [(main, one) for main, names in COMPANIONS.items() for one in names]
