@@ -74,7 +74,7 @@ def test_axes_go_the_motion_s_way_and_stay(move):
 
 @pytest.mark.parametrize(
     ("mishap", "error"),
-    [({"bDriveError": True}, 20), ({"bRunning": False}, 21), ({"fActPosition": 9.0}, 24)],
+    [({"bDriveError": True}, 20), ({"bRunning": False}, 21), ({"fActPosition": 9.0}, 25)],
 )
 @pytest.mark.parametrize("move", [ONE, TWO], ids=["one", "two"])
 def test_a_mishap_ends_the_motion(move, mishap, error):
@@ -86,7 +86,7 @@ def test_a_mishap_ends_the_motion(move, mishap, error):
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=True, **wrong)
     assert (outputs["berror"], outputs["nerrorid"]) == (True, error)
     assert bench.asked[-1] == [0.0] * move.axes
-    kept = bench.asked[-40:] if error == 24 else [row[:-1] for row in bench.asked[-40:]]
+    kept = bench.asked[-40:] if error == 25 else [row[:-1] for row in bench.asked[-40:]]
     if kept[0]:  # what is still guided brakes on the path; what failed is let go
         steps = np.abs(np.diff(kept, axis=0)).max() / CYCLE
         assert steps < 3.0 * np.abs(sample(move, CYCLE).acceleration).max()

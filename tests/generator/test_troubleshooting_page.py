@@ -29,12 +29,15 @@ PLAYBACK, PLAYBACK_WRAPPER = (
 PLANNER, PLANNER_WRAPPER = (
     (BLOCKS / "planner" / name).read_text("utf-8") for name in ("text/interface.st", "axis_wrapper.st")
 )
+WRAPPERS = numbers(PLAYBACK_WRAPPER, "nErrorId") | set(
+    re.findall(r"^@part \w+_more\n(\d+) ", PLAYBACK_WRAPPER, flags=re.MULTILINE)
+)
 LISTED = [
     {code.value for code in Code},
     numbers(PLAYBACK, "nErrorId") | {"6"},  # of a library alone, explained where profiles are selected
-    numbers(PLAYBACK_WRAPPER, "nErrorId"),
+    WRAPPERS,
     numbers(PLANNER, "nErrorId"),
-    numbers(PLANNER_WRAPPER, "nErrorId") - numbers(PLAYBACK_WRAPPER, "nErrorId"),
+    numbers(PLANNER_WRAPPER, "nErrorId") - WRAPPERS,
     numbers(PLANNER, "nPromise"),
 ]
 
