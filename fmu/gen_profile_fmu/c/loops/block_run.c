@@ -70,11 +70,11 @@ typedef struct {
     bool promise;                        /* at the end */
 } Found;
 
-static double greater(double peak, double value) { return isnan(value) ? INFINITY : fmax(peak, fabs(value)); }
+static double greater(double peak, double value) { return isnan(value) ? HUGE_VAL : fmax(peak, fabs(value)); }
 
 static void begin_axes(const Block *block, Found *found) {
     for (size_t i = 0; i < block->n_axes; i++) {
-        found->axes[i] = (Extremes){.lowest = INFINITY, .highest = -INFINITY};
+        found->axes[i] = (Extremes){.lowest = HUGE_VAL, .highest = -HUGE_VAL};
     }
 }
 
@@ -83,8 +83,8 @@ static void take_axis(const size_t *places, const double *before, const double *
     const double position = now[places[0]], velocity = now[places[1]], acceleration = now[places[2]];
     axis->velocity = greater(axis->velocity, velocity);
     axis->acceleration = greater(axis->acceleration, acceleration);
-    axis->lowest = isnan(position) ? -INFINITY : fmin(axis->lowest, position);
-    axis->highest = isnan(position) ? INFINITY : fmax(axis->highest, position);
+    axis->lowest = isnan(position) ? -HUGE_VAL : fmin(axis->lowest, position);
+    axis->highest = isnan(position) ? HUGE_VAL : fmax(axis->highest, position);
     if (before == NULL) return;
     const double change = acceleration - before[places[2]];
     const double half = 0.5 * cycle;

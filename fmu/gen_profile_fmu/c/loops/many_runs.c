@@ -45,7 +45,7 @@ static double beside(const double *zone, double x) {
 
 /* Least room to all zones in a step, in which bodies go straight: beside a zone or above it. */
 static double room(const Plan *plan, const double *was, const double *is) {
-    double least = INFINITY;
+    double least = HUGE_VAL;
     for (const double *zone = plan->zones; zone < plan->zones + plan->n_zones * ZONE; zone += ZONE) {
         const size_t x = (size_t)zone[X], z = (size_t)zone[Z];
         const double first = beside(zone, was[x]), last = beside(zone, is[x]);
@@ -68,7 +68,7 @@ static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values
     for (size_t i = 0; i <= last; i++) peaks[i] = 0.0;
     int status = begin(fmu, times[0], plan->parameter_references, plan->n_parameters, of_run(&plan->parameters, run));
     if (plan->n_zones > 0) {
-        peaks[last] = INFINITY;
+        peaks[last] = HUGE_VAL;
         if (status == GOOD) status = get(fmu, plan->output_references, plan->n_outputs, is);
     }
     for (size_t k = 0; k < plan->steps && status == GOOD; k++, input += plan->n_inputs) {
