@@ -21,7 +21,7 @@ static void model_outputs(Model *model) { motion_outputs(model); }
 static int model_output_derivative(const Model *model, unsigned output, int order, double *value) {
     double position[N_A][N_POWERS];
     const int index = (int)output - COMMAND;
-    if (index < 0 || index >= N_COMMANDS * N_A) return 0;
+    if (index < 0 || index >= (int)N_COMMANDS * N_A) return 0;
     motion_from_now(model, position);
     *value = derivative_now(position[index % N_A], index / N_A + order);
     return 1;
