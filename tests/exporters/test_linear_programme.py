@@ -66,6 +66,16 @@ def one_with(result, programmes, **changes):
     raise AssertionError("no such programme")
 
 
+def test_polygons_that_are_next_to_nothing_are_met_or_not_found_and_nothing_divides_by_zero(programmes):
+    """One side of a polygon then weighs 1e16 times what the others do."""
+    for number in (113, 138, 165, 667, 973, 1398, 1732, 2455, 2571, 2612):
+        problem = problem_of(77, number)
+        for share in (1e-4, 1e-6):
+            tight = attrs.evolve(problem, radii=share * problem.radii)
+            result, speeds, _ = programmes.solve(tight, iterations=21)
+            assert result != FOUND or tight.shortfall(speeds) <= MET
+
+
 @pytest.mark.parametrize("result", [FOUND, NONE])
 def test_it_does_the_same_however_few_operations_a_call_has(programmes, result):
     problem = one_with(result, programmes)

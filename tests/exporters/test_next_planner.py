@@ -197,6 +197,33 @@ def test_a_prompt_stop_is_never_faster_than_the_axis_was_and_says_what_is_left(b
     assert stop["bPromise"][-1] == (stop["fSwayLeft"][-1] <= min(spec.check.residual_sway.values()))
 
 
+def test_no_speed_is_above_a_limit_however_little_that_falls(bay):
+    """Neither the ramp to it, nor one that is kept, nor the stop behind it."""
+    spec, compiled = bay
+    for seed in range(3):
+        history = History(spec, compiled, np.random.default_rng([17, seed]))
+        side, most = (1.0 if history.place < 20.0 else -1.0), history.limits.velocity
+        ramp = history.hold(10.0, bVelocity=1.0, fVelocityCommand=side * most, rOverride=0.3)
+        assert np.abs(ramp["fVelocity"]).max() <= 0.3 * most * ROUNDING
+        for override in (0.298, 0.27):
+            kept = history.hold(10.0, bVelocity=1.0, fVelocityCommand=side * most, rOverride=override)
+            assert np.abs(kept["fVelocity"][-1250:]).max() <= override * most * ROUNDING
+            assert kept["fVelocity"][-1] == pytest.approx(side * override * most)
+        stop = history.hold(30.0, bVelocity=0.0, bStop=1.0)
+        assert np.abs(stop["fVelocity"]).max() <= 0.27 * most * ROUNDING
+        history.keeps()
+
+
+def test_the_slowest_speed_of_a_stick_moves_the_axis(bay):
+    spec, compiled = bay
+    for share in (2e-3, 1e-4):
+        history = History(spec, compiled, np.random.default_rng(29))
+        speed = share * history.limits.velocity
+        moved = history.hold(20.0, bVelocity=1.0, fVelocityCommand=speed)
+        assert moved["fVelocity"][-1] == pytest.approx(speed)
+        history.keeps()
+
+
 def test_a_lower_limit_is_come_to_on_the_way_and_a_place_that_is_closed_too_late_is_said(bay):
     spec, compiled = bay
     history = History(spec, compiled, np.random.default_rng(100))
