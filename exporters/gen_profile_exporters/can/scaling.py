@@ -98,22 +98,24 @@ def demand_of(motion: Setpoints, target: Target) -> Demand:
     )
 
 
-def exact_counts(values: Array, ratio: Fraction) -> Integers:
+def exact_counts(values: Array, ratio: Fraction, what: str = "a setpoint") -> Integers:
     """Multiply doubles by a ratio and round to whole numbers, half to even, without any other error.
 
     Parameters
     ----------
     values : array
     ratio : Fraction
+    what : str
+        They are, for errors.
 
     Raises
     ------
     ExportError
-        A product lies outside 32 bits.
+        A product lies far outside 32 bits.
     """
     product = np.asarray(values, dtype=np.float64) * float(ratio)
     if not (np.abs(product) < 2.0**40).all():
-        raise ExportError("A setpoint lies far outside 32 bits; check axis.counts_per_metre.")
+        raise ExportError(f"{what}: it lies far outside 32 bits; {TOO_FAR}.")
     counts = np.rint(product).astype(np.int64)
     for index in zip(*np.nonzero(np.abs(product - np.floor(product) - 0.5) < NEAR_TIE), strict=True):
         counts[index] = round(Fraction(float(values[index])) * ratio)
@@ -147,11 +149,24 @@ def travelled(velocity: Integers, period: float, target: Target) -> Array:
 
 
 def travel_counts(axis: AxisScale, can: CanSpec) -> tuple[int, int] | None:
-    """Software position limits 607Dh, lower first, or None."""
+    """Software position limits 607Dh, lower first, or None.
+
+    Raises
+    ------
+    ExportError
+        One does not fit 32 bits, and would be another place in the drive.
+    """
     if axis.name not in can.travel:
         return None
-    ends = exact_counts(np.array(can.travel[axis.name]), exact(axis.counts_per_si))
-    return int(ends.min()), int(ends.max())
+    what, travel = f"can.travel.{axis.name}", can.travel[axis.name]
+    ends = exact_counts(np.array(travel), exact(axis.counts_per_si), what)
+    least, greatest = int(ends.min()), int(ends.max())
+    if least < INT32.min or greatest > INT32.max:
+        raise ExportError(
+            f"{what}: {travel[0]:g} to {travel[1]:g} are {least} to {greatest} counts, more than 32 bits "
+            f"hold ({INT32.min} to {INT32.max}); narrow the travel, or {TOO_FAR}."
+        )
+    return least, greatest
 
 
 def magnitude_counts(value: float, axis: AxisScale) -> int:
@@ -175,7 +190,7 @@ def _greatest_acceleration(position: Integers, period: float) -> float:
 
 
 def _positions(values: Array, axis: AxisScale, can: CanSpec, period: float) -> Integers:
-    counts = exact_counts(values, exact(axis.counts_per_si))
+    counts = exact_counts(values, exact(axis.counts_per_si), f"axis {axis.name}")
     require_within(INT32, counts, f"axis {axis.name}", TOO_FAR, period)
     if can.encoder is not None or can.gear is not None or can.feed is not None:
         increments = np.array([round(int(count) * position_factor(can)) for count in counts], dtype=object)
@@ -233,7 +248,7 @@ def _offset(field: Field, motion: SampledProfile, target: Target) -> Integers:
             cure = "lower can.torque_per_acceleration"
             ratio = exact(target.can.torque_per_acceleration or 0.0) * (1 if ratio > 0 else -1)
         assert values is not None  # samples of a profile have them all
-        counts = exact_counts(values[:, column], ratio)
+        counts = exact_counts(values[:, column], ratio, f"axis {axis.name}, {what}")
         require_within(limits, counts, f"axis {axis.name}, {what}", cure, motion.cycle_time)
         columns.append(counts)
     return np.column_stack(columns)

@@ -80,7 +80,7 @@ class Entry:
     bits : int
         8, 16 or 32.
     value : int
-        Negative ones in two's complement.
+        Negative ones in two's complement; one that its bits do not hold is refused by an `ExportError`.
     meaning : str
     optional : bool
         A drive without this object will do.
@@ -91,10 +91,18 @@ class Entry:
     index: int
     sub: int
     bits: int
-    value: int
+    value: int = attrs.field()
     meaning: str
     optional: bool = False
     fixed: bool = False
+
+    @value.validator
+    def _fits(self, _: object, value: int) -> None:
+        if not -(1 << self.bits - 1) <= value < 1 << self.bits:
+            raise ExportError(
+                f"{self.index:04X}h:{self.sub:02X}, {self.meaning}: {value} does not fit {self.bits} bits; "
+                "state less in the spec, or lower axis.counts_per_metre."
+            )
 
     @property
     def is_code(self) -> bool:

@@ -303,6 +303,19 @@ class TestScaling:
         with pytest.raises(ExportError, match="far outside 32 bits"):
             scaling.exact_counts(np.array([1e9]), Fraction(10**6))
 
+    def test_a_travel_that_a_drive_would_take_for_another_is_refused(self):
+        """3000 m of 1 µm are −1 294 967 296 to a drive: its upper end would lie below its lower one."""
+        assert files(travel={"cart": (-2147.0, 2147.0)})
+        sentence = r"can\.travel\.cart: -3000 to 3000 are -3000000000 to 3000000000 counts, more than 32 bits"
+        with pytest.raises(ExportError, match=sentence):
+            files(travel={"cart": (-3000.0, 3000.0)})
+        with pytest.raises(ExportError, match=r"axis cart: it lies far outside 32 bits; lower axis\.counts"):
+            files(counts_per_si=1e15)
+
+    def test_an_entry_that_its_bits_do_not_hold_is_refused(self):
+        with pytest.raises(ExportError, match=r"6085h:00, deceleration .*: 5000000000 does not fit 32 bits"):
+            files(quick_stop=5000.0)
+
     def test_the_drives_increments_must_fit(self):
         assert files(encoder=(65536, 1), gear=(3, 1), feed=(1000, 1))
         with pytest.raises(ExportError, match=r"axis cart, in the drive's increments: .* outside 32 bits"):
