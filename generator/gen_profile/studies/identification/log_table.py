@@ -22,6 +22,7 @@ from gen_profile.support.suggestion import finite_number, suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
 MOST_BYTES = 1 << 27
+MOST_SEEN = 10_000  # lines of a file, spread over it, which tell what stands between its columns
 # units as loggers write them, in brackets or behind a name, and what they are called here
 SPELLINGS = {"°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad"}
 SPELLINGS |= {"°/s": "deg/s", "dps": "deg/s"}
@@ -231,9 +232,10 @@ def read_table(text: str, source: str) -> LogTable:
     lines = rows.lines
     if not lines:
         raise OutputError("{source}: the log is empty.", source=source)
-    common = (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines))
+    seen = lines[:: math.ceil(len(lines) / MOST_SEEN)]
+    common = (known for known in SEPARATORS if 2 * sum(known in line for line in seen) >= len(seen))
     rows.separator = next(common, ",")
-    if rows.separator == "," and 2 * sum(_SPACED.fullmatch(line) is not None for line in lines) >= len(lines):
+    if rows.separator == "," and 2 * sum(_SPACED.fullmatch(line) is not None for line in seen) >= len(seen):
         rows.separator = " "
     return LogTable(rows=rows, decimal_comma=rows.separator != ",", source=source)
 

@@ -19,6 +19,7 @@ from gen_profile.studies.identification.log_signal import (
     axis_note,
     jumps,
     likely_columns,
+    resolution,
     same_sensor,
 )
 from gen_profile.studies.identification.log_table import LogTable, read_table
@@ -95,7 +96,7 @@ class SwingLog(Sampled):
 
     @resolution.default
     def _resolution(self) -> float:
-        return float(np.diff(np.unique(self.values)).min(initial=np.inf))
+        return resolution(self.values)
 
     @logged.default
     def _logged(self) -> int:
@@ -296,7 +297,7 @@ def cut_swing(
         )
         notes = (*notes, Phrase(template, before=-float(times[0])))
     require_samples(source, len(times), notes)
-    beside = jumps(times, values, float(np.diff(np.unique(values)).min(initial=np.inf)))
+    beside = jumps(times, values, resolution(values))
     if 0 < len(beside) <= SHARE * len(times):
         template = "{count} samples that jump aside, the first at {time:.4g} s, are left out"
         notes = (*notes, Phrase(template, count=len(beside), time=float(times[beside[0]])))
