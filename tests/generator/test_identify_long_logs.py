@@ -1,5 +1,6 @@
 """Long logs: memory that does not follow their length, and averages that tell what the whole log does."""
 
+import re
 import subprocess
 import sys
 
@@ -9,8 +10,16 @@ from command_line import PROGRAM
 
 from gen_profile.spec.reading import preset_spec
 from gen_profile.studies.identification.identify import identify
+from gen_profile.studies.identification.log_signal import resolution
 from gen_profile.studies.identification.measurements import SwingLog
-from gen_profile.studies.identification.swing_model import MOST_SAMPLES, SwingingMachine, shortened
+from gen_profile.studies.identification.swing_model import (
+    MOST_SAMPLES,
+    SwingingMachine,
+    require_pace,
+    shortened,
+    swing_model,
+)
+from gen_profile.support.errors import InfeasibleProblem
 
 LENGTH, DAMPING = 3.4, 0.004  # m, of the rope; 1/s
 PRESET, HOISTED = "single-pendulum-crane", 1.0  # m, of rope that the hoist adds at the move's target
@@ -37,6 +46,38 @@ def test_a_short_log_is_taken_as_it_is():
     log = SwingLog(times=times, values=np.sin(times), quantity="angle", load="payload")
     machine = SwingingMachine(plant=spec.machine(), parameters=spec.plant.parameters, q_a=spec.move.target)
     assert shortened(log, machine) is log
+
+
+def test_the_least_step_is_that_between_different_values():
+    values = np.random.default_rng(1).integers(-50, 50, 400) * 0.03
+    assert resolution(values) == np.diff(np.unique(values)).min()
+    assert resolution(np.full(20, 0.1)) == np.inf
+
+
+def log_of(times, values):
+    return SwingLog(times=times, values=values, quantity="angle", load="payload")
+
+
+@pytest.mark.parametrize("factor", [20.0, 0.1])
+def test_a_clock_that_is_wrong_is_named_before_anything_is_searched(factor):
+    times, values = swing(100.0, 40.0)
+    period = 2.0 * np.pi / np.sqrt(9.81 / LENGTH)
+    with pytest.raises(InfeasibleProblem, match=r"By its clock, .* unit of the log's times") as refusal:
+        identify(preset_spec(PRESET), [log_of(times * factor, values)], free=["L0", "c"])
+    told = float(re.search(r"swings once in ([\d.]+) s", str(refusal.value))[1])
+    assert told == pytest.approx(factor * period, rel=0.1)  # to a bin of a spectrum of eleven swings
+
+
+@pytest.mark.parametrize("beside", ["drift", "wind", "another rope", "few swings"])
+def test_a_clock_is_not_blamed_for_what_may_be_so(beside):
+    times, values = swing(100.0, 6.0 if beside == "few swings" else 40.0)
+    drift = 0.2 * np.sin(0.02 * times)  # twenty times the swing, and over the log no whole period
+    wind = 0.02 * np.cumsum(np.random.default_rng(2).standard_normal(len(times))) / 10.0
+    values = values + {"drift": drift, "wind": wind}.get(beside, 0.0)
+    log = log_of(times * (4.0 if beside == "another rope" else 1.0), values)  # sixteen times as long
+    spec = preset_spec(PRESET)
+    machine = SwingingMachine(plant=spec.machine(), parameters=spec.plant.parameters, q_a=spec.move.target)
+    require_pace(swing_model(machine, shortened(log, machine)))
 
 
 @pytest.mark.slow

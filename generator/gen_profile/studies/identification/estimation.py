@@ -14,7 +14,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.studies.identification.fit import Fit, fit_of
 from gen_profile.studies.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.studies.identification.misfit import Misfit, elsewhere, explanations, misfits
-from gen_profile.studies.identification.swing_model import SwingingMachine, swing_model
+from gen_profile.studies.identification.swing_model import SwingingMachine, require_pace, swing_model
 from gen_profile.studies.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.support.errors import InfeasibleProblem
 from gen_profile.support.phrase import AND, OR_WITH, Phrase, joined
@@ -95,6 +95,8 @@ def estimate(
         The measurements do not determine the parameters.
     """
     models = [swing_model(machine, log) for log in logs]
+    for model in models:
+        require_pace(model)
     fit = fit_of(machine, names, readings, models)
     progress("fitting")
     try:

@@ -25,6 +25,8 @@ DERIVATIVES = {"rate": 1, "acceleration": 2}  # by time; of the angle, or the sw
 OF_SWAY = ("sway", "acceleration")
 MOST_SAMPLES, SWINGS = 6000, 300  # of a log that is fitted: twenty averages of each swing
 SWINGS_A_DRIFT, MOST_DRIFTS = 2.0, 4  # a zero drifts slower than the load swings
+FEWEST_SWINGS, CLEAR = 4, 0.5  # of a log, and share of its power at one frequency, which tell its pace
+PACE = 5.0  # times slower or faster than the machine, of which no rope is so wrong as a clock may be
 SHOWN = 1e-6  # relative size from which on a log shows a part of its start
 
 
@@ -216,6 +218,37 @@ def swing_model(machine: SwingingMachine, log: SwingLog) -> SwingModel:
     size = np.linalg.norm(_linear_answers(machine, log), axis=0)
     shown = np.flatnonzero(size > SHOWN * size.max())
     return SwingModel(machine=machine, log=log, shown=shown, period=period)
+
+
+def require_pace(model: SwingModel) -> None:
+    """Refuse a log that swings many times slower or faster than its machine: its clock is wrong.
+
+    A search from so far away takes minutes and finds nothing. Logs of few swings, or of many frequencies,
+    are left to the fit.
+
+    Raises
+    ------
+    InfeasibleProblem
+    """
+    log, natural = model.log, model.machine.linear.frequencies
+    times = np.linspace(0.0, log.times[-1], len(log.times))
+    values = np.interp(times, log.times, log.values)
+    places = 2.0 * times / times[-1] - 1.0
+    drift = np.polynomial.legendre.legfit(places, values, MOST_DRIFTS)
+    swinging = (values - np.polynomial.legendre.legval(places, drift)) * np.hanning(len(times))
+    power = np.square(np.abs(np.fft.rfft(swinging)))
+    peak = int(np.argmax(power))
+    seen = 2.0 * np.pi * peak / float(times[-1])
+    if peak < FEWEST_SWINGS or power[peak - 2 : peak + 3].sum() < CLEAR * power.sum():
+        return
+    if natural[0] / PACE <= seen <= PACE * natural[-1]:
+        return
+    near = natural[0] if seen < natural[0] else natural[-1]
+    template = (
+        "By its clock, the log swings once in {seen:.3g} s, and this machine in {period:.3g} s: look at the "
+        "column and the unit of the log's times, or mend the spec."
+    )
+    raise InfeasibleProblem(template, seen=2.0 * np.pi / seen, period=2.0 * np.pi / float(near))
 
 
 def shortened(log: SwingLog, machine: SwingingMachine, most: int = MOST_SAMPLES) -> SwingLog:
