@@ -33,8 +33,9 @@ def test_a_spec_reads_back_equal():
         ("from,to,height\n8,10.5,6\n13;15".replace(";", ",") + ",9\n", ((8.0, 10.5, 6.0), (13.0, 15.0, 9.0))),
         ("# by a scanner\nplace;height\n" + "\n".join(f"{x};{z}" for x, z in PROFILE), AS_STACKS),
         ("\ufeff" + "\n".join(f"{x},{z}" for x, z in PROFILE), AS_STACKS),
+        ("\n".join(f"{x}\t{z}" for x, z in PROFILE), AS_STACKS),
     ],
-    ids=["stacks", "semicolons", "no header"],
+    ids=["stacks", "semicolons", "no header", "tabs"],
 )
 def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
     (tmp_path / "bay.csv").write_text(text, "utf-8")
@@ -42,6 +43,30 @@ def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
     del document["path"]["stacks"]
     document["path"]["file"] = "bay.csv"
     assert spec_from_dict(document, tmp_path).path.stacks == stacks
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "path.file: bay.csv holds no rows of numbers"),
+        ("from,to,height\n", "path.file: bay.csv holds no rows of numbers"),
+        ("20.0,22.5,1O.4\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two or three numbers"),
+        ("1,8,10.5,6\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two or three numbers"),
+        ("from,to,height\n\n# lee\n8,10.5\n8,10.5,x\n", "path.file: bay.csv: line 5 must be two or three"),
+        ("from,to,height\n8,10.5\n10.5,13,9\n", "path.file: bay.csv: line 3 must be two or three numbers"),
+        ("from_mm,to_mm,height_mm\n8000,10500,6000\n", "path.file: bay.csv: line 1 names another unit than m"),
+        ("Place [cm];Height [cm]\n8;6\n", "path.file: bay.csv: line 1 names another unit than m"),
+        ("height,from,to\n6,8,10.5\n", "path.file: bay.csv: line 1 names a column behind the height"),
+    ],
+)
+def test_no_row_of_a_file_is_left_out_or_misread(tmp_path, text, sentence):
+    (tmp_path / "bay.csv").write_text(text, "utf-8")
+    document = quay(move={"start": [20.0, 10.0]}).to_dict()
+    del document["path"]["stacks"]
+    document["path"]["file"] = "bay.csv"
+    with pytest.raises(gp.SpecError) as refusal:
+        spec_from_dict(document, tmp_path)
+    assert [fault.startswith(sentence) for fault in refusal.value.faults] == [True], refusal.value.faults
 
 
 def test_a_profile_counts_the_higher_end_of_every_piece():

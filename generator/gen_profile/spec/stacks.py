@@ -6,9 +6,8 @@ A stack that the load stands on, or hangs over, at the start or the target is le
 clear of it, it stays within the clearance for the sides of where it stood.
 """
 
-import csv
+import re
 from collections.abc import Mapping, Sequence
-from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -40,6 +39,7 @@ Size = Annotated[
     tuple[NotNegative, NotNegative],
     Words("must be two numbers in m, such as [2.5, 2.6]: width and height, found {found}"),
 ]
+OTHER_UNIT = re.compile(r"(?<![^\W_])(?:[mcdkuµ]m|ft|feet|foot|inch(?:es)?)(?![^\W_])")  # in a heading
 SOURCES = ("stacks", "profile", "file")
 
 
@@ -117,23 +117,43 @@ def _rows(path: Path, faults: Faults) -> list[list[float]]:
         problem = getattr(error, "strerror", "it is no UTF-8 text")
         faults.add("path.file", "{path} cannot be read ({problem})", path=path, problem=problem)
         return []
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    split = csv.reader(StringIO("\n".join(lines)), delimiter=";" if ";" in text else ",")
+    mark = next((mark for mark in ";\t" if mark in text), ",")
     rows: list[list[float]] = []
-    for number, cells in enumerate(split):
-        try:
-            row = [float(cell) for cell in cells]
-        except ValueError:
-            row = []
-        if len(row) in (2, 3) and (not rows or len(row) == len(rows[0])):
+    heading = True
+    for number, line in enumerate(text.splitlines(), start=1):
+        cells = [cell.strip(' "') for cell in line.split(mark)]
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = [value for value in map(_number, cells) if value is not None]
+        if heading and not row:
+            problem = _misleading([cell.lower() for cell in cells])
+        else:
+            fits = len(row) == len(cells) == len(rows[0] if rows else cells) and len(row) in (2, 3)
+            problem = None if fits else "{path}: line {line} must be two or three numbers in m, as all others"
             rows.append(row)
-        elif number > 0:
-            template = "{path}: line {line} must be two or three numbers in m, as all others"
-            faults.add("path.file", template, path=path.name, line=number + 1)
-            break
+        heading = False
+        if problem is not None:
+            faults.add("path.file", problem, path=path.name, line=number)
+            return []
     if not rows:
         faults.add("path.file", "{path} holds no rows of numbers", path=path.name)
     return rows
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def _misleading(heading: Sequence[str]) -> str | None:
+    """Tell what a heading says that is not so: another unit, or another order."""
+    if any(OTHER_UNIT.search(cell) for cell in heading):
+        return "{path}: line {line} names another unit than m; give places and heights in m"
+    if any(cell.startswith("height") for cell in heading[:-1]):
+        return "{path}: line {line} names a column behind the height; give from, to, height, or place, height"
+    return None
 
 
 def _pieces(points: Any, where: str, structurer: Structurer) -> list[tuple[float, float, float]]:
