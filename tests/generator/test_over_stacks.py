@@ -6,7 +6,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from generator.quay import RAIL, ROPE, STACKS, followed, quay, shortage
+from generator.quay import RAIL, ROPE, SIDEWAYS, STACKS, WIDTH, followed, quay, shortage
 from scipy.integrate import solve_ivp
 
 import gen_profile as gp
@@ -178,6 +178,22 @@ class TestCheck:
                 response = fmu.run(setpoints, values, max_step=1e-3, settle=0.01)
                 bodies = body_places(plant, response.q_u, response.position, row)
                 assert nearest(spec, response.times, bodies).room == pytest.approx(found, abs=1e-6)
+
+
+@pytest.mark.parametrize("end", ["start", "target"])
+def test_a_load_may_begin_and_end_at_the_clearance_itself(end):
+    beside = 20.1 - WIDTH / 2.0 - SIDEWAYS
+    ends = {"start": [beside, 30.1], "target": [36.0, 18.7]}
+    if end == "target":
+        ends = {"start": [0.0, 30.1], "target": [22.5 + WIDTH / 2.0 + SIDEWAYS, 26.0]}
+    plan = gp.plan(quay([[20.1, 22.5, 10.4]], move=ends))
+    times = np.linspace(0.0, plan.motion.duration, 20001)
+    for rope in (0.9, 1.0, 1.1):
+        x, z, _ = followed(plan.motion, rope * ROPE, times)
+        assert shortage(x, z, plan.spec.path, *(ends[key][0] for key in ends)) <= NEARER
+    farther = ends["start"][0] - 0.01, ends["target"][0] + 0.01
+    move = {"start": [farther[0], ends["start"][1]], "target": [farther[1], ends["target"][1]]}
+    assert plan.motion.duration < 1.01 * gp.plan(quay([[20.1, 22.5, 10.4]], move=move)).motion.duration
 
 
 def test_hook_and_load_of_a_machine_of_ones_own_keep_the_clearance(tmp_path):

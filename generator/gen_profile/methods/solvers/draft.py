@@ -70,7 +70,7 @@ class Plan(Drawable):
     spec : Spec
         With a duration, found where the shortest was asked for.
     solution : Solution or None
-        What the solver found, or why it found nothing; None where a shaper made the motion.
+        What the solver found, or why it found nothing; None where a shaper made the motion, or over stacks.
     found : Profile or None
         Motion of the axes, there in what `gen_profile.plan` gives.
     solver_time : float

@@ -106,7 +106,7 @@ class Solution(Summarised):
         angles are small; None where the worst machine was not what counted.
     other_costs : tuple of float or None
         Of the motion to which another start led, where one was tried because loads swing far; empty where it
-        led to none, or was not tried.
+        led to none, or limits keep it from being tried; None where loads do not swing far.
     advice : str
         What to change, a sentence; empty on success.
     suggestions : tuple of Suggestion

@@ -1,6 +1,7 @@
 """A path over stacks as the programs take it: machines, their ends, and when each load is high enough."""
 
 import math
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -167,8 +168,18 @@ def bay_of(spec: Spec, reserve: float = 0.0) -> Bay:
         others=swing_of(plant, trolley, ()),
         machines=parameter_rows(plant, named),
         hang=hang,
-        zones=zones(wider, ends),
+        zones=tuple(
+            _up_to_ends(wide, zone, [end[zone.body][0] for end in ends])
+            for wide, zone in zip(zones(wider, ends), zones(path, ends), strict=True)
+        ),
     )
+
+
+def _up_to_ends(wide: Zone, zone: Zone, places: Sequence[float]) -> Zone:
+    """Widen a zone up to where its body starts or ends at most, which else would be within it."""
+    low = max([wide.low, *(x for x in places if x <= zone.low)])
+    high = min([wide.high, *(x for x in places if x >= zone.high)])
+    return attrs.evolve(wide, low=low, high=high)
 
 
 def _machines(spec: Spec, plant: Plant) -> list[dict[str, float]]:

@@ -213,6 +213,8 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
         if near.room >= 0.0:
             break
         reserve += OVERALL - near.room
+    if near.room < -ENOUGH:
+        raise _none_found()
     passage = Passage(
         lift=course.up.peak(),
         one_by_one=_one_by_one(planner.bay),
