@@ -212,6 +212,11 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
         (lambda spec: gp.cosimulate(spec, STANDING, {"L1": -1.0}), "must be from 0.01 to 200 m, found -1"),
         (lambda spec: gp.cosimulate(spec, STANDING, {"L1": [0.4, 0.5]}), "residual_sways takes many"),
         (lambda spec: gp.linearize(spec.machine(), {"m1": 0.1}), "m2 must be a finite number"),
+        (
+            lambda spec: gp.linearize(spec.machine(), spec.plant.parameters, [np.nan]),
+            r"at: must hold finite numbers, found \[nan\]",
+        ),
+        (lambda spec: gp.export_fmu(spec, "plant", author=3), "author: a name is expected, found 3"),
         (lambda spec: gp.linearize(spec, {}), r"such as spec\.machine\(\) gives, found a Spec"),
         (lambda spec: gp.identify(spec, ["L1=0.47±0.005"]), "what parse_reading, .* found 'L1=0.47"),
         (

@@ -178,6 +178,7 @@ FAULTS = [
     ),  # meant as ms
     ("can.node", 128, r"can\.node: must be at least 1 and at most 127, found 128\."),
     ("can.node", 1.5, r"can\.node: must be a whole number, found 1\.5\."),
+    ("can", {"eds": __file__, "eds_sha256": [1]}, r"can\.eds_sha256: must be text, found \[1\]\."),
     ("can.node", 10**400, r"can\.node: must be at least 1 .*, found a whole number of more than 18 digits\."),
     # things of another kind
     ("move", 3, r"move: must be a table, found 3\."),

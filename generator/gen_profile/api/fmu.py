@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from gen_profile.delivery.designs.fmu import Export, platform_names
 from gen_profile.delivery.designs.fmu import export_fmu as _export_fmu
-from gen_profile.spec.arguments import as_names, as_path
+from gen_profile.spec.arguments import as_names, as_path, as_text
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.support.errors import SpecError
@@ -69,7 +69,7 @@ def export_fmu(
         version=_one_of(Version, version, "version"),
         input_kind=_one_of(InputKind, input_kind, "input_kind"),
         platforms=platform_names("host") if platforms is None else tuple(as_names(platforms)),
-        author=author,
+        author=as_text(author, "author: a name"),
         progress=progress,
     )
 

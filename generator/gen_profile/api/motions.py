@@ -105,4 +105,6 @@ def linearize(
     if len(axes) != len(plant.actuated):
         template = "at: must hold one position per axis ({axes}), found {found}."
         raise SpecError(template, axes=len(plant.actuated), found=len(axes))
+    if not all(map(math.isfinite, axes)):
+        raise SpecError("at: must hold finite numbers, found {found}.", found=found(axes))
     return _linearize(plant, parameters, axes)

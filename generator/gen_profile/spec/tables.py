@@ -153,6 +153,9 @@ def _drives_file(table: Table, folder: Path, faults: Faults) -> None:
     if not isinstance(name, str):
         faults.add("can.eds", "must name an EDS or DCF, such as drive.eds, found {found}", found=found(name))
         return
+    if not isinstance(sha256, str | None):
+        faults.add("can.eds_sha256", "must be text, found {found}", found=found(sha256))
+        return
     try:
         table["eds"] = sheet = read_data_sheet(folder / name)
     except (OSError, ValueError) as error:
