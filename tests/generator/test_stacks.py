@@ -54,7 +54,10 @@ def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
         ("1,8,10.5,6\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two or three numbers"),
         ("from,to,height\n\n# lee\n8,10.5\n8,10.5,x\n", "path.file: bay.csv: line 5 must be two or three"),
         ("from,to,height\n8,10.5\n10.5,13,9\n", "path.file: bay.csv: line 3 must be two or three numbers"),
-        ("from_mm,to_mm,height_mm\n8000,10500,6000\n", "path.file: bay.csv: line 1 names another unit than m"),
+        (
+            "from_mm,to_mm,height_mm\n8000,10500,6000\n",
+            "path.file: bay.csv: line 1 names another unit than m",
+        ),
         ("Place [cm];Height [cm]\n8;6\n", "path.file: bay.csv: line 1 names another unit than m"),
         ("height,from,to\n6,8,10.5\n", "path.file: bay.csv: line 1 names a column behind the height"),
     ],
