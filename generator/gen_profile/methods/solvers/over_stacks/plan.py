@@ -203,15 +203,16 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
     InfeasibleProblem, SolverDiverged
         With what is in the way, and by how much.
     """
-    began, reserve = time.perf_counter(), RESERVE
+    began, reserve, before = time.perf_counter(), RESERVE, -math.inf
     progress("solving")
     for _ in range(ROUNDS):
         planner = _Planner(bay=bay_of(spec, reserve))
         course = planner.course()
         motion = _profile(planner.bay, course)
         near = _nearest(spec, motion)
-        if near.room >= 0.0:
-            break
+        if near.room >= 0.0 or -ENOUGH <= near.room < before + OVERALL / 2.0:
+            break  # beside an end at the clearance itself there is no reserve
+        before = near.room
         reserve += OVERALL - near.room
     if near.room < -ENOUGH:
         raise _none_found()
