@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
-from gen_profile.spec.stacks import MOST_STACKS, Zone, hanging, trolley_and_hoist, zones
+from gen_profile.spec.stacks import MOST_STACKS, StackZone, hanging, trolley_and_hoist, zones
 from gen_profile.support.errors import SpecError
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
@@ -102,7 +102,7 @@ def _ends(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 yield f"move.{key}", _too_near(spec, plant, zone, x, z)
 
 
-def _too_near(spec: Spec, plant: Plant, zone: Zone, x: float, z: float) -> Phrase:
+def _too_near(spec: Spec, plant: Plant, zone: StackZone, x: float, z: float) -> Phrase:
     """Say how far a load is from where it may be: sideways, or upwards."""
     assert spec.path is not None
     template = (

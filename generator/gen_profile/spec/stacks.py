@@ -172,7 +172,7 @@ def _pieces(points: Any, where: str, structurer: Structurer) -> list[tuple[float
 
 
 @attrs.frozen(kw_only=True)
-class Zone:
+class StackZone:
     """Where a body of the machine may not be: between two places and below a height, in the machine's frame.
 
     Attributes
@@ -198,7 +198,7 @@ class Zone:
         return np.asarray(np.maximum.reduce(sides))
 
 
-def zones(path: StacksSpec, ends: Sequence[Sequence[tuple[float, float]]]) -> tuple[Zone, ...]:
+def zones(path: StacksSpec, ends: Sequence[Sequence[tuple[float, float]]]) -> tuple[StackZone, ...]:
     """List where each body may not be.
 
     Parameters
@@ -217,7 +217,7 @@ def zones(path: StacksSpec, ends: Sequence[Sequence[tuple[float, float]]]) -> tu
             level = stack - path.rail + height / 2.0
             over = [x for x, z in places if low < x < high and level - TOUCHING <= z]
             own = tuple(dict.fromkeys((x - sideways, x + sideways) for x in over))
-            found.append(Zone(stack=number, body=body, low=low, high=high, top=level + above, own=own))
+            found.append(StackZone(stack=number, body=body, low=low, high=high, top=level + above, own=own))
     return tuple(found)
 
 

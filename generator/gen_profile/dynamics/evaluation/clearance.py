@@ -5,7 +5,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.spec.model import Spec
-from gen_profile.spec.stacks import Zone, hanging, zones
+from gen_profile.spec.stacks import StackZone, hanging, zones
 
 
 @attrs.frozen(kw_only=True)
@@ -29,7 +29,7 @@ class Nearest:
     body: str
 
 
-def zones_of(spec: Spec) -> tuple[Zone, ...]:
+def zones_of(spec: Spec) -> tuple[StackZone, ...]:
     """List where the bodies of a spec's machine may not be; none without a path over stacks."""
     if spec.path is None:
         return ()

@@ -14,7 +14,7 @@ from gen_profile.methods.solvers.over_stacks.swing import Swing, swing_of
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant, decides
 from gen_profile.spec.model import AxisLimitsSpec, Spec
-from gen_profile.spec.stacks import Zone, hanging, trolley_and_hoist, zones
+from gen_profile.spec.stacks import StackZone, hanging, trolley_and_hoist, zones
 
 FINE = 4001  # times at which levels are compared; between them they are straight lines
 UNLIMITED = 1e4  # in place of a limit of the trolley that is not stated
@@ -37,7 +37,7 @@ class Bay:
         Nominal first.
     hang : (machines, bodies) array
         Heights of the bodies at the start, m above the suspension.
-    zones : tuple of Zone
+    zones : tuple of StackZone
     """
 
     spec: Spec
@@ -48,7 +48,7 @@ class Bay:
     others: Swing
     machines: Array
     hang: Array
-    zones: tuple[Zone, ...]
+    zones: tuple[StackZone, ...]
 
     @property
     def limits(self) -> AxisLimitsSpec:
@@ -98,7 +98,7 @@ class Bay:
         """Of the trolley in m."""
         return abs(self.target - float(self.begin[0]))
 
-    def passes(self, zone: Zone) -> bool:
+    def passes(self, zone: StackZone) -> bool:
         """Whether a body has to go over a stack."""
         return len(set(self._sides(zone))) > 1
 
@@ -119,7 +119,7 @@ class Bay:
         motion = highest(duration - sum(waits), self.rise, top, self.rates)
         return motion if motion is None or not any(waits) else motion.within(*waits)
 
-    def _sides(self, zone: Zone) -> tuple[tuple[float, float], tuple[float, float]]:
+    def _sides(self, zone: StackZone) -> tuple[tuple[float, float], tuple[float, float]]:
         """Between which places a body may be while it is low, before a stack and after it."""
         return _side(zone, float(self.begin[0])), _side(zone, self.target)
 
@@ -175,7 +175,7 @@ def bay_of(spec: Spec, reserve: float = 0.0) -> Bay:
     )
 
 
-def _up_to_ends(wide: Zone, zone: Zone, places: Sequence[float]) -> Zone:
+def _up_to_ends(wide: StackZone, zone: StackZone, places: Sequence[float]) -> StackZone:
     """Widen a zone up to where its body starts or ends at most, which else would be within it."""
     low = max([wide.low, *(x for x in places if x <= zone.low)])
     high = min([wide.high, *(x for x in places if x >= zone.high)])
@@ -202,7 +202,7 @@ def _rates(limits: AxisLimitsSpec) -> Rates:
     )
 
 
-def _side(zone: Zone, end: float) -> tuple[float, float]:
+def _side(zone: StackZone, end: float) -> tuple[float, float]:
     """Between which places a body may be that is on its end's side of a stack."""
     if end <= zone.low:
         return (-math.inf, zone.low)

@@ -20,7 +20,7 @@ from gen_profile.methods.solvers.over_stacks.program import INTERVAL, Course, Pr
 from gen_profile.methods.solvers.search import Search, least
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
-from gen_profile.spec.stacks import Zone
+from gen_profile.spec.stacks import StackZone
 from gen_profile.spec.values import LONGEST_MOVE
 from gen_profile.support.errors import (
     Code,
@@ -342,13 +342,13 @@ def _tried(spec: Spec, values: Mapping[str, Any]) -> tuple[Suggestion, ...]:
         return ()
 
 
-def _in_the_way(bay: Bay, course: Course) -> tuple[Zone, float]:
+def _in_the_way(bay: Bay, course: Course) -> tuple[StackZone, float]:
     """Find the stack that a course comes too near to, and by how much in m."""
     one = Program(bay=bay, about=course).followed[0]
     places = one.seen[0, :, 1:].reshape(-1, one.seen.shape[-1])
     times = np.linspace(0.0, course.up.duration, len(places) + 1)[1:]
 
-    def missing(zone: Zone) -> float:
+    def missing(zone: StackZone) -> float:
         low, high = attrs.evolve(bay, zones=(zone,)).bounds(0, zone.body, course.up, times)
         x = places[:, zone.body]
         return float(np.maximum(low - x, x - high).max())

@@ -16,7 +16,7 @@ from gen_profile.dynamics.problem.linearization import linear_terms, linearize
 from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Entries, place, squares
 from gen_profile.methods.solvers.over_stacks.bay import Bay
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
-from gen_profile.methods.solvers.over_stacks.swing import TROLLEY, Followed, followed
+from gen_profile.methods.solvers.over_stacks.swing import TROLLEY, FollowedMachines, followed
 from gen_profile.motion.profile import Array
 
 INTERVAL = 0.4  # s, about, of constant jerk
@@ -81,7 +81,7 @@ class Program:
         return self.about.up.duration / len(self.about.jerks) / STEPS
 
     @cached_property
-    def followed(self) -> list[Followed]:
+    def followed(self) -> list[FollowedMachines]:
         """What the machines do, the nominal one first; each is alone along the first axis."""
         bay, about = self.bay, self.about
         intervals = len(about.jerks)
@@ -98,7 +98,7 @@ class Program:
         each = attrs.asdict(rest, recurse=False)
         return [
             first,
-            *(Followed(**{k: v[m : m + 1] for k, v in each.items()}) for m in range(len(others))),
+            *(FollowedMachines(**{k: v[m : m + 1] for k, v in each.items()}) for m in range(len(others))),
         ]
 
     @property

@@ -61,7 +61,7 @@ def swing_of(plant: Plant, trolley: int, names: tuple[str, ...]) -> Swing:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Followed:
+class FollowedMachines:
     """What machines do in every interval, at its steps.
 
     Attributes
@@ -79,7 +79,9 @@ class Followed:
     seen_along: Array
 
 
-def followed(swing: Swing, nodes: Array, p: Array, *, jerks: Array, hoist: Array, step: float) -> Followed:
+def followed(
+    swing: Swing, nodes: Array, p: Array, *, jerks: Array, hoist: Array, step: float
+) -> FollowedMachines:
     """Integrate by the classical method of Runge and Kutta, with the derivatives.
 
     Parameters
@@ -120,6 +122,6 @@ def followed(swing: Swing, nodes: Array, p: Array, *, jerks: Array, hoist: Array
         alongs.append(along)
     whole, whole_along = np.stack(states, axis=2), np.stack(alongs, axis=2)
     both = swing.seen(whole, hoist[:, ::2], p[:, None, None])
-    return Followed(
+    return FollowedMachines(
         states=whole, along=whole_along, seen=both[..., 0], seen_along=both[..., 1:] @ whole_along
     )
