@@ -10,6 +10,7 @@ import subprocess
 import time
 from contextlib import suppress
 from io import StringIO
+from types import SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
@@ -197,3 +198,30 @@ def test_the_address_is_told(log):
         state = json.loads(answer(f"{address}state")[1])
         out, _ = process.communicate()
     assert (state["name"], process.returncode, json.loads(out)["state"]) == ("paper", 0, "done")
+
+
+def write_on(memory, cycles, over):
+    """Take down cycles as sent, and as not sent again, until it is over."""
+    book = Book(memory, cycles, 1)
+    while not over.is_set():
+        book.late[:] = 0
+        book.late[:] = 1
+
+
+def test_a_stream_is_looked_at_while_it_is_written():
+    cycles, context = 100_000, multiprocessing.get_context("fork")
+    memory, over = context.RawArray("b", Book.size(cycles, 1)), context.Event()
+    writer = context.Process(target=write_on, args=(memory, cycles, over), daemon=True)
+    writer.start()
+    try:
+        book, view = (
+            Book(memory, cycles, 1),
+            SimpleNamespace(scale=1.0, planned=np.zeros((cycles, 1)), axes=["x"]),
+        )
+        while not book.late.any():
+            time.sleep(0.01)
+        for _ in range(300):
+            assert 0 <= live.Glance.at(book, view).cycle <= cycles
+    finally:
+        over.set()
+        writer.join()

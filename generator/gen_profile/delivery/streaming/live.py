@@ -76,7 +76,8 @@ class Glance:
     @classmethod
     def at(cls, book: Book, view: View) -> Glance:
         """Look into the streamer's record as it is now."""
-        sent, answered = np.flatnonzero(book.late), book.answered != 0
+        late = book.late.copy()  # the streamer goes on writing, at which NumPy ends a search with an error
+        sent, answered = np.flatnonzero(late), book.answered != 0
         actual = np.where(answered[:, None], book.actual / view.scale, np.nan)
         apart = np.abs(actual - view.planned)[answered]
         return cls(
@@ -84,7 +85,7 @@ class Glance:
             cycle=int(sent[-1]) + 1 if sent.size else 0,
             actual=actual,
             apart=apart.max(axis=0) if apart.size else np.zeros(len(view.axes)),
-            late=float(book.late.max() - 1) / 1e3 if sent.size else 0.0,
+            late=float(late.max() - 1) / 1e3 if sent.size else 0.0,
         )
 
 
