@@ -99,7 +99,7 @@ def pytest_testnodedown(node: Any) -> None:
         node.config.stash[TURN] = line
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     if line := config.stash.get(TURN, ""):
         terminalreporter.write_line(line)
 

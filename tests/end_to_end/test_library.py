@@ -113,7 +113,7 @@ def test_issues_what_was_checked(library):
     [
         ("bay 3.XML", []),
         ("bay 3.codesys.xml", []),
-        ("bay 3.scl", []),
+        ("bay 3.scl", ["bay 3_velocity.scl"]),
         ("FB_bay_3.TcPOU", ["FB_bay_3_Axis.TcPOU"]),
     ],
 )
