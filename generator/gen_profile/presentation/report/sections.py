@@ -13,6 +13,7 @@ from gen_profile.delivery.designs.design import Design
 from gen_profile.dynamics.evaluation.demands import axis_demands, demands
 from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.dynamics.evaluation.phrases import bound, machine, mm, number, place_unit
+from gen_profile.dynamics.problem.limits import ROUNDING
 from gen_profile.methods.solvers.solution import Solution
 from gen_profile.motion.metrics import excursion, extremes
 from gen_profile.presentation.charts.comparison import compared_styles, comparison_figure
@@ -152,7 +153,7 @@ def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]
             if one.allowed is None:
                 yield TableRow(cells=(name, f"{number(one.asked)} {one.unit}", "no limit stated", "", ""))
             else:
-                yield _limit(name, one.asked, one.allowed, one.unit)
+                yield _limit(name, one.asked, one.allowed, one.unit, rounding=ROUNDING)
         unit, factor = place_unit(spec, column)
         least, most = (factor * end for end in extremes(evaluation.command, 0, column))
         taken, travel = f"{number(least)} to {number(most)} {unit}", spec.limits.of(column).travel
@@ -165,9 +166,12 @@ def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]
             yield TableRow(cells=(f"travel of {axis.name}", taken, allowed, margin, ""))
 
 
-def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> TableRow:
+def _limit(
+    name: str, taken: float, allowed: float, unit: str, factor: float = 1.0, *, rounding: float = 0.0
+) -> TableRow:
     texts = (f"{number(factor * value)} {unit}" for value in (taken, allowed, allowed - taken))
-    return TableRow(cells=(name, *texts, Share(taken / allowed)), mark="failed" if taken > allowed else "")
+    mark = "failed" if (1.0 - rounding) * taken > allowed else ""
+    return TableRow(cells=(name, *texts, Share(taken / allowed)), mark=mark)
 
 
 def _scenarios(check: Check) -> Iterator[Table]:
