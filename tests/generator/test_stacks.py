@@ -59,6 +59,7 @@ def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
             "path.file: bay.csv: line 1 names another unit than m",
         ),
         ("Place [cm];Height [cm]\n8;6\n", "path.file: bay.csv: line 1 names another unit than m"),
+        ("from,to,height\n8,10.5,nan\n", "path.file: bay.csv: line 2 must be two or three numbers"),
         ("height,from,to\n6,8,10.5\n", "path.file: bay.csv: line 1 names a column behind the height"),
     ],
 )
@@ -91,6 +92,7 @@ def test_a_profile_counts_the_higher_end_of_every_piece():
         ({"path": {"hook": [1.0, 1.0]}}, "path.hook: the machine has no hook"),
         ({"path": {"clearance": -0.1}}, "path.clearance: must be at least 0"),
         ({"path": {"clearence": 0.1}}, "path.clearence: unknown key; did you mean 'clearance'?"),
+        ({"path": {"profil": []}}, "path.profil: unknown key; did you mean 'profile'?"),
         (
             {"move": {"start": [24.0, 20.0]}},
             "move.start: the payload is too near to the stack from 22.5 to 25",

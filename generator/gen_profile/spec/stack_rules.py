@@ -79,10 +79,7 @@ def _rates(spec: Spec, plant: Plant, hoist: int) -> Iterator[Fault]:
     limits, name = spec.limits.of(hoist), plant.actuated[hoist].name
     for rate in RATES:
         if getattr(limits, rate) is None:
-            template = (
-                "required with [path], such as limits.axis.{name}.{rate}: it decides when the load is up"
-            )
-            yield f"limits.axis.{name}.{rate}", Phrase(template, name=name, rate=rate)
+            yield f"limits.axis.{name}.{rate}", Phrase("required with [path]: it decides when the load is up")
     if limits.travel is None and plant.actuated[hoist].lower < -1e3:
         template = "required with [path]: its lower end is the hoist's top"
         yield f"limits.axis.{name}.travel", Phrase(template)

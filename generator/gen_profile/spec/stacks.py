@@ -6,6 +6,7 @@ A stack that the load stands on, or hangs over, at the start or the target is le
 clear of it, it stays within the clearance for the sides of where it stood.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -18,7 +19,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.structure import Checked, Faults, Structurer
+from gen_profile.spec.structure import Checked, Faults, Structurer, kinds_of
 from gen_profile.spec.values import Distance, NotNegative, Words
 from gen_profile.support.bounded_file import DOCUMENT, read_bounded
 from gen_profile.support.phrase import Phrase
@@ -92,6 +93,7 @@ def stacks_of(table: Mapping[str, Any], folder: Path, structurer: Structurer) ->
     structurer : Structurer
     """
     faults = structurer.faults
+    table = structurer.known(table, (*SOURCES, *kinds_of(StacksSpec)), "path")
     given = [key for key in SOURCES if key in table]
     others = {key: value for key, value in table.items() if key not in SOURCES}
     if len(given) != 1:
@@ -142,9 +144,10 @@ def _rows(path: Path, faults: Faults) -> list[list[float]]:
 
 def _number(cell: str) -> float | None:
     try:
-        return float(cell)
+        number = float(cell)
     except ValueError:
         return None
+    return number if math.isfinite(number) else None
 
 
 def _misleading(heading: Sequence[str]) -> str | None:
