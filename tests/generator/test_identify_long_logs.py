@@ -64,8 +64,8 @@ def test_a_clock_that_is_wrong_is_named_before_anything_is_searched(factor):
     period = 2.0 * np.pi / np.sqrt(9.81 / LENGTH)
     with pytest.raises(InfeasibleProblem, match=r"By its clock, .* unit of the log's times") as refusal:
         identify(preset_spec(PRESET), [log_of(times * factor, values)], free=["L0", "c"])
-    told = float(re.search(r"swings once in ([\d.]+) s", str(refusal.value))[1])
-    assert told == pytest.approx(factor * period, rel=0.1)  # to a bin of a spectrum of eleven swings
+    stated = float(re.search(r"swings once in ([\d.]+) s", str(refusal.value))[1])
+    assert stated == pytest.approx(factor * period, rel=0.1)  # to a bin of a spectrum of eleven swings
 
 
 @pytest.mark.parametrize("beside", ["drift", "wind", "another rope", "few swings"])
