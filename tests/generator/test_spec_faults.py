@@ -179,6 +179,7 @@ FAULTS = [
     ("can.node", 128, r"can\.node: must be at least 1 and at most 127, found 128\."),
     ("can.node", 1.5, r"can\.node: must be a whole number, found 1\.5\."),
     ("can", {"eds": __file__, "eds_sha256": [1]}, r"can\.eds_sha256: must be text, found \[1\]\."),
+    ("can", {"eds_sha256": "0a"}, r"can\.eds: must name an EDS or DCF, such as drive\.eds, found nothing\."),
     ("can.node", 10**400, r"can\.node: must be at least 1 .*, found a whole number of more than 18 digits\."),
     # things of another kind
     ("move", 3, r"move: must be a table, found 3\."),

@@ -148,7 +148,7 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
 def _drives_file(table: Table, folder: Path, faults: Faults) -> None:
     """Put the file that ``can.eds`` names in the place of its name."""
     name, sha256 = table.pop("eds", None), table.pop("eds_sha256", None)
-    if name is None:
+    if name is None and sha256 is None:
         return
     if not isinstance(name, str):
         faults.add("can.eds", "must name an EDS or DCF, such as drive.eds, found {found}", found=found(name))
