@@ -7,7 +7,7 @@ only when its format is asked for.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path, PurePath
@@ -20,7 +20,7 @@ from gen_profile.support.suggestion import suggestion
 if TYPE_CHECKING:
     from gen_profile_exporters import csv_table
     from gen_profile_exporters.can.export import exporter as can
-    from gen_profile_exporters.exporter import BlockContainer, Exporter
+    from gen_profile_exporters.exporter import BlockContainer, Exporter, Target
     from gen_profile_exporters.playback import structured_text
     from gen_profile_exporters.vendors import codesys, plcopen_xml, rockwell_l5x, siemens_scl, twincat
 
@@ -95,6 +95,21 @@ def find_exporter(name: str) -> Exporter:
     if listed not in known:
         raise SpecError(f"export: unknown format {name!r}{suggestion(name, known)}")
     return cast("Exporter", import_module(known[listed].module))
+
+
+def require_targets(exporters: Iterable[Exporter], target: Target) -> None:
+    """Refuse a target for which no motion could be exported, before one is sought.
+
+    Exporters that can tell have a function `require_target`, which takes the target.
+
+    Raises
+    ------
+    ExportError
+    """
+    for exporter in exporters:
+        require: Callable[[Target], None] | None = getattr(exporter, "require_target", None)
+        if require is not None:
+            require(target)
 
 
 def containers() -> tuple[str, ...]:

@@ -6,7 +6,9 @@ import pytest
 from exporters.can.bench import Bench
 from exporters.motions import quintic, target
 
+from gen_profile.delivery.designs.design import design
 from gen_profile.spec.can import read_data_sheet
+from gen_profile.spec.reading import preset_spec, spec_from_dict
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.can.export import exporter
 from gen_profile_exporters.can.setup.data_sheet import require_fit
@@ -68,6 +70,30 @@ def test_drives_that_fit(tmp_path, make, options):
 def test_what_the_bus_would_refuse(tmp_path, make, change, reason):
     with pytest.raises(ExportError, match=rf"^drive.eds: axis cart: .*{reason}"):
         tried(tmp_path, make, change or (lambda text: text))
+    sheet = read_data_sheet(tmp_path / "drive.eds")
+    if not reason.startswith("6085h"):  # a ramp that is not stated comes from the motion
+        with pytest.raises(ExportError, match=rf"^drive.eds: axis cart: .*{reason}"):
+            exporter.require_target(target(eds=sheet))
+
+
+def test_a_stated_ramp_is_held_to_its_limits_before_there_is_a_motion(tmp_path):
+    (tmp_path / "drive.eds").write_text(of("6085", "HighLimit", "0x10")(eds(1, DriveVariant())), "utf-8")
+    sheet = read_data_sheet(tmp_path / "drive.eds")
+    exporter.require_target(target(eds=sheet))
+    with pytest.raises(ExportError, match="By the file, 6085h:00 takes 16 at most"):
+        exporter.require_target(target(eds=sheet, quick_stop=2.0))
+
+
+@pytest.mark.parametrize("changed", [{"can.eds": "drive.eds"}, {"can.sync_period": 0.0123457}])
+def test_nothing_is_solved_for_drives_that_cannot_follow(tmp_path, changed):
+    """A move without any motion within its limits would be refused by another sentence."""
+    (tmp_path / "drive.eds").write_text(without("605A")(eds(1, DriveVariant())), "utf-8")
+    document = preset_spec("paper").to_dict() | {"limits": {"acceleration": 1e-3}}
+    for place, value in changed.items():
+        document["can"][place.removeprefix("can.")] = value
+    spec = spec_from_dict(document, folder=tmp_path)
+    with pytest.raises(ExportError, match=r"605Ah|60C2h"):
+        design(spec, ["csv", "can"], tmp_path / "out")
 
 
 @pytest.mark.parametrize(

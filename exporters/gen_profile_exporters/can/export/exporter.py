@@ -7,7 +7,9 @@ Between two SYNCs a drive interpolates over its interpolation period 60C2h, whic
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
+from importlib import import_module
 from itertools import pairwise
+from types import ModuleType
 
 import numpy as np
 
@@ -22,6 +24,22 @@ from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
 from gen_profile_exporters.can.scaling import Demand, Setpoints, demand_of, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
+
+
+def require_target(target: Target) -> None:
+    """Refuse what no motion could be exported for, before there is one.
+
+    Raises
+    ------
+    ExportError
+        The bus is too slow, there are too few node ids, drives cannot be set to the period, a fixed mapping
+        lacks what is needed, or the drives' file is none, or of drives that cannot follow.
+    """
+    frames.period_digits(target.can)
+    frames.require_load(target)
+    frames.setpoint_frames(target)
+    if target.can.eds is not None:
+        _data_sheet().require_able(target.can.eds, target)
 
 
 def encode(profile: Profile, target: Target) -> tuple[File, ...]:
@@ -54,11 +72,15 @@ def _startup_lists(demand: Demand, target: Target) -> startup.Lists:
     lists, sheet = startup.startup_lists(demand, target), target.can.eds
     if sheet is None:
         return lists
-    require_installed("can.eds needs canopen", "can", "canopen")
-    from gen_profile_exporters.can.setup import data_sheet  # noqa: PLC0415  # canopen is an extra
+    _data_sheet().require_fit(sheet, demand, target)
+    fitted: startup.Lists = _data_sheet().fitted(sheet, lists, target)
+    return fitted
 
-    data_sheet.require_fit(sheet, demand, target)
-    return data_sheet.fitted(sheet, lists, target)
+
+def _data_sheet() -> ModuleType:
+    """Load what reads a drive's file."""
+    require_installed("can.eds needs canopen", "can", "canopen")
+    return import_module("gen_profile_exporters.can.setup.data_sheet")  # canopen is an extra
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:

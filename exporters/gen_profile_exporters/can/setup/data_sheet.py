@@ -14,14 +14,15 @@ from typing import Any, cast
 import attrs
 import can
 import canopen
+import numpy as np
 from canopen import SdoAbortedError
 from canopen.objectdictionary.datatypes import INTEGER_TYPES, SIGNED_TYPES
 
 from gen_profile.spec.can import DataSheet
 from gen_profile.support.errors import ExportError, StreamAborted
-from gen_profile_exporters.can import frames, startup
+from gen_profile_exporters.can import drive_units, frames, startup
 from gen_profile_exporters.can.host.link import Link
-from gen_profile_exporters.can.scaling import Demand
+from gen_profile_exporters.can.scaling import Demand, exact_counts, quick_stop_deceleration
 from gen_profile_exporters.can.setup import configuration
 from gen_profile_exporters.can.setup.node import Node
 from gen_profile_exporters.can.setup.restoration import HEARTBEAT_WATCHED, MAPPING, Restoration
@@ -34,6 +35,34 @@ MODE, SHOWN_MODE, STATUSWORD, ACTUAL_POSITION = 0x6060, 0x6061, 0x6041, 0x6064
 SWITCH_ON_DISABLED = 0x0250  # a statusword
 MANY = 0xFFFF_FFFF  # modes
 MOST_TIME = 0xFFFF  # ms, of 1016h
+RAMPS = frozenset({0x6084, 0x6085})  # of a quick stop, which come from the motion where none is stated
+ANY_VELOCITY = 1e9  # counts/s: no window of a following error is too wide for it
+
+
+def require_able(sheet: DataSheet, target: Target) -> None:
+    """Require of drives of an EDS or DCF what no motion changes, before there is one.
+
+    Raises
+    ------
+    ExportError
+        The file cannot be read, or no motion could be exported for a drive of its kind.
+    """
+    places = zip(target.start, target.axes, strict=True)
+    start = tuple(
+        int(exact_counts(np.array([place]), drive_units.exact(axis.counts_per_si))[0])
+        for place, axis in places
+    )
+    fast, gentle = (ANY_VELOCITY,) * len(start), (0.0,) * len(start)
+    ramp = tuple(quick_stop_deceleration(0.0, target.can, axis) for axis in target.axes)
+    any_motion = Demand(
+        start=start,
+        ends=tuple(zip(start, start, strict=True)),
+        velocity=fast,
+        acceleration=gentle,
+        quick_stop=ramp,
+    )
+    unknown = RAMPS if target.can.quick_stop is None else frozenset[int]()
+    _require_fit(sheet, any_motion, target, unlimited=unknown)
 
 
 def require_fit(sheet: DataSheet, demand: Demand, target: Target) -> None:
@@ -47,9 +76,16 @@ def require_fit(sheet: DataSheet, demand: Demand, target: Target) -> None:
     ExportError
         The file cannot be read, or a drive of its kind would refuse the motion.
     """
+    _require_fit(sheet, demand, target)
+
+
+def _require_fit(
+    sheet: DataSheet, demand: Demand, target: Target, unlimited: frozenset[int] = frozenset()
+) -> None:
+    """Hold drives to a demand, but not to the limits of some objects."""
     known = attrs.evolve(target, can=attrs.evolve(target.can, serial={}, homed=None))
     starts = demand.start or tuple(least for least, _ in demand.ends)
-    drives = _drives(sheet, target, starts)
+    drives = _drives(sheet, target, starts, unlimited)
     try:
         configuration.configure(
             cast("Link", _Desk(drives)), known, demand, Restoration(), lambda: None, reset_fault=False
@@ -82,9 +118,11 @@ def may_carry(objects: canopen.ObjectDictionary, mapping: int, entry: int) -> bo
     return bool(variable.pdo_mappable and (variable.writable or mapping >= 0x1A00))
 
 
-def _drives(sheet: DataSheet, target: Target, starts: tuple[int, ...]) -> dict[int, _Sheet]:
+def _drives(
+    sheet: DataSheet, target: Target, starts: tuple[int, ...], unlimited: frozenset[int] = frozenset()
+) -> dict[int, _Sheet]:
     return {
-        node: _Sheet(_dictionary(sheet, node), start)
+        node: _Sheet(_dictionary(sheet, node), start, unlimited)
         for node, start in zip(frames.nodes(target), starts, strict=True)
     }
 
@@ -105,10 +143,12 @@ def _dictionary(sheet: DataSheet, node: int) -> canopen.ObjectDictionary:
 
 
 class _Sheet:
-    """One drive that answers by its file."""
+    """One drive that answers by its file, which limits no value of `unlimited` objects."""
 
-    def __init__(self, objects: canopen.ObjectDictionary, start: int) -> None:
-        self._objects = objects
+    def __init__(
+        self, objects: canopen.ObjectDictionary, start: int, unlimited: frozenset[int] = frozenset()
+    ) -> None:
+        self._objects, self._unlimited = objects, unlimited
         self._held: dict[tuple[int, int], bytes] = {}
         self._refused: dict[tuple[int, int], str] = {}
         about = objects.device_information
@@ -134,12 +174,19 @@ class _Sheet:
         value = int.from_bytes(data, "little", signed=entry.data_type in SIGNED_TYPES)
         if index == HEARTBEAT_WATCHED[0] and entry.max == MOST_TIME:
             value &= MOST_TIME  # some files state the limits of its time alone
+        limited = index not in self._unlimited
         mapped = sub and index - MAPPING in startup.PDO_PARAMETERS and entry.writable
         refused = {
             READ_ONLY: (not entry.writable, "cannot be written"),
             WRONG_LENGTH: (len(data) * 8 != len(entry), f"has {len(entry)} bits"),
-            TOO_GREAT: (entry.max is not None and value > entry.max, f"takes {entry.max} at most"),
-            TOO_SMALL: (entry.min is not None and value < entry.min, f"takes {entry.min} at least"),
+            TOO_GREAT: (
+                limited and entry.max is not None and value > entry.max,
+                f"takes {entry.max} at most",
+            ),
+            TOO_SMALL: (
+                limited and entry.min is not None and value < entry.min,
+                f"takes {entry.min} at least",
+            ),
             NOT_MAPPABLE: (
                 mapped and not may_carry(self._objects, index, value),
                 f"cannot carry {value >> 16:04X}h:{value >> 8 & 0xFF:02X}",

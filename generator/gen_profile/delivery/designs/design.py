@@ -36,7 +36,7 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.summary import Drawable
 from gen_profile_exporters.exporter import Exporter, target_of
-from gen_profile_exporters.registry import find_exporter, format_named, require_end
+from gen_profile_exporters.registry import find_exporter, format_named, require_end, require_targets
 
 if TYPE_CHECKING:
     from gen_profile.assurance.proof.verdict import (
@@ -194,6 +194,7 @@ def _designed(
     if not exporters:
         raise SpecError("export: name at least one format.")
     require_end(exporters, stops=spec.move.stops)
+    require_targets(exporters.values(), target_of(spec))
     planned = plan(spec, progress)
     spec, command = planned.spec, planned.command
     with place as staging:
