@@ -1,6 +1,6 @@
-# What a change must pass: quick tests, and slow ones whose rooms changed in five commits, or whose turn it is.
+# What a change must pass: quick tests, and slow ones that are near to what changed, or whose turn it is.
 check: lint
-    pytest -n auto --turn "${TURN:-$(git rev-list --count HEAD)}" --changed "$(git diff --name-only "${BASE:-$(.ci/base)}")"
+    told=$(.ci/base) && pytest -n auto --turn "${told#* }" --changed "$(git diff --name-only "${told% *}")"
 
 # All that there is, whatever turn it is.
 check-all: lint coverage oldest

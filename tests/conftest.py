@@ -4,16 +4,17 @@ import gc
 import os
 import signal
 import sys
+from collections import Counter
 from collections.abc import Iterator, Set
 from importlib import import_module
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is loaded: there is a process per processor
 
 import pytest
 from hypothesis import settings
-from turns import TURNS, reasons, turns
+from turns import TURNS, near, rooms_of, turns
 
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
@@ -51,7 +52,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--turn",
         type=int,
-        help=f"run the slow tests whose rooms changed, and those whose turn it is (modulo {TURNS})",
+        help=f"run the slow tests near to what changed, and those whose turn it is (modulo {TURNS})",
     )
     parser.addoption(
         "--changed", default="", metavar="PATHS", help="what changed, for --turn: a path each line"
@@ -77,12 +78,15 @@ def take_turns(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the slow tests whose turn it is not, and note how many for the last lines."""
     turn, changed = config.getoption("--turn") % TURNS, set(config.getoption("--changed").split())
     slow = {item: item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
-    files = {*slow.values()}
-    why, turn_of = {file: reasons(file, changed) for file in files}, turns(files)
-    rooms = {item for item, file in slow.items() if why[file]}
+    tests = Counter(slow.values())
+    why = near(
+        tests, {file: rooms_of(file, (config.rootpath / file).read_text("utf-8")) for file in tests}, changed
+    )
+    turn_of = turns(set(tests))
+    rooms = {item for item, file in slow.items() if file in why}
     due = {item for item, file in slow.items() if turn_of[file] == turn} - rooms
     keep(config, items, {*items} - slow.keys() | rooms | due)
-    named = ", ".join(sorted({PurePosixPath(one).stem for one in set().union(*why.values())})) or "none"
+    named = ", ".join(sorted({*why.values()})) or "none"
     left = len(slow) - len(rooms) - len(due)
     config.stash[TURN] = (
         f"Turn {turn + 1} of {TURNS}: of {len(slow)} slow tests {len(rooms)} of changed rooms ({named}), "

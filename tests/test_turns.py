@@ -1,36 +1,69 @@
-"""Which slow tests run: every one in three turns, and those of a room that changed in each of them."""
+"""Which slow tests run: every one in three turns, and those near to what changed in each of them."""
 
+import os
+import shutil
 import subprocess
 import sys
 from collections import Counter
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
-from turns import reasons, turns
+from turns import near, rooms_of, turns
 
 ROOT = Path(__file__).parents[1]
 
 
+FILES = {
+    "tests/exporters/test_planner_far.py": "from st_programs import run\nfrom gen_profile import Spec",
+    "tests/exporters/test_planner_text.py": "from gen_profile import (\n    Spec,\n    read_spec,\n)",
+    "tests/exporters/can/test_vcan.py": "from gen_profile_exporters.can import drive",
+    "tests/fmu/test_cache.py": "from gen_profile import Spec",
+    "tests/generator/test_minimum_time.py": "import gen_profile",
+    "tests/end_to_end/test_documentation.py": "from documentation import blocks",
+}
+SPARE = {
+    f"tests/{folder}/test_other_{number}.py": "import gen_profile, gen_profile_exporters"
+    for folder in ("exporters", "generator")
+    for number in range(7)
+}
+
+
 @pytest.mark.parametrize(
-    ("test", "changed", "room"),
+    ("changed", "room", "files"),
     [
-        ("tests/exporters/test_planner_far.py", "generator/gen_profile/planner/sensor.py", "planner"),
-        ("tests/exporters/test_planner_far.py", "exporters/gen_profile_exporters/planner/a/b.st", "planner"),
+        ("generator/gen_profile/planner/sensor.py", "planner", ["test_planner_far", "test_planner_text"]),
         (
-            "tests/generator/test_minimum_time.py",
-            "generator/gen_profile/methods/solvers/minimum_time.py",
-            "minimum_time",
+            "exporters/gen_profile_exporters/planner/a/b.st",
+            "planner",
+            ["test_planner_far", "test_planner_text"],
         ),
-        ("tests/fmu/test_cache.py", "fmu/gen_profile_fmu/building/plant_fmu.py", "fmu"),
-        ("tests/exporters/can/test_vcan.py", "exporters/gen_profile_exporters/can/drive.py", "can"),
-        ("tests/generator/test_watch.py", "tests/generator/test_watch.py", "tests/generator/test_watch.py"),
-        ("tests/exporters/test_planner_far.py", "exporters/gen_profile_exporters/csv_table.py", None),
-        ("tests/exporters/test_planner_far.py", "tests/exporters/planner/helper.py", None),
-        ("tests/end_to_end/test_scanner.py", "exporters/gen_profile_exporters/can/drive.py", None),
+        ("generator/gen_profile/solvers/minimum_time.py", "minimum_time", ["test_minimum_time"]),
+        ("fmu/gen_profile_fmu/building/plant_fmu.py", "fmu", ["test_cache"]),
+        ("exporters/gen_profile_exporters/can/drive.py", "can", ["test_vcan"]),
+        ("generator/gen_profile/spec/read_spec.py", "read_spec", ["test_planner_text"]),
+        ("tests/exporters/st_programs.py", "st_programs", ["test_planner_far"]),
+        ("tests/fmu/test_cache.py", "test_cache", ["test_cache"]),
+        ("docs/planner.md", "documentation", ["test_documentation"]),
+        ("tests/exporters/planner/helper.py", None, []),
+        ("generator/gen_profile/units.py", None, []),
     ],
 )
-def test_a_file_is_of_the_rooms_that_its_name_names(test, changed, room):
-    assert reasons(test, {changed}) == ({room} - {None})
+def test_a_file_is_near_to_the_rooms_that_it_names_or_imports(changed, room, files):
+    found = near_to({changed})
+    assert set(found.values()) == {room} - {None}
+    assert sorted(PurePosixPath(file).stem for file in found) == files
+
+
+def near_to(changed):
+    sources = FILES | SPARE
+    rooms = {file: rooms_of(file, source) for file, source in sources.items()}
+    return near(dict.fromkeys(sources, 30), rooms, changed)
+
+
+def test_what_few_tests_use_comes_first_when_nearly_everything_changed():
+    few = {"generator/gen_profile/solvers/minimum_time.py", "tests/exporters/st_programs.py"}
+    assert set(near_to(few).values()) == {"minimum_time", "st_programs"}
+    assert near_to({*few, "generator/gen_profile/planner/sensor.py", *FILES, *SPARE}) == near_to(few)
 
 
 def test_each_turn_has_a_third_of_a_room():
@@ -59,13 +92,39 @@ def test_three_turns_run_everything_and_a_changed_room_runs_in_each(tmp_path):
     (tmp_path / "tests").mkdir()
     for file in ("conftest.py", "turns.py"):
         (tmp_path / "tests" / file).write_text((ROOT / "tests" / file).read_text("utf-8"))
-    for name in ("planner_far", "sweep", "report", "plot"):
+    for name in ("planner_far", *"abcdefg"):
         (tmp_path / "tests" / f"test_{name}.py").write_text(SUITE)
     (tmp_path / "pytest.ini").write_text(
         "[pytest]\npythonpath = tests\nmarkers = slow\naddopts = --import-mode=importlib"
     )
     changed = "--changed=generator/planner/modes.py\nREADME.md"
     said = [run_in(tmp_path, "-n", "1", f"--turn={turn}", changed) for turn in (7, 8, 9)]
-    assert all("of 4 slow tests 1 of changed rooms (planner)" in one for one in said), said
+    assert all("of 8 slow tests 1 of changed rooms (planner)" in one for one in said), said
     ran = [int(one.rpartition(" passed")[0].split()[-1]) for one in said]
-    assert sum(ran) == 3 * (4 + 1) + 3  # quick tests and the changed room thrice, the others once
+    assert sum(ran) == 3 * (8 + 1) + 7  # quick tests and the changed room thrice, the others once
+
+
+@pytest.mark.slow
+def test_changes_are_counted_from_the_run_that_passed_or_from_half_a_day_ago(tmp_path):
+    (tmp_path / ".ci").mkdir()
+    base = shutil.copy(ROOT / ".ci" / "base", tmp_path / ".ci")
+    named = {f"GIT_{who}_{what}": "tests" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
+    environment = {key: os.environ[key] for key in os.environ.keys() - {"BASE", "TURN"}} | named
+
+    def run(*command, **more):
+        there = {"cwd": tmp_path, "env": environment | more}
+        done = subprocess.run(command, check=False, capture_output=True, text=True, **there)
+        return done.stdout.strip() or done.returncode
+
+    assert run("git", "init", "-q") == 0
+    assert run(base) != 0  # nothing to count from
+    commits = []
+    for hour in (1, 5, 9, 18):
+        at = f"2026-01-01T{hour:02}:00:00Z"
+        assert run("git", "commit", "-q", "--allow-empty", "-m", "some", GIT_COMMITTER_DATE=at) == 0
+        commits.append(run("git", "rev-parse", "HEAD"))
+    assert run(base) == f"{commits[1]} 4"
+    for turn, commit in ((9, commits[0]), (10, commits[2])):
+        assert run("git", "update-ref", f"refs/ci/passed/{turn}", commit) == 0
+    assert run(base) == f"{commits[2]} 11"
+    assert run(base, BASE="given", TURN="5") == "given 5"

@@ -1,28 +1,63 @@
-"""Slow tests take turns: in each run those whose room changed, and a third of the others.
+"""Slow tests take turns: in each run those that are near to what changed, and a third of the others.
 
-A test's file is of the rooms, folders and modules of the product, that it and its folder are named after: a
-change to `planner.py`, or in a folder `fmu` or `planner`, runs `fmu/test_planner_cache.py`. In three turns
-every test runs.
+A test is of the *rooms*, modules and folders, that its file and its folder are named after or that it
+imports. A room that changed has its tests run whatever turn it is, those of few tests first, until they
+are a `SHARE` of all: what nearly every test uses makes nothing run but in its turn. In three turns every
+test runs.
 """
 
-from collections.abc import Set
+import re
+from collections import Counter
+from collections.abc import Mapping, Set
 from pathlib import PurePosixPath
 
 TURNS = 3
-TOO_LARGE = frozenset({"docs", "examples", "exporters", "generator"})  # to be one room
+SHARE = 1 / 8
+IMPORT = re.compile(r"^ *(?:from ([\w.]+) )?import (\([^)]*\)|.*)", re.MULTILINE)
 
 
-def rooms_of(changed: Set[str]) -> set[str]:
+def changed_rooms(changed: Set[str]) -> set[str]:
     """Name the rooms of files that changed, which are given from the root of the repository."""
-    paths = [PurePosixPath(name) for name in changed if not name.startswith("tests/")]
-    return {room for path in paths for room in (*path.parts[:-1], path.stem)} - TOO_LARGE
+    rooms: set[str] = set()
+    for path in map(PurePosixPath, changed):
+        if path.suffix == ".md":
+            rooms.add("documentation")  # whose test runs every page
+        elif path.parts[0] == "tests":
+            rooms.add(path.stem)
+        else:
+            rooms.update(path.parts[:-1], [path.stem])
+    return rooms
 
 
-def reasons(test: str, changed: Set[str]) -> set[str]:
-    """Tell for which rooms a test's file runs whatever turn it is; if it changed itself, for its own name."""
+def rooms_of(test: str, source: str) -> set[str]:
+    """Name the rooms that a test's file is of: its own name, all parts of it, its folder, and its imports."""
     path = PurePosixPath(test)
-    name = f"_{path.parent.name}_{path.stem}_"
-    return {room for room in rooms_of(changed) if f"_{room}_" in name} | ({test} & changed)
+    words = path.stem.removeprefix("test_").split("_")
+    ends = range(1, len(words) + 1)
+    parts = {"_".join(words[begin:end]) for end in ends for begin in range(end)}
+    imported = {word for found in IMPORT.findall(source) for word in re.findall(r"\w+", " ".join(found))}
+    return {path.stem, path.parent.name} | parts | imported
+
+
+def near(tests: Mapping[str, int], rooms: Mapping[str, Set[str]], changed: Set[str]) -> dict[str, str]:
+    """Tell which files run whatever turn it is, each with a room that changed.
+
+    Parameters
+    ----------
+    tests, rooms
+        How many tests each file has, and the rooms that it is of.
+    changed
+        What changed, from the root of the repository.
+    """
+    of = {room: [file for file in tests if room in rooms[file]] for room in changed_rooms(changed)}
+    sizes = Counter({room: sum(tests[file] for file in files) for room, files in of.items()})
+    found: dict[str, str] = {}
+    for room in sorted(of, key=lambda room: (sizes[room], room)):
+        more = found | {file: room for file in of[room] if file not in found}
+        if sum(tests[file] for file in more) > SHARE * sum(tests.values()):
+            break
+        found = more
+    return found
 
 
 def turns(files: Set[str]) -> dict[str, int]:
