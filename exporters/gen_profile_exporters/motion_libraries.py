@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from gen_profile_exporters.block_source import BlockVariable
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.templates import text_parts
 
 _INSTANCE = re.compile(r"(\w+) : (\w+);")
 _VARIABLE = re.compile(r"(\w+) (\S+) : (\w+);() \(\* (.*) \*\)")

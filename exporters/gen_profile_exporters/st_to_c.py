@@ -32,7 +32,7 @@ from gen_profile_exporters.st_variables import (
     refused,
     require_no_word_of_c,
 )
-from gen_profile_exporters.text_parts import FOLDER, filled, indented
+from gen_profile_exporters.templates import FOLDER, filled, indented
 
 FAULTS = (
     "",

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 HIDDEN = {"asyncua", "canopen", "cryptography", "dask", "distributed", "flint", "matplotlib", "pandas"}
-HIDDEN |= {"pyads", "pyarrow", "ruckig", "snap7", "tornado"}  # Jinja2 and Plotly come with fmpy
+HIDDEN |= {"pyads", "pyarrow", "ruckig", "snap7", "tornado"}  # Plotly comes with fmpy
 WORKS = [
     "--export plc --export can --out out",
     "check out/paper.st",

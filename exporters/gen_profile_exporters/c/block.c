@@ -1,11 +1,11 @@
 /* Compile without contraction of products and sums (-ffp-contract=off). */
-#include "$name.h"
+#include "{{ name }}.h"
 #include <math.h>
 #include <string.h>
 
 #ifdef COUNT_OPERATIONS
-long ${name}_operations;
-#define OPERATIONS(number) (${name}_operations += (number))
+long {{ name }}_operations;
+#define OPERATIONS(number) ({{ name }}_operations += (number))
 #else
 #define OPERATIONS(number) ((void)0)
 #endif
@@ -52,7 +52,7 @@ static inline int32_t within(int32_t *fault, int32_t index, int32_t length)
 }
 static inline bool turn(int32_t *fault, int32_t *turns)
 {
-    return sound(fault, ++*turns <= $most_turns, 2) & (*fault == 0);
+    return sound(fault, ++*turns <= {{ most_turns }}, 2) & (*fault == 0);
 }
 static inline double nonzero(int32_t *fault, double divisor)
 {
@@ -101,17 +101,17 @@ static inline double root(int32_t *fault, double value)
 #define EITHER(one, other) ((one) || (other))
 #endif
 
-$blocks$constants
+{{ blocks }}{{ constants }}
 
-static void ${name}_init($name *fb) {
+static void {{ name }}_init({{ name }} *fb) {
     memset(fb, 0, sizeof *fb);
-$initials
+{{ initials }}
 }
 
-$parts
-static void ${name}_step($name *fb) {
+{{ parts }}
+static void {{ name }}_step({{ name }} *fb) {
     BEGIN();
     FIRST();
-$body
+{{ body }}
     END();
 }

@@ -1,13 +1,13 @@
-$constants
+{{ constants }}
 
-static void ${name}_init($name *fb) {
+static void {{ name }}_init({{ name }} *fb) {
     memset(fb, 0, sizeof *fb);
-$initials
+{{ initials }}
 }
 
-$parts
-static APART void ${name}_step($name *fb) {
+{{ parts }}
+static APART void {{ name }}_step({{ name }} *fb) {
     BEGIN();
-$body
+{{ body }}
     END();
 }

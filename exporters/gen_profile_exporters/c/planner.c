@@ -1,5 +1,5 @@
-/* $file.c: see $file.h. Compile as C99 (-std=c99), without -ffast-math. */
-#include "$file.h"
+/* {{ file }}.c: see {{ file }}.h. Compile as C99 (-std=c99), without -ffast-math. */
+#include "{{ file }}.h"
 
 #include <math.h>
 #include <string.h>
@@ -24,19 +24,19 @@ static inline int32_t within(int *left, int32_t index, int32_t length)
 #define AT(index, length) within(&left, index, length)
 #define CALL(name, instance) (left |= name(&(instance)))
 
-$blocks$constants
+{{ blocks }}{{ constants }}
 
-void ${name}_init(${name}_state *state, ${name}_inputs *in)
+void {{ name }}_init({{ name }}_state *state, {{ name }}_inputs *in)
 {
     memset(state, 0, sizeof *state);
     memset(in, 0, sizeof *in);
-$initials
+{{ initials }}
 }
 
-int ${name}_step(${name}_state *state, const ${name}_inputs *in, ${name}_outputs *out)
+int {{ name }}_step({{ name }}_state *state, const {{ name }}_inputs *in, {{ name }}_outputs *out)
 {
     int left = 0;
-$body
+{{ body }}
     *out = state->out;
     return left;
 }

@@ -1,14 +1,14 @@
-$constants
+{{ constants }}
 
-static void ${name}_init($name *fb)
+static void {{ name }}_init({{ name }} *fb)
 {
     memset(fb, 0, sizeof *fb);
-$initials
+{{ initials }}
 }
 
-static int ${name}_step($name *fb)
+static int {{ name }}_step({{ name }} *fb)
 {
     int left = 0;
-$body
+{{ body }}
     return left;
 }

@@ -1,6 +1,6 @@
 typedef struct {
-$members
+{{ members }}
 #ifdef CHECKED
     int32_t fault_, turns_;
 #endif
-} $name;
+} {{ name }};

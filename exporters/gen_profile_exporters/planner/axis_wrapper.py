@@ -22,7 +22,7 @@ from gen_profile_exporters.motion_libraries import (
     each,
 )
 from gen_profile_exporters.playback.structured_text import literal
-from gen_profile_exporters.text_parts import names_by_type, text_parts
+from gen_profile_exporters.templates import names_by_type, text_parts
 
 TEXTS = text_parts("planner/axis_wrapper.st")
 INTERFACE = ("VAR_INPUT", "VAR_OUTPUT")

@@ -7,7 +7,7 @@ from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File
 from gen_profile_exporters.st_to_c import Statements, c_parts, translate_statements
 from gen_profile_exporters.st_variables import StVariable, c_constants, c_initials, c_member
-from gen_profile_exporters.text_parts import filled, indented
+from gen_profile_exporters.templates import filled, indented
 
 OWNERS = {"VAR_INPUT": "in->", "VAR_OUTPUT": "state->out.", "VAR": "state->"}
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from gen_profile_exporters.block_source import BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File
 from gen_profile_exporters.playback.structured_text import plain
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.templates import text_parts
 
 OPENPLC = "_openplc.st"
 CYCLE = "fCycleTime"  # is the task's

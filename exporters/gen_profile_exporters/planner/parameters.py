@@ -22,7 +22,7 @@ from gen_profile_exporters.block_source import BlockSource, BlockVariable, initi
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.playback.block import CHECKSUM
-from gen_profile_exporters.text_parts import names_by_type, put_in, text_parts
+from gen_profile_exporters.templates import names_by_type, put_in, text_parts
 
 OURS = "OfBuffer"  # behind names that the block has already
 _WORD = re.compile(r"\w+")

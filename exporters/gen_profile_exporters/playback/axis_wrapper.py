@@ -13,7 +13,7 @@ import attrs
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.templates import text_parts
 
 TEXTS = text_parts("playback/text/axis_wrapper.st")
 STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")

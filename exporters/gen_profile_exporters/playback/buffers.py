@@ -33,7 +33,7 @@ from gen_profile_exporters.playback.block import fill, layout_of
 from gen_profile_exporters.playback.layouts import LAYOUTS
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
-from gen_profile_exporters.text_parts import names_by_type, put_in, text_parts
+from gen_profile_exporters.templates import names_by_type, put_in, text_parts
 
 INTERFACE = 2  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from gen_profile_exporters.text_parts import FOLDER, text_parts
+from gen_profile_exporters.templates import FOLDER, text_parts
 
 
 def _constant(line: str) -> tuple[str, str, str, str]:

@@ -29,7 +29,7 @@ from gen_profile_exporters.playback.structured_text import (
     table_checksum,
 )
 from gen_profile_exporters.playback.table import MOST_SAMPLES
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.templates import text_parts
 
 SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.SCALARS, buffers.PER_AXIS))
 *POWERS, SEGMENTS = (f"c{name}" for name in buffers.COLUMNS["segments"])

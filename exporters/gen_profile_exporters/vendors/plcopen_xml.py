@@ -21,7 +21,7 @@ from gen_profile_exporters.block_source import (
 )
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_text, replays
-from gen_profile_exporters.text_parts import filled
+from gen_profile_exporters.templates import filled
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
 
 XHTML = "http://www.w3.org/1999/xhtml"

@@ -18,7 +18,7 @@ from gen_profile.support.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_name
 from gen_profile_exporters.setpoints import MAX_SAMPLES, axis_table, in_si, sampled
-from gen_profile_exporters.text_parts import filled, text_parts
+from gen_profile_exporters.templates import filled, text_parts
 from gen_profile_exporters.vendors.cam_points import play_spline, spline_cycles, spline_error
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
 

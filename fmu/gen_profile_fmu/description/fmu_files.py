@@ -11,9 +11,10 @@ from pathlib import Path
 import attrs
 import fmpy
 
+from gen_profile_exporters.templates import filled
 from gen_profile_fmu.description.model_description import build_description, model_description
 from gen_profile_fmu.description.terminals import terminals_and_icons
-from gen_profile_fmu.model.c_sources import filled, hand_written
+from gen_profile_fmu.model.c_sources import TEMPLATES, hand_written
 from gen_profile_fmu.model.contents import Model
 
 SOURCE_FILE = "fmu.c"  # includes all others
@@ -91,7 +92,7 @@ def _translation_unit(model: Model, version: Version, identity: str) -> str:
     host, *interface = version.own_files
     names = [host, "model.h", *model.order, *_COMMON, *interface]
     return filled(
-        SOURCE_FILE,
+        TEMPLATES / SOURCE_FILE,
         fmi=f"FMI{version.value}",
         model=model.identifier,
         identity=identity,

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from string import Template
 
 import numpy as np
 
@@ -11,9 +10,11 @@ from gen_profile.dynamics.problem import symbolic as sym
 from gen_profile.dynamics.problem.dynamics import Dynamics
 from gen_profile.dynamics.problem.symbolic import Function
 from gen_profile.motion.profile import Profile
+from gen_profile_exporters.templates import filled
 from gen_profile_fmu.model.variables import DERIVATIVES, STATES, FmuVariable, Kind, Type, VariableTable
 
 _FOLDER = Path(__file__).parents[1] / "c"
+TEMPLATES = _FOLDER / "templates"
 FEWEST_POWERS = 4  # so that there is a jerk
 # of CasADi's text: all that it exports, and there the functions that only call the one with the equations
 _EXPORTED = r"^CASADI_SYMBOL_EXPORT [^{\n]*\{(?:[^\n]*\}\n|.*?^\}\n)\n?"
@@ -29,11 +30,6 @@ def hand_written(folder: str, *names: str) -> dict[str, str]:
 def model_sources(*names: str) -> dict[str, str]:
     """Read the hand-written files of a model, and those that every model has."""
     return hand_written("models", "model.h", *names)
-
-
-def filled(name: str, **values: object) -> str:
-    """Read a C file that is the same in every FMU but for what stands there as ``$name``."""
-    return Template(hand_written("templates", name)[name]).substitute(values)
 
 
 def equations_source(equations: Dynamics) -> str:
@@ -91,7 +87,7 @@ def variables_header(table: VariableTable, n_a: int, n_u: int, constants: Mappin
     offsets["STATES"] = 0 if states is None else table.offset(states)
     offsets.setdefault(DERIVATIVES, 0)
     return filled(
-        "variables.h",
+        TEMPLATES / "variables.h",
         counts=", ".join(f"{name} = {value}" for name, value in counts.items()),
         offsets=_lines(f"    {block} = {offset}" for block, offset in offsets.items()),
         types=", ".join(type_.name for type_ in Type),
@@ -106,9 +102,9 @@ def motion_table(profile: Profile) -> str:
     segments, powers, axes = profile.coefficients.shape
     padded = np.zeros((segments, max(powers, FEWEST_POWERS), axes))
     padded[:, :powers] = profile.coefficients
-    rows = ("    {" + ", ".join("{" + _numbers(power) + "}" for power in segment) + "}" for segment in padded)
+    rows = ("    {" + ", ".join(map(_numbers, segment)) + "}" for segment in padded)
     return filled(
-        "motion_table.h",
+        TEMPLATES / "motion_table.h",
         segments=segments,
         powers=padded.shape[1],
         axes=axes,
@@ -120,7 +116,7 @@ def motion_table(profile: Profile) -> str:
 
 
 def _numbers(values: object) -> str:
-    return ", ".join(repr(float(value)) for value in np.asarray(values))
+    return "{" + ", ".join(repr(float(value)) for value in np.asarray(values)) + "}"
 
 
 def _lines(items: Iterable[str]) -> str:

@@ -5,28 +5,29 @@ import math
 from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
-from string import Template
 
 import numpy as np
+from markupsafe import Markup
 
 from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Coordinate, Plant
-from gen_profile_exporters.text_parts import text_parts
+from gen_profile_exporters.templates import filled
 from gen_profile_fmu.model.nominals import rounded_up, smooth_move
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
-from gen_profile_fmu.model.variables import VariableTable
+from gen_profile_fmu.model.variables import FmuVariable, VariableTable
 
 _WIDTH, _HEIGHT, _SAMPLES = 640.0, 220.0, 321
 _FLAT = 1e-12  # what moves by less is drawn as a line
 _COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b")
-_TEXTS = text_parts(str(Path(__file__).with_name("pages.html")))
+_PAGE = Path(__file__).with_name("page.html")
+_PARTS = ("summary", "equations", "drives", "motion", "words", "sway")  # which some pages have
 
 
 def plant_page(name: str, machine: PlantInstance, table: VariableTable, kind: InputKind) -> str:
     """Describe a plant with inputs, in HTML; its picture is the swing after a quick push."""
     sway = _sway_plot(machine, _push(machine), 6.0)
-    return _page("plant", name, table, machine.plant, drives=_TEXTS[kind.value], sway=sway)
+    return _page("plant", name, table, machine.plant, drives=kind.value, sway=sway)
 
 
 def motion_page(name: str, axes: Sequence[Coordinate], profile: Profile, table: VariableTable) -> str:
@@ -55,30 +56,22 @@ def _page(kind: str, title: str, table: VariableTable, plant: Plant | None = Non
     if plant is not None:
         summary = escape(plant.summary[:1].upper() + plant.summary[1:])
         more |= {"summary": summary, "equations": _equations(plant)}
-    body = Template(_TEXTS[kind]).substitute(_TEXTS | more, variables=_variables(table))
-    return Template(f"{_TEXTS['page']}\n").substitute(title=escape(title), body=body)
+    ready = {part: Markup(more.get(part, "")) for part in _PARTS}  # escaped by now
+    return filled(_PAGE, kind=kind, title=title, variables=map(_row, table.variables), **ready)
 
 
 def _equations(plant: Plant) -> str:
     """Quote what the plant's file says of its equations."""
     module = inspect.getmodule(plant.equations)
     words = inspect.getdoc(module) or inspect.getdoc(plant.equations) or ""
-    general = "M_uu(q) q̈_u = K_u(q) + G_u(q, q̇) − M_au(q)ᵀ q̈_a"
-    return f"<h2>Equations</h2>\n<pre>{general}</pre>\n<pre>{escape(words)}</pre>"
+    return escape(words)
 
 
-def _variables(table: VariableTable) -> str:
-    def cell(number: float | None) -> str:
-        return "" if number is None else f"{number:g}"
-
-    rows = "\n".join(
-        f"<tr><td>{escape(v.name)}</td><td>{v.kind.causality}, {v.kind.variability}</td>"
-        f"<td>{escape(v.unit)}</td><td>{cell(v.start) if v.kind.has_start else ''}</td>"
-        f"<td>{cell(v.lower)}</td><td>{cell(v.upper)}</td><td>{escape(v.description)}</td></tr>"
-        for v in table.variables
-    )
-    head = "".join(f"<th>{word}</th>" for word in ("name", "kind", "unit", "start", "min", "max", "what"))
-    return f"<h2>Variables</h2>\n<table>\n<tr>{head}</tr>\n{rows}\n</table>"
+def _row(v: FmuVariable) -> tuple[str, ...]:
+    numbers = (v.start if v.kind.has_start else None, v.lower, v.upper)
+    start, low, high = ("" if number is None else f"{number:g}" for number in numbers)
+    kind = f"{v.kind.causality}, {v.kind.variability}"
+    return v.name, kind, v.unit, start, low, high, Markup(escape(v.description))
 
 
 def _push(machine: PlantInstance) -> Profile:

@@ -12,8 +12,8 @@ from gen_profile_exporters.planner.axis_declarations import GIVEN, PLACE, TAKEN
 from gen_profile_exporters.planner.sensor_constants import INPUTS, OUTPUTS
 from gen_profile_exporters.st_to_c import Translation, translate
 from gen_profile_exporters.st_variables import StVariable
-from gen_profile_exporters.text_parts import indented
-from gen_profile_fmu.model.c_sources import filled, model_sources, variables_header
+from gen_profile_exporters.templates import filled, indented
+from gen_profile_fmu.model.c_sources import TEMPLATES, model_sources, variables_header
 from gen_profile_fmu.model.contents import PLAIN, Model, plant_code
 from gen_profile_fmu.model.dependencies import Structure, plant_structure
 from gen_profile_fmu.model.documentation import block_page, planned_system_page
@@ -80,7 +80,7 @@ class _PlacedBlock:
         return {
             f"{self.code.name}.h": self.code.header,
             f"{self.code.name}.c": self.code.source,
-            "planner_block.h": filled("planner_block.h", block=self.code.name),
+            "planner_block.h": filled(TEMPLATES / "planner_block.h", block=self.code.name),
         }
 
 
@@ -303,7 +303,7 @@ def _block_source(block: _PlacedBlock, at: Mapping[str, int]) -> str:
     stands = [f"block->{output} = values[{at[given]}];" for output, given in taken.items()]
     changes = [f"tangent[{at[output]}] = tangent[{at[given]}];" for output, given in taken.items()]
     return filled(
-        "planner_block.c",
+        TEMPLATES / "planner_block.c",
         block=code.name,
         stands=indented(stands),
         changes=indented(changes),

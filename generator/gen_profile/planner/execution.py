@@ -17,7 +17,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import ISSUED, STATES, BlockAxis, block_axes
 from gen_profile.support.errors import ExportError
 from gen_profile.support.strict_json import parse_json
-from gen_profile_exporters import st_to_c, st_variables, text_parts
+from gen_profile_exporters import st_to_c, st_variables, templates
 from gen_profile_exporters.st_to_c import FAULTS, Translation, translate
 from gen_profile_exporters.st_variables import StVariable
 from gen_profile_fmu.building.build import compile_texts
@@ -151,9 +151,9 @@ def translated(text: str) -> Translation:
 @cache
 def _translator() -> tuple[bytes, ...]:
     """Give all that a translation is made by, so that none outlives a change of it."""
-    modules: tuple[Any, ...] = (st_to_c, st_variables, text_parts)  # perhaps in an archive
+    modules: tuple[Any, ...] = (st_to_c, st_variables, templates)  # perhaps in an archive
     code = (module.__loader__.get_data(module.__file__) for module in modules)
-    texts = (text_parts.FOLDER / name for name in st_to_c.TEXTS)
+    texts = (templates.FOLDER / name for name in st_to_c.TEXTS)
     return version("lark").encode("ascii"), *code, *(path.read_bytes() for path in texts)
 
 

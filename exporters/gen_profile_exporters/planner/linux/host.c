@@ -1,12 +1,12 @@
 /*
- * ${file}_linux.c: the planner of $file.c in a real-time loop, by which a Linux machine is a controller, from
+ * {{ file }}_linux.c: the planner of {{ file }}.c in a real-time loop, by which a Linux machine is a controller, from
  * gen-profile. Not a safety function: keep emergency stop and STO in hardware.
  *
- *     cc -std=c11 -O2 -o $name "${file}_linux.c" -lm
- *     sudo ./$name [SECONDS]        until Ctrl-C or SIGTERM
+ *     cc -std=c11 -O2 -o {{ name }} "{{ file }}_linux.c" -lm
+ *     sudo ./{{ name }} [SECONDS]        until Ctrl-C or SIGTERM
  *
- * It is called every $cycle s. Other programs reach it in shared memory, /dev/shm/$name, which is laid out as `struct
- * image` below: one writes the inputs, a fieldbus's takes the setpoints, and "${file}_opcua.py" serves both by OPC UA.
+ * It is called every {{ cycle }} s. Other programs reach it in shared memory, /dev/shm/{{ name }}, which is laid out as `struct
+ * image` below: one writes the inputs, a fieldbus's takes the setpoints, and "{{ file }}_opcua.py" serves both by OPC UA.
  * All that belongs to one cycle stands in one row. Only this user and his group may write it (UMask=0007 lets the
  * group): a file of that name that is another user's is refused. A program that opens it should do the same.
  *
@@ -15,7 +15,7 @@
  * punctual its cycles were.
  */
 #define _GNU_SOURCE
-#include "$file.c"
+#include "{{ file }}.c"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -34,9 +34,9 @@
 #error "numbers of 64 bits are not read and written whole here: take a 64-bit system"
 #endif
 
-enum { INPUTS = $inputs, COLUMNS = $columns, ROWS = 16384, NAME = 48, PRIORITY = 80 };
-enum { ALIVE = 0, STOP = $stop, QUICK_STOP = $quick_stop, LATE = COLUMNS - 3, STEP, OVERRUNS };
-static const int64_t SECOND = 1000000000, PERIOD = $period; /* ns */
+enum { INPUTS = {{ inputs }}, COLUMNS = {{ columns }}, ROWS = 16384, NAME = 48, PRIORITY = 80 };
+enum { ALIVE = 0, STOP = {{ stop }}, QUICK_STOP = {{ quick_stop }}, LATE = COLUMNS - 3, STEP, OVERRUNS };
+static const int64_t SECOND = 1000000000, PERIOD = {{ period }}; /* ns */
 
 struct image {
     char kind[16];
@@ -49,10 +49,10 @@ struct image {
 };
 
 static const char *const NAMES[COLUMNS] = {
-$names
+{{ names }}
 };
 static const double FIRST[INPUTS] = {
-$first
+{{ first }}
 };
 
 static volatile sig_atomic_t signals;
@@ -88,11 +88,11 @@ static void require_own(int file)
 {
     struct stat status;
     if (fstat(file, &status)) {
-        give_up("/dev/shm/$name");
+        give_up("/dev/shm/{{ name }}");
     }
     const mode_t foreign = S_IWOTH | (status.st_gid == getegid() ? 0 : S_IWGRP);
     if (!S_ISREG(status.st_mode) || status.st_uid != geteuid() || status.st_nlink != 1 || status.st_mode & foreign) {
-        fputs("/dev/shm/$name is another user's, or others may write it: remove it, and start again.\n", stderr);
+        fputs("/dev/shm/{{ name }} is another user's, or others may write it: remove it, and start again.\n", stderr);
         exit(1);
     }
 }
@@ -100,27 +100,27 @@ static void require_own(int file)
 /* Share the image, and keep others that would drive the same axes out. */
 static struct image *shared_image(void)
 {
-    const int file = shm_open("/$name", O_RDWR | O_CREAT, 0660);
+    const int file = shm_open("/{{ name }}", O_RDWR | O_CREAT, 0660);
     if (file < 0) {
-        give_up("/dev/shm/$name");
+        give_up("/dev/shm/{{ name }}");
     }
     require_own(file);
     if (flock(file, LOCK_EX | LOCK_NB)) {
-        give_up("$name runs already; end that first");
+        give_up("{{ name }} runs already; end that first");
     }
     struct image *image = MAP_FAILED;
     if (ftruncate(file, sizeof *image) == 0) {
         image = mmap(NULL, sizeof *image, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
     }
     if (image == MAP_FAILED) {
-        give_up("/dev/shm/$name");
+        give_up("/dev/shm/{{ name }}");
     }
     memset(image, 0, sizeof *image); /* also of a program that was killed */
     image->inputs = INPUTS;
     image->columns = COLUMNS;
     image->rows = ROWS;
     image->process = getpid();
-    image->cycle_time = $cycle;
+    image->cycle_time = {{ cycle }};
     for (int k = 0; k < COLUMNS; ++k) {
         strcpy(image->names[k], NAMES[k]);
     }
@@ -144,25 +144,25 @@ static void begin_real_time(void)
     }
 }
 
-static void take(const double *row, ${name}_inputs *in)
+static void take(const double *row, {{ name }}_inputs *in)
 {
-$taken
+{{ taken }}
 }
 
-static void issue(const ${name}_outputs *out, double *row)
+static void issue(const {{ name }}_outputs *out, double *row)
 {
-$issued
+{{ issued }}
 }
 
 /* Call the planner in every cycle until a signal has stopped it; one that comes too late is left out. */
 static void run(struct image *image, int64_t patience)
 {
-    static ${name}_state state;
-    ${name}_inputs in;
-    ${name}_outputs out = {0};
+    static {{ name }}_state state;
+    {{ name }}_inputs in;
+    {{ name }}_outputs out = {0};
     double alive = 0.0, late = 0.0, latest = 0.0, longest = 0.0;
     int64_t cycles = 0, overruns = 0, due = now() + PERIOD, heard = due - patience;
-    ${name}_init(&state, &in);
+    {{ name }}_init(&state, &in);
     for (; !signals || out.bBusy || cycles == 0; due += PERIOD) {
         for (; due < now(); due += PERIOD) {
             ++overruns;
@@ -180,8 +180,8 @@ static void run(struct image *image, int64_t patience)
         row[STOP] = row[STOP] > 0.0 || signals || (patience && begun - heard >= patience);
         row[QUICK_STOP] = row[QUICK_STOP] > 0.0 || signals > 1;
         take(row, &in);
-        if (${name}_step(&state, &in, &out)) {
-            fputs("$name would have left an array: this is an error of gen-profile. Stop the axes.\n", stderr);
+        if ({{ name }}_step(&state, &in, &out)) {
+            fputs("{{ name }} would have left an array: this is an error of gen-profile. Stop the axes.\n", stderr);
             exit(1);
         }
         issue(&out, row);
@@ -212,6 +212,6 @@ int main(int count, char **words)
     struct image *image = shared_image();
     begin_real_time();
     run(image, (int64_t)(seconds * 1e9));
-    shm_unlink("/$name");
+    shm_unlink("/{{ name }}");
     return 0;
 }

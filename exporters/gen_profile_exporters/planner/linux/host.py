@@ -4,7 +4,7 @@ from gen_profile_exporters.exporter import File
 from gen_profile_exporters.planner.c_source import c_files, c_name
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_exporters.st_to_c import translate
-from gen_profile_exporters.text_parts import filled
+from gen_profile_exporters.templates import filled
 
 GIVEN = {"BOOL": "row[{}] > 0.0", "LREAL": "row[{}]"}
 ALIVE, PUNCTUAL = "bAlive", ("fCycleLate", "fCycleWork", "nCyclesLeftOut")  # the host's own

@@ -2,16 +2,16 @@
 #ifndef MOTION_TABLE_H
 #define MOTION_TABLE_H
 
-enum { N_SEGMENTS = $segments, N_POWERS = $powers };
+enum { N_SEGMENTS = {{ segments }}, N_POWERS = {{ powers }} };
 
-static const double KNOTS[N_SEGMENTS + 1] = {$knots};
+static const double KNOTS[N_SEGMENTS + 1] = {{ knots }};
 
-static const double TARGET[] = {$target};
+static const double TARGET[] = {{ target }};
 
-static const double FINAL_VELOCITY[] = {$final_velocity};
+static const double FINAL_VELOCITY[] = {{ final_velocity }};
 
-static const double COEFFICIENTS[N_SEGMENTS][N_POWERS][$axes] = {
-$rows
+static const double COEFFICIENTS[N_SEGMENTS][N_POWERS][{{ axes }}] = {
+{{ rows }}
 };
 
 #endif

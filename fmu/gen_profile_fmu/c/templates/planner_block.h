@@ -3,8 +3,8 @@
 #define PLANNER_BLOCK_H
 
 #define CHECKED
-#include "$block.h"
+#include "{{ block }}.h"
 
-typedef $block PlannerBlock;
+typedef {{ block }} PlannerBlock;
 
 #endif

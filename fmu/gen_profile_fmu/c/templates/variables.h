@@ -6,14 +6,14 @@
 
 /* Counts, and the first value reference of every block. */
 enum {
-    $counts,
-$offsets
+    {{ counts }},
+{{ offsets }}
 };
 
-typedef enum { $types } Type;
-typedef enum { $kinds } Kind;
+typedef enum { {{ types }} } Type;
+typedef enum { {{ kinds }} } Kind;
 enum { ACCELERATION_INPUT, VELOCITY_INPUT, SETPOINT_INPUT };
-$constants
+{{ constants }}
 typedef struct {
     const char *name;
     Type type;
@@ -22,7 +22,7 @@ typedef struct {
 } Variable;
 
 static const Variable VARIABLES[N_VALUES] = {
-$rows
+{{ rows }}
 };
 
 #endif

@@ -60,7 +60,7 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
     Measure, log a swing, identify, design, prove, report, deploy, and record it. What no option answers is
     asked; SPEC.toml is made where it is not there, and gone on with where it is.
     """
-    require_installed("A report needs Jinja2 and Plotly", "report", "jinja2", "plotly")
+    require_installed("A report needs Plotly", "report", "plotly")
     run = _Guide(click.get_current_context(), given, yes)
     options.require_formats(given["formats"])
     run.require_log(given["swing"] or "")

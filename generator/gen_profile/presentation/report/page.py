@@ -10,10 +10,10 @@ from gen_profile.presentation.charts.plotly_json import figure_json
 from gen_profile.presentation.report.animation import Animation
 from gen_profile.presentation.report.content import Page
 from gen_profile.support.plugins import require_installed
+from gen_profile_exporters.templates import filled
 
 ASSETS = files("gen_profile.presentation.report") / "assets"
 SCRIPTS = ("figures.js", "animation.js")
-NEEDED = ("jinja2", "plotly")
 # characters with which a JSON text could leave its script element, or its line
 HARMLESS = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&\u2028\u2029"}
 
@@ -26,7 +26,7 @@ def require_pages() -> None:
     OutputError
         A library is not installed.
     """
-    require_installed("gen-profile report needs Jinja2 and Plotly", "report", *NEEDED)
+    require_installed("gen-profile report needs Plotly", "report", "plotly")
 
 
 def render(page: Page) -> bytes:
@@ -35,15 +35,11 @@ def render(page: Page) -> bytes:
     Whatever a text holds, it cannot run: the template escapes it, and a content security policy lets only the
     page's own scripts run, which it names by their SHA-256 (W3C, Content Security Policy Level 3, 8.3).
     """
-    import jinja2  # noqa: PLC0415  # an extra
     from plotly.offline import get_plotlyjs  # noqa: PLC0415
 
     scripts = [get_plotlyjs(), *((ASSETS / name).read_text("utf-8") for name in SCRIPTS)]
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    template = environment.from_string((ASSETS / "page.html").read_text("utf-8"))
-    text = template.render(
+    text = filled(
+        str(ASSETS / "page.html"),
         page=page,
         data=_data(page),
         style=(ASSETS / "page.css").read_text("utf-8"),

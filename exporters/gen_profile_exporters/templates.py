@@ -1,19 +1,45 @@
-"""Texts for controllers in files of their own, where they can be read as what they are.
+"""Texts for controllers, compilers and browsers in files of their own, which are Jinja2 templates.
 
-What a text leaves open stands in it as ``$name`` (C, XML, HTML, the playback block), as ``@name`` (buffers
-and planner blocks) or as ``{name}`` (libraries and what wraps a block).
+``{{ name }}`` is what a text leaves open; a line that is nothing but a statement ``{% … %}`` leaves no trace.
 """
 
 import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from string import Template
 from textwrap import indent
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 FOLDER = Path(__file__).parent
 _PART = re.compile(r"(?m)^@part (\w+)\n")
+
+
+def filled(path: str | Path, **values: object) -> str:
+    """Fill a template of this package, or of another one by its whole path, with values by their names.
+
+    Raises
+    ------
+    jinja2.UndefinedError
+        One is missing.
+    """
+    return _environment().get_template(str(path)).render(values)
+
+
+@cache
+def _environment() -> "Environment":
+    from jinja2 import Environment, FunctionLoader, StrictUndefined  # noqa: PLC0415  # slow to import
+
+    return Environment(
+        autoescape=lambda path: str(path).endswith(".html"),
+        loader=FunctionLoader(lambda path: (FOLDER / path).read_text("utf-8")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
 
 
 @cache
@@ -29,11 +55,6 @@ def text_parts(path: str) -> dict[str, Any]:
 def names_by_type(part: str) -> dict[str, tuple[str, ...]]:
     """Read lines of a type and names of variables that have it."""
     return {type_: tuple(names) for type_, *names in map(str.split, part.splitlines())}
-
-
-def filled(path: str, **values: object) -> str:
-    """Read a program of this package, and put in what stands there as ``$name``."""
-    return Template((FOLDER / path).read_text("ascii")).substitute(values)
 
 
 def put_in(text: str, **values: str) -> str:

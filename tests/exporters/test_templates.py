@@ -1,0 +1,32 @@
+"""One template language, and the white space that it leaves."""
+
+import jinja2
+import pytest
+
+from gen_profile_exporters.templates import filled
+
+
+@pytest.fixture
+def template(tmp_path):
+    def written(text, name="some.st"):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def test_a_statement_on_a_line_of_its_own_leaves_no_trace(template):
+    path = template("a\n    {% for name in names %}\n    {{ name }}\n    {% endfor %}\n\nb\n")
+    assert filled(path, names=["x", "y"]) == "a\n    x\n    y\n\nb\n"
+    assert filled(path, names=[]) == "a\n\nb\n"
+
+
+def test_a_value_that_is_missing_is_an_error(template):
+    with pytest.raises(jinja2.UndefinedError, match="'position' is undefined"):
+        filled(template("{{ position }}"), velocity=0.0)
+
+
+def test_what_others_wrote_ends_no_element_of_a_page(template):
+    assert filled(template("{{ name }}", "page.html"), name="<b>") == "&lt;b&gt;"
+    assert filled(template("{{ name }}"), name="a < b") == "a < b"
