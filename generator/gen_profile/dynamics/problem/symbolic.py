@@ -91,7 +91,7 @@ def entries(expression: Symbol) -> set[tuple[int, int]]:
     return set(zip(rows, columns, strict=True))
 
 
-_MANY = 160  # points from which on NumPy is quicker, operation by operation, than CasADi point by point
+_MANY = 200  # points from which on NumPy is quicker, operation by operation, than CasADi point by point
 _OPERATIONS: Mapping[str, Callable[..., Array]] = {
     "ADD": np.add,
     "SUB": np.subtract,

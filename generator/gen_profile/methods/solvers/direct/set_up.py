@@ -42,7 +42,8 @@ class DirectOptions:
     radians_per_interval : float
         rad of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost.
     step_tolerance : float
-        Relative change of the motion between two programs at which they end; the cost is off by its square.
+        How far the motion may still change, relative, as the last two programs let it be foreseen; the cost
+        is off by its square, or as much where sway's scale is automatic.
     max_iterations : int
         Programs on one mesh; most take ten.
     max_bisections : int

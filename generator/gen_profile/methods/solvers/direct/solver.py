@@ -8,6 +8,7 @@ convex programming; Malyuta et al., 2022); where motions overshoot one another, 
 motion can do where angles are small.
 """
 
+import math
 from collections.abc import Sequence
 
 import attrs
@@ -43,6 +44,7 @@ ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones 
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
 # solved exactly; they cost their square, and ten times or a tenth of them give the same motions
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
+BELIEVED = 0.03  # least quotient of steps that is taken for how they go on to shrink
 SLOW = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
 BISECTING = 0.7  # fraction of the work that is left, after which a motion on the first mesh will do
 WORTHWHILE = 1e-3  # relative change of the worst case worth another program; 1e-4 changes costs by 4e-7
@@ -304,7 +306,10 @@ def sequence(start: Iterate, goal: Goal, tolerance: float | None = None) -> Prog
         points.append(iterate.flat())
         iterate = transcription.iterate(solutions[-1].x, maps)
         images.append(iterate.flat())
-        if step < tolerance or _stalled(step, before, exact=solutions[-1].exact):
+        off = step
+        if goal.effort_price is None and not goal.setup.tried and step < SLOW * before < math.inf:
+            off *= max(step / before, BELIEVED)  # as steps go on to shrink
+        if off < tolerance or _stalled(step, before, exact=solutions[-1].exact):
             verdict = ConicStatus.SOLVED
         else:
             if step > SLOW * before:
