@@ -1,5 +1,10 @@
-"""The commit that a distribution is built from, written into it: `gen-profile --version` tells it."""
+"""What a distribution holds beside the packages.
 
+That is the commit that it is built from, which `gen-profile --version` tells, and in a wheel the manual's
+pages, which the studio shows.
+"""
+
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -9,14 +14,18 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 PLACES = {"sdist": "commit.txt", "wheel": "gen_profile/commit.txt"}
 
 
-class CommitHook(BuildHookInterface):
-    """Adds a file to both distributions; the source archive hands its own on to the wheel."""
+class DistributionHook(BuildHookInterface):
+    """Adds files to both distributions; the source archive hands its own on to the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Find or write the file."""
+        """Find or write the files."""
         kept = Path(self.root, PLACES["sdist"])
         if version == "editable":
             return
+        if self.target_name == "wheel":
+            build_data["force_include"] |= {
+                str(file): f"gen_profile/docs/{file.name}" for file in manual_files(Path(self.root, "docs"))
+            }
         if not kept.exists():
             commit = _commit(Path(self.root))
             if not commit:
@@ -33,6 +42,15 @@ class CommitHook(BuildHookInterface):
     @property
     def _written(self) -> Path:
         return Path(self.directory, f".{self.target_name}-commit.txt")
+
+
+def manual_files(docs: Path) -> list[Path]:
+    """List the manual's pages, and the pictures that are on them."""
+    pages = sorted(docs.glob("*.md"))
+    shown = {
+        name for page in pages for name in re.findall(r"!\[[^]]*\]\(([\w-]+\.png)\)", page.read_text("utf-8"))
+    }
+    return [*pages, *(docs / name for name in sorted(shown))]
 
 
 def _commit(root: Path) -> str:

@@ -40,6 +40,11 @@ def test_a_wheel_from_the_source_archive_is_that_from_the_checkout(tmp_path):
     with zipfile.ZipFile(one) as wheel:
         held = {name for name in wheel.namelist() if ".dist-info/" not in name} - {"gen_profile/commit.txt"}
         licences = [name for name in wheel.namelist() if name.endswith("/LICENSE")]
-    assert held == ours
+    pages = {f"gen_profile/docs/{file.name}" for file in (ROOT / "docs").glob("*.md")}
+    pictures = {
+        name for name in held - ours if name.startswith("gen_profile/docs/") and name.endswith(".png")
+    }
+    assert held == ours | pages | pictures
+    assert {name.rpartition("/")[2] for name in pictures} >= {"studio.png", "bay-crane.png"}
     assert any("dist-info/licenses/LICENSE" in name for name in licences)
     assert any("uPlot" in name and "dist-info" in name for name in licences)

@@ -263,6 +263,29 @@ def test_it_is_accessible(page, scheme, rules):
             assert page.violations(*rules) == []
 
 
+def test_every_knob_leads_to_its_line_in_the_manual(page):
+    found = page.run_async("""
+        const links = [...document.querySelectorAll('.knob')].map((knob) => knob.querySelector('a.help'));
+        const line = (shown, link) => shown.getElementById(link.hash.slice(1))?.textContent;
+        fetch('help/spec').then((answer) => answer.text()).then((text) => {
+            const shown = new DOMParser().parseFromString(text, 'text/html');
+            arguments[0](links.map((link) => link && [link.ariaLabel, line(shown, link)]));
+        });""")
+    assert len(found) > 50 and all(link and link[1] for link in found)
+    assert ["Help: Duration", "duration = 3.0"] in [[name, line[:14]] for name, line in found]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_of_the_manual_is_accessible(scheme):
+    with studio("--preset", "paper") as running, start() as window:
+        running.open(window)
+        window.visit(f"{running.address}help/spec#limits.velocity")
+        with window.emulated(scheme):
+            assert window.run("return document.querySelector(':target').textContent").startswith("# velocity")
+            assert window.violations() == []
+        assert window.complaints() == []
+
+
 def test_it_is_accessible_on_a_phone(page):
     page.size(390, 844, mobile=True)
     for view in VIEWS:

@@ -40,7 +40,7 @@ def running():
 def test_strangers_are_refused(running):
     address, own = running.address, {"Cookie": running.cookie}
     assert status(address, **own) == 200 and status(f"{address}words.json", **own) == 200
-    for name in ("words.json", "studio.js", "live", "made/unknown", "guess"):
+    for name in ("words.json", "studio.js", "live", "made/unknown", "help/spec", "help/studio.png", "guess"):
         assert status(f"{address}{name}") == 404
     assert status(address) == 403 and status(address, Cookie=running.cookie[:-2] + "xx") == 403
     assert status(address, Host="evil.example", **own) == 404  # whose name was made to mean this machine
@@ -50,6 +50,9 @@ def test_strangers_are_refused(running):
         assert status(f"{address}words.json", **{"Sec-Fetch-Site": site}, **own) == 404
     assert status(f"{address}../pyproject.toml", **own) == status(f"{address}studio.py", **own) == 404
     assert status(f"{address}made/unknown", **own) == 404
+    assert status(f"{address}help/spec", **own) == status(f"{address}help/studio.png", **own) == 200
+    for name in ("help/guess", "help/../pyproject.toml", "help/..%2Fpyproject", "help/conf.py", "help/"):
+        assert status(f"{address}{name}", **own) == 404
 
 
 @pytest.mark.slow
@@ -65,8 +68,9 @@ def test_a_code_works_once_and_in_any_writing(tmp_path):
         assert running.enter(stderr.read().split()[-1]) == given
 
 
-def test_the_page_can_load_and_tell_nothing_elsewhere(running):
-    with urlopen(Request(running.address, headers={"Cookie": running.cookie})) as answer:
+@pytest.mark.parametrize("place", ["", "help/spec"])
+def test_the_page_can_load_and_tell_nothing_elsewhere(running, place):
+    with urlopen(Request(f"{running.address}{place}", headers={"Cookie": running.cookie})) as answer:
         policy = dict(
             part.strip().split(" ", 1) for part in answer.headers["Content-Security-Policy"].split(";")
         )

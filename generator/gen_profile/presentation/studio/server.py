@@ -17,6 +17,7 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
+from gen_profile.presentation.studio import manual
 from gen_profile.presentation.studio.entrance import (
     PATIENCE,
     BoundedServer,
@@ -156,6 +157,18 @@ class Asset(Guarded):
             raise tornado.web.HTTPError(404)
         self.set_header("Content-Type", KINDS[Path(name).suffix])
         self.finish(ASSETS[name].read_bytes())
+
+
+class ManualPage(Guarded):
+    """A page of the manual, or a picture on one."""
+
+    def get(self, name: str, picture: str | None) -> None:
+        """Send it."""
+        content = manual.picture(name) if picture else manual.page(name)
+        if content is None:
+            raise tornado.web.HTTPError(404)
+        self.set_header("Content-Type", "image/png" if picture else KINDS[".html"])
+        self.finish(content)
 
 
 class FrontPage(Entering, Asset):
@@ -429,6 +442,7 @@ def _server(studio: Studio, entrance: Entrance) -> BoundedServer:
             ("/", FrontPage),
             ("/live", Conversation),
             (r"/made/(?P<name>[\w-]+)", Download),
+            (r"/help/(?P<name>[\w-]+)(?P<picture>\.png)?", ManualPage),
             (r"/(?P<name>.*)", Asset),
         ],
         websocket_max_message_size=MOST_UPLOAD,

@@ -23,6 +23,7 @@ from gen_profile.presentation.charts.curves import motion_figure, select_machine
 from gen_profile.presentation.report.animation import animation
 from gen_profile.presentation.studio.curves_json import curves_json
 from gen_profile.presentation.studio.knobs import knobs
+from gen_profile.presentation.studio.manual import help_on
 from gen_profile.presentation.studio.orders import Question
 from gen_profile.presentation.studio.state import command_of, text_of
 from gen_profile.presentation.studio.workers import Part, failure
@@ -92,9 +93,10 @@ def _setting(question: Question, spec: Spec) -> Part:
 
 
 def _json(knob: Any) -> dict[str, Any]:
-    """Leave out what is as by default; the page knows."""
+    """Leave out what is as by default, which the page knows, and say where the manual explains it."""
     pairs = ((field, getattr(knob, field.name)) for field in attrs.fields(type(knob)))
-    return {one.name: value for one, value in pairs if value != one.default or one.name == "value"}
+    stated = {one.name: value for one, value in pairs if value != one.default or one.name == "value"}
+    return {**stated, "help": help_on(knob.words)}
 
 
 def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any]]:

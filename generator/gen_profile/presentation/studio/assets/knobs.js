@@ -187,8 +187,9 @@ const knobs = (() => {
     }
     if (about) name.append(prefix, element("b", {}, knob.name), ` ${about}`);
     else name.append(label);
+    const help = element("a", { class: "help", href: knob.help, target: "gen-profile-help", hreflang: "en", "aria-label": `${options.phrase("help")}: ${label}`, title: options.phrase("help") }, "?");
     const fault = element("p", { class: "fault", hidden: true });
-    host.append(name, ...made.parts, fault);
+    host.append(name, ...made.parts, help, fault);
     const one = {
       knob, host, fault,
       show(next) {
