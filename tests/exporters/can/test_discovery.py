@@ -11,6 +11,7 @@ from exporters.motions import quintic
 from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can.host import clock, detection
 from gen_profile_exporters.can.host.link import Link
+from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.streaming.discovery import discover
 
 LINKS = [
@@ -137,7 +138,7 @@ def test_a_disturbed_bus_is_left_alone(early):
 
 class TestOnAChannel:
     def listed(self, monkeypatch, *options):
-        with Bench("cart") as bench:
+        with Bench("cart", port=Port) as bench:
             monkeypatch.setattr(clock, "SystemClock", lambda: bench.clock)
             channel = bench.witness.channel_info.rpartition(" ")[2]
             return run_here("can", "list", "--interface", "virtual", "--channel", channel, *options)
