@@ -78,6 +78,7 @@ def test_limits_bind_the_command_of_a_lagging_drive(tmp_path):
     assert limited.document["figures"]["command_velocity_max_m_per_s"] <= limit * (1.0 + 1e-6)
 
 
+@pytest.mark.slow
 def test_a_shortest_motion_without_a_limit_of_the_jerk_tells_its_own(tmp_path):
     shortest = ("--set", "move.duration=minimum", "--set", "limits.acceleration=0.7", "--no-check")
     outcome = run_here(*shortest, "--out", tmp_path, "--json")

@@ -86,6 +86,7 @@ def test_it_says_what_the_design_found(paper):
     }
 
 
+@pytest.mark.slow
 def test_the_robustness_it_states_is_where_the_check_begins_to_fail(paper):
     path, _ = paper
     text = " ".join(Reader(path.read_text("utf-8")).texts)

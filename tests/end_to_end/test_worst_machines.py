@@ -118,6 +118,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "name", "share", "limit", "more"), CASES.values(), ids=CASES.keys())
 def test_what_passes_at_nominal_and_ends_and_fails_between_is_refused(
     tmp_path, preset, name, share, limit, more

@@ -48,6 +48,7 @@ def test_what_a_mode_makes_a_load_sway_is_that_of_the_wrong_machine_s_own_modes(
         assert (stated <= 1.4 * true).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("second", [1.5, 2.0, 2.3])
 def test_what_errors_leave_is_not_overstated_where_the_hook_may_be_empty(second):
     """With three powers of a parameter it was, by up to 0.8 between the points of interpolation."""
@@ -58,6 +59,7 @@ def test_what_errors_leave_is_not_overstated_where_the_hook_may_be_empty(second)
         assert stated[:2] @ stated[2:] <= 1.12 * (true[:2] @ true[2:])
 
 
+@pytest.mark.slow
 def test_where_two_modes_come_too_near_each_other_the_place_and_a_cure_are_named():
     near = preset_spec("bay-crane", ["plant.L2=2.7"])
     words = (

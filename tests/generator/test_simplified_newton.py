@@ -84,6 +84,7 @@ def test_both_ways_lead_to_the_same_motion(name):
     np.testing.assert_allclose(*ends, rtol=1e-4, atol=1e-5 * ends[0].max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
