@@ -53,6 +53,12 @@ class BlockVariable:
     initial: str = ""
     comment: str = ""
 
+    def __str__(self) -> str:
+        """Write the declaration."""
+        initial = f" := {self.initial}" if self.initial else ""
+        comment = f" (* {self.comment} *)" if self.comment else ""
+        return f"{self.name} : {self.type}{initial};{comment}"
+
     @property
     def array(self) -> tuple[str, str, str] | None:
         """First and last index and type of the elements, or None."""
@@ -115,7 +121,7 @@ class BlockSource:
         for section in SECTIONS:
             variables = [v for v in self.variables if v.section == section]
             if variables:
-                lines += [section, *(f"    {_declared(v)}" for v in variables), "END_VAR"]
+                lines += [section, *(f"    {v}" for v in variables), "END_VAR"]
         return "\n".join(lines) + "\n"
 
 
@@ -196,12 +202,6 @@ def _pieces(text: str) -> list[str]:
 def bare(text: str) -> str:
     """Leave out white space and case, which mean nothing in Structured Text."""
     return "".join(text.split()).lower()
-
-
-def _declared(variable: BlockVariable) -> str:
-    initial = f" := {variable.initial}" if variable.initial else ""
-    comment = f" (* {variable.comment} *)" if variable.comment else ""
-    return f"{variable.name} : {variable.type}{initial};{comment}"
 
 
 def is_planner(text: str) -> bool:

@@ -28,6 +28,11 @@ def filled(path: str | Path, **values: object) -> str:
     return _environment().get_template(str(path)).render(values)
 
 
+def macros(path: str) -> Any:
+    """Give what a template of this package defines: its macros, and its values, as attributes."""
+    return _environment().get_template(path).module
+
+
 @cache
 def _environment() -> "Environment":
     from jinja2 import Environment, FunctionLoader, StrictUndefined  # noqa: PLC0415  # slow to import

@@ -199,7 +199,7 @@ class Vendor:
 
     Attributes
     ----------
-    library : MotionLibrary
+    library : str
     blocks : tuple of str
     axis : int
         Which of them is the axis.
@@ -211,7 +211,7 @@ class Vendor:
         Values of its state; astray is not homed.
     """
 
-    library: object
+    library: str
     blocks: tuple[str, ...]
     axis: int = 0
     part: str | None = None

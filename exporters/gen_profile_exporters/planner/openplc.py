@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from gen_profile_exporters.block_source import BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File
 from gen_profile_exporters.playback.structured_text import plain
-from gen_profile_exporters.templates import text_parts
+from gen_profile_exporters.templates import filled
 
 OPENPLC = "_openplc.st"
 CYCLE = "fCycleTime"  # is the task's
@@ -35,28 +35,24 @@ def openplc_files(text: str, file: str) -> tuple[File]:
         [v for v in source.variables if v.section == section and not v.array and v.name != CYCLE]
         for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
-    project = text_parts("planner/openplc.st")["project"].format(
+    project = filled(
+        "planner/openplc.st",
         file=plain(file),
-        name=source.name,
+        source=source,
         milliseconds=f"{1e3 * cycle:g}",
         block=text,
-        located="\n".join(
-            [*_located(inputs, 0), *_located([NUMBER, *outputs], STEP * -(-len(inputs) // STEP))]
-        ),
-        arguments=",\n    ".join(f"{v.name} := {v.name}" for v in inputs),
-        results="\n".join(f"{v.name} := fbPlanner.{v.name};" for v in outputs),
+        located=[*_located(inputs, 0), *_located([NUMBER, *outputs], STEP * -(-len(inputs) // STEP))],
+        inputs=inputs,
+        outputs=outputs,
     )
-    return (File(f"{file}{OPENPLC}", f"{project}\n".encode("ascii")),)
+    return (File(f"{file}{OPENPLC}", project.encode("ascii")),)
 
 
-def _located(variables: Iterable[BlockVariable], first: int) -> Iterator[str]:
-    """Declare variables at the next addresses of their areas, from the first one on."""
+def _located(variables: Iterable[BlockVariable], first: int) -> Iterator[tuple[str, BlockVariable]]:
+    """Give variables the next addresses of their areas, from the first one on."""
     numbers: dict[str, int] = {}
     for v in variables:
         area = AREAS[v.type]
         number = numbers.setdefault(area, first)
         numbers[area] += 1
-        place = f"{number // 8}.{number % 8}" if v.type == "BOOL" else str(number)
-        initial = f" := {v.initial}" if v.initial else ""
-        comment = f" (* {v.comment} *)" if v.comment else ""
-        yield f"    {v.name} AT %{area}{place} : {v.type}{initial};{comment}"
+        yield f"{area}{number // 8}.{number % 8}" if v.type == "BOOL" else f"{area}{number}", v

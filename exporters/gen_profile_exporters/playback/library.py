@@ -29,7 +29,7 @@ from gen_profile_exporters.playback.structured_text import (
     table_checksum,
 )
 from gen_profile_exporters.playback.table import MOST_SAMPLES
-from gen_profile_exporters.templates import text_parts
+from gen_profile_exporters.templates import filled
 
 SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.SCALARS, buffers.PER_AXIS))
 *POWERS, SEGMENTS = (f"c{name}" for name in buffers.COLUMNS["segments"])
@@ -231,8 +231,7 @@ def _header(entries: Sequence[LibraryEntry], target: Target) -> str:
     use = use.removesuffix("\n").removesuffix("*)")
     listed = [line for number, entry in enumerate(entries) for line in _listed(number, entry, target)]
     values = {"name": plain(target.name), "count": len(entries), "use": f"{start}{use}"}
-    text = text_parts("playback/text/library.st")["header"].format(**values, listed="\n".join(listed))
-    return f"{text}\n"
+    return filled("playback/text/library.st", **values, listed=listed)
 
 
 def _listed(number: int, entry: LibraryEntry, target: Target) -> list[str]:

@@ -18,7 +18,7 @@ from gen_profile.support.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_name
 from gen_profile_exporters.setpoints import MAX_SAMPLES, axis_table, in_si, sampled
-from gen_profile_exporters.templates import filled, text_parts
+from gen_profile_exporters.templates import filled
 from gen_profile_exporters.vendors.cam_points import play_spline, spline_cycles, spline_error
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
 
@@ -51,8 +51,9 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         _tag(tags, f"{name}_Profile", "CAM_PROFILE", len(cycles))
         _tag(tags, f"{name}_Control", "MOTION_INSTRUCTION")
         _switch(tags, f"{name}_Calculate")
+    statements = filled("vendors/rockwell_l5x.st", names=_tag_names(target), points=len(cycles))
     content = child(root, "Controller/Programs/Program/Routines/Routine/STContent")
-    for number, line in enumerate(_statements(_tag_names(target), len(cycles))):
+    for number, line in enumerate(statements.splitlines()):
         etree.SubElement(content, "Line", {"Number": str(number)}).text = etree.CDATA(line)
     return (File(f"{target.name}.L5X", write_xml(root)),)
 
@@ -176,9 +177,3 @@ def _short(name: str, most: int) -> str:
         return whole
     digest = sha256(name.encode("ascii")).hexdigest()[:6]
     return f"{whole[: most - 7].rstrip('_')}_{digest}"
-
-
-def _statements(names: list[str], points: int) -> list[str]:
-    texts = text_parts("vendors/rockwell_l5x.st")
-    cams = (texts["cam"].format(name=name, points=points) for name in names)
-    return "\n".join([texts["head"], *cams]).split("\n")
