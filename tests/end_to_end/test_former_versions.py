@@ -1,7 +1,7 @@
 """Files kept from former versions of the program: how manifests and certificates of other versions are read.
 
-`former` holds what `gen-profile SPEC --out FOLDER` and `check FOLDER/kept.csv --certify` wrote at three
-commits, by their dates (bf37a762, f97690ff and 1d38b36b); docs/check.md states the policy. The spec of the
+`former` holds what `gen-profile SPEC --out FOLDER` and `check FOLDER/kept.csv --certify` wrote at two
+commits, by their dates (bf37a762 and f97690ff); docs/check.md states the policy. The spec of the
 first one is written otherwise today, as a key of it is new.
 """
 
