@@ -4,35 +4,43 @@ import random
 import socket
 import struct
 from contextlib import closing
+from functools import partial
 
 import numpy as np
 import pytest
 from command_line import run_here
-from end_to_end.simulated_controllers import BARE, free_port, serving
+from end_to_end.simulated_controllers import (
+    MOVES,
+    assert_deployed_and_watched,
+    assert_whole,
+    attempted,
+    deployed_otherwise,
+    exported_moves,
+    free_port,
+    serving,
+    table_in_use,
+    unchecked_deployments,
+)
 
 from gen_profile.delivery.deployment.ads import AdsLink
 from gen_profile.delivery.deployment.ads_sim import SimulatedAdsController
 from gen_profile.delivery.deployment.block_state import MotionState, read_state
-from gen_profile.delivery.deployment.deploy import deploy, verify
+from gen_profile.delivery.deployment.deploy import deploy
 from gen_profile.delivery.deployment.mailbox import RIGHT, LinkLostError, Mailbox
-from gen_profile.delivery.deployment.table import BlockTable, read_table
-from gen_profile.support.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.support.errors import DeploymentError
 
 FAULTS = 25
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ads")
-    for name, distance in {"old": 0.3, "new": 0.25, "other": 0.2}.items():
-        words = (*BARE, "--export", "twincat", "--set", f"move.distance={distance}")
-        assert run_here(*words, "--out", folder / name).code == 0
-    return folder
+    return exported_moves(tmp_path_factory.mktemp("ads"), "twincat")
 
 
 @pytest.fixture(scope="module")
 def tables(files):
-    return {name: read_table(files / name / "FB_paper.TcPOU") for name in ("old", "new", "other")}
+    return {name: read_table(files / name / "FB_paper.TcPOU") for name in MOVES}
 
 
 @pytest.fixture
@@ -46,19 +54,14 @@ def plc(tables):
 def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     old, new = files / "old" / "FB_paper.TcPOU", files / "new" / "FB_paper.TcPOU"
     controller, where = plc
-    done = run_here("deploy", new, *where, "--json")
-    assert done.code == 0, done.err
-    at = done.document["controller"]
+
+    def start():
+        with controller.lock:
+            controller.block.set("bExecute", np.ones(1))
+
+    at = assert_deployed_and_watched(old, new, where, start)
     assert (at["instance"], at["security"], at["policy"]) == ("MAIN.fbMotion", "none", "None")
-    assert done.document["held_sha256"] == done.document["table_sha256"]
-    assert run_here("deploy", new, *where, "--instance", "MAIN", "--verify").code == 0
-    assert run_here("deploy", old, *where, "--verify").code == 4
-    assert "rolled back" in run_here("deploy", old, *where, "--rollback").out
-    with controller.lock:
-        controller.block.set("bExecute", np.ones(1))
-    watched = run_here("deploy", old, *where, "--watch", "--for", "1.5", "--json")
-    assert watched.code == 0, watched.err
-    assert watched.document["moving"] == watched.document["exact"] > 1
+    assert run_here("deploy", old, *where, "--instance", "MAIN", "--verify").code == 0
 
 
 @pytest.mark.slow
@@ -76,9 +79,7 @@ def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     ids=lambda value: value if isinstance(value, str) else None,
 )
 def test_what_is_not_as_it_should_be_is_told_in_a_sentence(words, code, error, files, plc):
-    options = dict(zip(plc[1][::2], plc[1][1::2], strict=True)) | words
-    given = [word for option, value in options.items() if value is not None for word in (option, value)]
-    found = run_here("deploy", files / "old" / "FB_paper.TcPOU", *given)
+    found = deployed_otherwise(files / "old" / "FB_paper.TcPOU", plc[1], words)
     assert found.code == code and error in found.err, found.err
     assert "Warning" not in found.err  # of the library
 
@@ -115,13 +116,7 @@ class Bench(SimulatedAdsController):
             self.block.set("bExecute", np.zeros(1))
         self.turn(400)
         with closing(self.link()) as link:
-            for name, table in self.tables.items():
-                try:
-                    verify(table, Mailbox(link, pause=lambda _: None))
-                except CheckFailed:
-                    continue
-                return name
-        return None
+            return table_in_use(self.tables, Mailbox(link, pause=lambda _: None))
 
 
 class FaultyLink(AdsLink):
@@ -167,15 +162,7 @@ def bench(tables):
 
 @pytest.fixture
 def checked(tables, monkeypatch):
-    judgement = tables["new"].check(tables["new"].values, lambda *_: None)
-    checked = []
-
-    def note(_self, values, _progress):
-        checked.append(values)
-        return judgement
-
-    monkeypatch.setattr(BlockTable, "check", note)
-    return checked
+    return unchecked_deployments(monkeypatch, tables)
 
 
 def drawn(bench, choices):
@@ -208,22 +195,14 @@ def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(ben
         bench.reset()
         checked.clear()
         fault, times = drawn(bench, choices), choices.choice([1, 1, 2, 5, 40, 1000])
-        case = (number, fault, times)
         with closing(bench.link()) as link:
             link.fault, link.span = dict(fault), range(at := choices.randint(1, 60), at + times)
-            try:
-                deploy(tables["new"], Mailbox(link, pause=lambda _: None))
-                done, error = True, ""
-            except (DeploymentError, CheckFailed, ExportError) as raised:
-                done, error = False, str(raised)
+            box = Mailbox(link, pause=lambda _: None)
+            done, error = attempted(partial(deploy, tables["new"], box))
         found = bench.used()
         ends.append((done, found))
-        if done:
-            assert found == "new" or "happen" in fault, case
-            assert any(np.array_equal(one, tables["new"].values) for one in checked), case
-        else:
-            assert found == "old" or "happen" in fault or (checked and "verify which" in error), (case, error)
-        assert found is not None, case
+        assert_whole(done, error, found, fault, tables, checked)
+        assert found is not None, (number, fault, times)
     assert {(True, "new"), (False, "old")} <= set(ends)
 
 

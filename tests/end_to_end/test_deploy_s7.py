@@ -7,32 +7,39 @@ from functools import partial
 import numpy as np
 import pytest
 from command_line import run_here
-from end_to_end.simulated_controllers import BARE, free_port, serving
+from end_to_end.simulated_controllers import (
+    MOVES,
+    assert_deployed_and_watched,
+    assert_whole,
+    attempted,
+    deployed_otherwise,
+    exported_moves,
+    free_port,
+    serving,
+    table_in_use,
+    unchecked_deployments,
+)
 from snap7.error import S7ConnectionError, S7TimeoutError
 
 from gen_profile.delivery.deployment.block_state import MotionState, read_state
-from gen_profile.delivery.deployment.deploy import deploy, verify
+from gen_profile.delivery.deployment.deploy import deploy
 from gen_profile.delivery.deployment.mailbox import RIGHT, Mailbox
 from gen_profile.delivery.deployment.s7 import S7Link
 from gen_profile.delivery.deployment.s7_sim import SimulatedS7Controller
-from gen_profile.delivery.deployment.table import BlockTable, read_table
-from gen_profile.support.errors import CheckFailed, DeploymentError, ExportError
+from gen_profile.delivery.deployment.table import read_table
+from gen_profile.support.errors import DeploymentError
 
 NUMBER, FAULTS = 7, 20
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("s7")
-    for name, distance in {"old": 0.3, "new": 0.25, "other": 0.2}.items():
-        words = (*BARE, "--export", "plc", "--export", "siemens-scl", "--set", f"move.distance={distance}")
-        assert run_here(*words, "--out", folder / name).code == 0
-    return folder
+    return exported_moves(tmp_path_factory.mktemp("s7"), "plc", "siemens-scl")
 
 
 @pytest.fixture(scope="module")
 def tables(files):
-    return {name: read_table(files / name / "paper.st") for name in ("old", "new", "other")}
+    return {name: read_table(files / name / "paper.st") for name in MOVES}
 
 
 @pytest.fixture
@@ -46,18 +53,8 @@ def plc(tables):
 def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     old, new = files / "old" / "paper.scl", files / "new" / "paper.scl"
     simulated, where = plc
-    done = run_here("deploy", new, *where, "--json")
-    assert done.code == 0, done.err
-    at = done.document["controller"]
+    at = assert_deployed_and_watched(old, new, where, lambda: simulated.memory.__setitem__(0, 1))
     assert (at["instance"], at["security"], at["policy"]) == ("DB7", "none", "None")
-    assert done.document["held_sha256"] == done.document["table_sha256"]
-    assert run_here("deploy", new, *where, "--verify").code == 0
-    assert run_here("deploy", old, *where, "--verify").code == 4
-    assert "rolled back" in run_here("deploy", old, *where, "--rollback").out
-    simulated.memory[0] = 1
-    watched = run_here("deploy", old, *where, "--watch", "--for", "1.5", "--json")
-    assert watched.code == 0, watched.err
-    assert watched.document["moving"] == watched.document["exact"] > 1
 
 
 @pytest.mark.slow
@@ -76,9 +73,7 @@ def test_a_table_gets_into_a_controller_and_back_and_is_watched(files, plc):
     ids=lambda value: value if isinstance(value, str) else None,
 )
 def test_what_is_not_as_it_should_be_is_told_in_a_sentence(words, code, error, files, plc):
-    options = dict(zip(plc[1][::2], plc[1][1::2], strict=True)) | words
-    given = [word for option, value in options.items() if value is not None for word in (option, value)]
-    found = run_here("deploy", files / "old" / "paper.st", *given)
+    found = deployed_otherwise(files / "old" / "paper.st", plc[1], words)
     assert found.code == code and error in found.err, found.err
 
 
@@ -118,14 +113,8 @@ class Bench:
         """Tell which table is used in the end, by a connection without faults."""
         self.controller.memory[0] = 0
         self.turn(400)
-        for name, table in self.tables.items():
-            with closing(self.link()) as link:
-                try:
-                    verify(table, self.box(link))
-                except CheckFailed:
-                    continue
-                return name
-        return None
+        with closing(self.link()) as link:
+            return table_in_use(self.tables, self.box(link))
 
 
 class BenchLink(S7Link):
@@ -147,15 +136,7 @@ def bench(tables):
 
 @pytest.fixture
 def unchecked(tables, monkeypatch):
-    judgement = tables["new"].check(tables["new"].values, lambda *_: None)
-    checked = []
-
-    def note(_self, values, _progress):
-        checked.append(values)
-        return judgement
-
-    monkeypatch.setattr(BlockTable, "check", note)
-    return checked
+    return unchecked_deployments(monkeypatch, tables)
 
 
 class Faults:
@@ -242,19 +223,11 @@ def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(ben
         fault, times = drawn(bench, choices), choices.choice([1, 1, 1, 2, 5, 40, 1000])
         with closing(bench.link(choices.choice([240, 480]))) as link:
             Faults(link, choices.randint(1, 150), times, **fault)
-            try:
-                deploy(tables["new"], bench.box(link))
-                done, error = True, None
-            except (DeploymentError, CheckFailed, ExportError) as raised:
-                done, error = False, str(raised)
-        found, case = bench.used(), (number, fault, times, error)
+            done, error = attempted(partial(deploy, tables["new"], bench.box(link)))
+        found = bench.used()
         ends.append((done, found))
-        if done:
-            assert found == "new" or "happen" in fault, case
-            assert any(np.array_equal(one, tables["new"].values) for one in unchecked), case
-        else:
-            assert found == "old" or "happen" in fault or (unchecked and "verify which" in error), case
-        assert found is not None, case
+        assert_whole(done, error, found, fault, tables, unchecked)
+        assert found is not None, (number, fault, times)
     assert {(True, "new"), (False, "old")} <= set(ends)
 
 

@@ -2,10 +2,12 @@
 
 import random
 import struct
+from functools import partial
 
 import attrs
 import numpy as np
 import pytest
+from end_to_end.simulated_controllers import assert_whole, attempted, table_in_use, unchecked_deployments
 from simulated_blocks import (
     VARIABLES,
     DirectLink,
@@ -109,18 +111,7 @@ def fresh(tables):
 
 @pytest.fixture
 def unchecked(tables, monkeypatch):
-    """Co-simulate nothing, but note what was to be: that takes most of the time."""
-    judgement = tables["new"].check(tables["new"].values, lambda *_: None)
-    assert judgement.check.passed
-    checked = []
-
-    def note(_self, values, _progress):
-        checked.append(values)
-        return judgement
-
-    for kind in (BlockTable, PlannerTable):
-        monkeypatch.setattr(kind, "check", note)
-    return checked
+    return unchecked_deployments(monkeypatch, tables, BlockTable, PlannerTable)
 
 
 def flip(values, choices):
@@ -179,14 +170,7 @@ def used(block, tables):
     for name in {"bExecute", "bEnable"} & block.inputs.keys():
         block.set(name, np.array([0.0]))
     block.run(400)
-    link = DirectLink(block)
-    for name, table in tables.items():
-        try:
-            verify(table, box_of(link))
-        except CheckFailed:
-            continue
-        return name
-    return None
+    return table_in_use(tables, box_of(DirectLink(block)))
 
 
 @pytest.mark.slow
@@ -204,20 +188,13 @@ def test_no_fault_leaves_a_controller_with_anything_but_a_whole_proved_table(
         fault = drawn[number % len(drawn)]
         link = FaultyLink(block, choices.randint(1, count.operations), times, **fault)
         unchecked.clear()
-        try:
-            done, error = deploy(tables["new"], box_of(link), trial=True), None
-        except (DeploymentError, CheckFailed, ExportError) as raised:
-            done, error = None, str(raised)
+        done, error = attempted(partial(deploy, tables["new"], box_of(link), trial=True))
         found = used(block, tables)
-        case = (number, fault, error)
         if found is None:  # memory that failed once all was confirmed: nothing starts
-            assert "happen" in fault and box_of(DirectLink(block)).status().checked != RIGHT, case
-        elif done is not None:
-            assert found == "new" or "happen" in fault, case
-            assert any(np.array_equal(one, tables["new"].values) for one in unchecked), case
+            assert "happen" in fault and box_of(DirectLink(block)).status().checked != RIGHT, (number, fault)
         else:
-            assert found == "old" or "happen" in fault or (unchecked and "verify which" in error), case
-        ends.append((done is not None, found))
+            assert_whole(done, error, found, fault, tables, unchecked)
+        ends.append((done, found))
     assert {(True, "new"), (False, "old")} <= set(ends)
 
 
