@@ -28,10 +28,11 @@ import numpy as np
 
 from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.support.errors import ExportError
-from gen_profile.support.units import AXIS_UNITS, COUNTS, AxisScale
+from gen_profile.support.units import AXIS_UNITS, COUNTS, AxisScale, require_one_way
 from gen_profile_exporters import csv_dialects, setpoints
 from gen_profile_exporters.csv_dialects import DIALECTS, CsvDialect, Row
 from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.modulo import least, require_short_steps, unwrapped, wrapped
 
 TIME = "time_s"
 # quantity → what follows the axis unit in its column's name
@@ -59,6 +60,10 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
             f"motion has {len(motion.position)}; lower export.cycle_time."
         )
     table = setpoints.axis_table(motion, target.axes)
+    for number, axis in enumerate(target.axes):
+        if axis.modulo is not None:
+            require_short_steps(table.position[:, number], axis.modulo, axis, target.cycle_time)
+            table.position[:, number] = wrapped(table.position[:, number], axis.modulo)
     columns = [_time_texts(len(table.position), target.cycle_time)]
     for number, axis in enumerate(target.axes):
         for quantity in target.export.csv_columns:
@@ -104,11 +109,27 @@ def _motion(
     factor = np.array([axis.factor for axis in target.axes])
     if "position" in columns:
         _check_counts(columns["position"], target.axes, lines)
+        columns["position"] = _continuous(columns["position"], target, lines)
     else:
         columns["position"] = _integrated(
             columns["velocity"], cycle_time, setpoints.in_axis_units(np.array(target.start), factor)
         )
     return setpoints.motion_of(setpoints.AxisTable(cycle_time=cycle_time, **columns), target.axes)
+
+
+def _continuous(position: Array, target: Target, lines: Sequence[int]) -> Array:
+    """Go on where positions of an axis begin anew."""
+    position = position.copy()
+    for number, (axis, start) in enumerate(zip(target.axes, target.start, strict=True)):
+        turn, places = axis.modulo, position[:, number]
+        if turn is None:
+            continue
+        for row in map(int, np.flatnonzero(wrapped(places, turn) != places)):
+            end = least(turn) + turn
+            outside = f"{places[row]:.15g} lies outside {least(turn):g} to {end:g} (axis.modulo)"
+            raise _altered(lines[row], f"axis {axis.name}: {outside}")
+        position[:, number] = unwrapped(places, turn, start * axis.factor)
+    return position
 
 
 def _integrated(velocity: Array, cycle_time: float, start: Array) -> Array:
@@ -126,6 +147,9 @@ def _dialect(target: Target) -> CsvDialect:
             'export.csv_columns = ["position"], and take another dialect for '
             "several axes."
         )
+    for axis in () if dialect.header else target.axes:
+        what = f"a cam of export.csv_dialect = {target.export.csv_dialect} is interpolated through its ends"
+        require_one_way(axis, what, "take another dialect, or leave axis.modulo out")
     return dialect
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 from gen_profile.support.errors import ExportError, SpecError
 from gen_profile.support.plugins import load_plugin
 from gen_profile.support.suggestion import suggestion
+from gen_profile.support.units import require_one_way
 
 if TYPE_CHECKING:
     from gen_profile_exporters import csv_table
@@ -53,6 +54,8 @@ class Format(NamedTuple):
         Of the artefact's name, such as ``".csv"``.
     may_end_at_speed : bool
         What plays it does not hold the last setpoint: what comes next is not from here.
+    begins_anew : bool
+        Positions of an axis with ``axis.modulo`` begin anew after a turn in it, and are read back.
     holds_block : bool
         It carries the playback block: its module is a `gen_profile_exporters.exporter.BlockContainer`.
     """
@@ -62,6 +65,7 @@ class Format(NamedTuple):
     proof: Proof
     suffix: str
     may_end_at_speed: bool = False
+    begins_anew: bool = False
     holds_block: bool = False
 
 
@@ -97,8 +101,8 @@ def find_exporter(name: str) -> Exporter:
     return cast("Exporter", import_module(known[listed].module))
 
 
-def require_targets(exporters: Iterable[Exporter], target: Target) -> None:
-    """Refuse a target for which no motion could be exported, before one is sought.
+def require_targets(exporters: Mapping[str, Exporter], target: Target) -> None:
+    """Refuse a target for which formats could export no motion, before one is sought.
 
     Exporters that can tell have a function `require_target`, which takes the target.
 
@@ -106,7 +110,11 @@ def require_targets(exporters: Iterable[Exporter], target: Target) -> None:
     ------
     ExportError
     """
-    for exporter in exporters:
+    known = formats()
+    able = ", ".join(name for name, form in known.items() if form.begins_anew)
+    for name, exporter in exporters.items():
+        for axis in () if known[name].begins_anew else target.axes:
+            require_one_way(axis, f"{name} has no such positions", f"export {able}, or leave axis.modulo out")
         require: Callable[[Target], None] | None = getattr(exporter, "require_target", None)
         if require is not None:
             require(target)

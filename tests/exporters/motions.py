@@ -31,20 +31,32 @@ def bang_bang(acceleration=1.2):
     )
 
 
-def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="bay-3", export=None, **can):
+def target(
+    *names,
+    unit="m",
+    sign=1,
+    counts_per_si=1e6,
+    modulo=None,
+    start=0.0,
+    cycle_time=0.01,
+    name="bay-3",
+    export=None,
+    **can,
+):
     scales = tuple(
         AxisScale(
             name=axis,
             unit=unit,
             factor=sign * axis_factor(unit, counts_per_si),
             counts_per_si=sign * counts_per_si,
+            modulo=modulo,
         )
         for axis in names or ("cart",)
     )
     return Target(
         name=name,
         axes=scales,
-        start=(0.0,) * len(scales),
+        start=(start,) * len(scales),
         export=ExportSpec(cycle_time=cycle_time, **(export or {})),
         can=CanSpec(**can),
         variants=(AxisVariants(least_scale=0.0, mirror=True, shift=True),) * len(scales),

@@ -27,6 +27,7 @@ from gen_profile_exporters.can.pdos import (
     setpoint_fields,
 )
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.modulo import turn_counts, within
 from gen_profile_exporters.setpoints import two_digits_up
 
 NMT = 0x000
@@ -69,6 +70,8 @@ class SetpointFrame:
         How many setpoints an axis has.
     constants : tuple of int
         What is the same in every cycle of the motion.
+    turn : int or None
+        Counts after which the position begins anew, where it is the axis's first setpoint.
     """
 
     channel: str
@@ -78,6 +81,7 @@ class SetpointFrame:
     places: tuple[int, ...]
     width: int
     constants: tuple[int, ...]
+    turn: int | None = None
     packing: struct.Struct = attrs.field(init=False)
 
     @packing.default
@@ -86,7 +90,9 @@ class SetpointFrame:
 
     def pack(self, setpoints: Sequence[Sequence[int]]) -> bytes:
         """Take its content from all setpoints of all axes in one cycle."""
-        known = (*setpoints[self.column], *self.constants)
+        known = [*setpoints[self.column], *self.constants]
+        if self.turn is not None:
+            known[0] = within(known[0], self.turn)
         return self.packing.pack(*[known[place] for place in self.places])
 
     def keeps_constants(self, data: bytes) -> bool:
@@ -189,6 +195,7 @@ def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
             places=tuple(known.index(field) for field in received[pdo] if field.used),
             width=len(sent),
             constants=tuple(kept.values()),
+            turn=turn_counts(target.axes[column]) if target.can.mode != "csv" else None,
         )
         for column, (channel, own) in enumerate(zip(channels(target), cob_ids(target), strict=True))
         for pdo in pdos

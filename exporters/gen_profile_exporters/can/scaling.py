@@ -12,12 +12,13 @@ import numpy as np
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.can import CanSpec
 from gen_profile.support.errors import ExportError
-from gen_profile.support.units import AxisScale
+from gen_profile.support.units import AxisScale, require_one_way
 from gen_profile_exporters.can import pdos
 from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, exact, per_count
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.modulo import require_short_steps, turn_counts, within
 from gen_profile_exporters.setpoints import INT16, INT32, TOO_FAR, require_within
 
 NEAR_TIE = 1e-6  # of a count; doubles decide the rounding of what is further from a half
@@ -142,6 +143,14 @@ def setpoints(motion: SampledProfile, target: Target) -> Setpoints:
     )
 
 
+def start_counts(target: Target) -> tuple[int, ...]:
+    """Tell where each axis stands before the motion, in counts, whole turns included."""
+    return tuple(
+        int(exact_counts(np.array([place]), exact(axis.counts_per_si))[0])
+        for place, axis in zip(target.start, target.axes, strict=True)
+    )
+
+
 def travelled(velocity: Integers, period: float, target: Target) -> Array:
     """Distance in counts by the instant of each SYNC, if each velocity is kept for a period."""
     counts = [period / float(per_count(VELOCITY_UNIT, target.can, axis)) for axis in target.axes]
@@ -158,6 +167,7 @@ def travel_counts(axis: AxisScale, can: CanSpec) -> tuple[int, int] | None:
     """
     if axis.name not in can.travel:
         return None
+    require_one_way(axis, f"can.travel.{axis.name} states ends", "state only one of the two")
     what, travel = f"can.travel.{axis.name}", can.travel[axis.name]
     ends = exact_counts(np.array(travel), exact(axis.counts_per_si), what)
     least, greatest = int(ends.min()), int(ends.max())
@@ -191,9 +201,13 @@ def _greatest_acceleration(position: Integers, period: float) -> float:
 
 def _positions(values: Array, axis: AxisScale, can: CanSpec, period: float) -> Integers:
     counts = exact_counts(values, exact(axis.counts_per_si), f"axis {axis.name}")
-    require_within(INT32, counts, f"axis {axis.name}", TOO_FAR, period)
+    turn, sent = turn_counts(axis), counts
+    if turn is not None:
+        require_short_steps(counts.astype(np.float64), turn, axis, period)
+        sent = np.array([within(count, turn) for count in counts.tolist()], dtype=np.int64)
+    require_within(INT32, sent, f"axis {axis.name}", TOO_FAR, period)
     if can.encoder is not None or can.gear is not None or can.feed is not None:
-        increments = np.array([round(int(count) * position_factor(can)) for count in counts], dtype=object)
+        increments = np.array([round(int(count) * position_factor(can)) for count in sent], dtype=object)
         what = f"axis {axis.name}, in the drive's increments"
         require_within(INT32, increments, what, "choose a coarser encoder", period)
     travel = travel_counts(axis, can)

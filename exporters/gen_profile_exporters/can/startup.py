@@ -31,6 +31,7 @@ from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.scaling import Demand, travel_counts
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.modulo import least, turn_counts
 
 QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
 RAMP_THEN_DISABLE, SLOW_DOWN_THEN_DISABLE = 2, 1  # 605Ah: on 6085h, and on 6084h
@@ -63,6 +64,7 @@ SUBSTITUTES = {
     0x6007: "it reacts to a lost connection as its maker chose",
     0x605A: "it must brake at a quick stop by itself, and is switched off once it stands",
     0x6065: "this machine alone watches the following error, over the bus",
+    0x607B: "it must begin anew by itself after axis.modulo, and take the shorter way there",
     0x6085: "it brakes on 6084h at a quick stop (605Ah = 1), or, without 605Ah, on a ramp of its own",
     0x60C2: "it must interpolate over can.sync_period by itself",
 }
@@ -203,6 +205,11 @@ def _entries(
     if travel is not None:
         yield Entry(0x607D, 1, 32, travel[0], "lower end of the travel (counts)")
         yield Entry(0x607D, 2, 32, travel[1], "upper end of the travel (counts)")
+    turn = turn_counts(axis)
+    if turn is not None:
+        low = int(least(turn))
+        yield Entry(0x607B, 1, 32, low, "least position within a turn (counts)")
+        yield Entry(0x607B, 2, 32, low + turn - 1, "greatest position within a turn (counts)")
     for index, pair, meaning in (
         (0x608F, can.encoder, "encoder: increments per motor revolutions"),
         (0x6091, can.gear, "gear: motor revolutions per shaft revolutions"),

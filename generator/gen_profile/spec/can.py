@@ -152,7 +152,7 @@ def read_data_sheet(path: Path) -> DataSheet:
 
 
 # what streams can do without where a spec says so; `gen_profile_exporters.can.startup` has the substitutes
-Dispensable = Literal["1016h", "1017h", "6007h", "605Ah", "6065h", "6085h", "60C2h"]
+Dispensable = Literal["1016h", "1017h", "6007h", "605Ah", "6065h", "607Bh", "6085h", "60C2h"]
 
 
 @attrs.frozen(kw_only=True)

@@ -328,6 +328,7 @@ class AxisSpec(Checked, table="axis"):
     unit: Literal["m", "mm", "um", "deg", "rad", "counts"]
     sign: Literal[1, -1] = 1
     counts_per_metre: Positive = DEFAULT_COUNTS_PER_SI
+    modulo: Positive | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -427,6 +428,7 @@ class Spec(Drawable, Checked):
                 unit=axis.unit,
                 factor=axis.sign * axis_factor(axis.unit, axis.counts_per_metre),
                 counts_per_si=axis.sign * axis.counts_per_metre,
+                modulo=axis.modulo,
             )
             for name, axis in self.axis.items()
         )

@@ -4,6 +4,8 @@ import math
 
 import attrs
 
+from gen_profile.support.errors import ExportError
+
 # unit → (SI unit, how many of it make one SI unit)
 UNITS: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0),
@@ -37,14 +39,31 @@ class AxisScale:
         Axis units per SI unit; negative where the axis counts the other way.
     counts_per_si : float
         Drive counts per SI unit, negative likewise.
+    modulo : float or None
+        Axis units after which the axis begins anew; None where it does not.
     """
 
     name: str
     unit: str
     factor: float
     counts_per_si: float
+    modulo: float | None = None
 
 
 def axis_factor(unit: str, counts_per_si: float) -> float:
     """Axis units per SI unit."""
     return counts_per_si if unit == COUNTS else UNITS[unit][1]
+
+
+def require_one_way(axis: AxisScale, what: str, cure: str) -> None:
+    """Refuse an axis that begins anew after a turn.
+
+    Raises
+    ------
+    ExportError
+    """
+    if axis.modulo is not None:
+        raise ExportError(
+            f"axis {axis.name}: it begins anew after axis.modulo = {axis.modulo:.15g} {axis.unit}, and "
+            f"{what}; {cure}."
+        )

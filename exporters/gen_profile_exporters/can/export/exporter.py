@@ -21,8 +21,16 @@ from gen_profile_exporters.can.drive_units import VELOCITY_UNIT, per_count
 from gen_profile_exporters.can.export import candump, database, traces
 from gen_profile_exporters.can.export.candump import Frame, altered
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
-from gen_profile_exporters.can.scaling import Demand, Setpoints, demand_of, setpoints, travelled
+from gen_profile_exporters.can.scaling import (
+    Demand,
+    Setpoints,
+    demand_of,
+    setpoints,
+    start_counts,
+    travelled,
+)
 from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.modulo import least, turn_counts, unwrapped, within
 from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
 
 
@@ -149,7 +157,26 @@ def read_setpoints(content: bytes, target: Target) -> tuple[frames.Integers, lis
         raise ExportError("The CAN log ends without a SYNC after its last setpoint; export it again.")
     if len(syncs) < 2:
         raise ExportError(f"The CAN log holds {len(syncs)} SYNCs, a motion needs 2 or more; export it again.")
-    return np.array(taken, dtype=np.int64).reshape(len(taken), len(target.axes), width), syncs
+    setpoints = np.array(taken, dtype=np.int64).reshape(len(taken), len(target.axes), width)
+    return _continuous(setpoints, target), syncs
+
+
+def _continuous(setpoints: frames.Integers, target: Target) -> frames.Integers:
+    """Go on where positions of an axis begin anew."""
+    if target.can.mode == "csv":
+        return setpoints
+    for column, (axis, near) in enumerate(zip(target.axes, start_counts(target), strict=True)):
+        turn, places = turn_counts(axis), setpoints[:, column, 0]
+        if turn is None:
+            continue
+        outside = [place for place in places.tolist() if within(place, turn) != place]
+        if outside:
+            raise ExportError(
+                f"axis {axis.name}: a setpoint of {outside[0]} counts lies outside the turn of axis.modulo "
+                f"({int(least(turn))} to {int(least(turn)) + turn - 1}); export the log again."
+            )
+        setpoints[:, column, 0] = np.rint(unwrapped(places.astype(np.float64), turn, near))
+    return setpoints
 
 
 def _on_their_channels(

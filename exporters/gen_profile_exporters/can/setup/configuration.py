@@ -22,7 +22,7 @@ from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword,
 from gen_profile_exporters.can.following_window import useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.host.link import Link
-from gen_profile_exporters.can.scaling import Demand, magnitude_counts
+from gen_profile_exporters.can.scaling import Demand, magnitude_counts, start_counts
 from gen_profile_exporters.can.setup.node import Node
 from gen_profile_exporters.can.setup.restoration import (
     HEARTBEAT_WATCHED,
@@ -35,6 +35,7 @@ from gen_profile_exporters.can.setup.restoration import (
 from gen_profile_exporters.can.setup.standing import trembling
 from gen_profile_exporters.can.setup.units import require_position_unit, require_units
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.modulo import least, nearest, turn_counts, within
 
 CIA_402 = 402  # low word of 1000h
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
@@ -121,7 +122,8 @@ def positions(link: Link, target: Target, demand: Demand) -> tuple[int, ...]:
                     f"the drive holds another {entry.index:04X}h:{entry.sub:02X} than the "
                     f"spec ({entry.meaning}), and counts in other units; set that in the drive."
                 )
-    return tuple(_signed(node.read(0x6064)) for node in nodes)
+    near = start_counts(target)
+    return tuple(_actual(node, target, near[node.column]) for node in nodes)
 
 
 def start(link: Link, target: Target) -> None:
@@ -167,7 +169,7 @@ def _require_fit(node: Node, target: Target, demand: Demand) -> int:
     _require_mode(node, target)
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
         _require_window(node, target, demand)
-    _require_travel(node, demand)
+    _require_travel(node, target, demand)
     _require_homed(node, target)
     return _require_start(node, target, demand)
 
@@ -383,15 +385,17 @@ def _require_window(node: Node, target: Target, demand: Demand) -> None:
         )
 
 
-def _require_travel(node: Node, demand: Demand) -> None:
+def _require_travel(node: Node, target: Target, demand: Demand) -> None:
     ends = [node.upload(0x607D, sub, optional=True) for sub in (1, 2)]
     if ends[0] is None or ends[1] is None:
         return
     low, high = (int.from_bytes(end, "little", signed=True) for end in ends if end is not None)
-    least, greatest = demand.ends[node.column]
-    if low < high and not (low <= least and greatest <= high):
+    (begin, end), turn = demand.ends[node.column], turn_counts(target.axes[node.column])
+    if turn is not None:  # no end of a travel may lie within the turn
+        begin, end = int(least(turn)), int(least(turn)) + turn - 1
+    if low < high and not (low <= begin and end <= high):
         raise node.unfit(
-            f"the motion from {least} to {greatest} counts leaves the drive's "
+            f"the motion from {begin} to {end} counts leaves the drive's "
             f"travel of {low} to {high} counts (607Dh)."
         )
 
@@ -407,8 +411,8 @@ def _require_homed(node: Node, target: Target) -> None:
 
 
 def _require_start(node: Node, target: Target, demand: Demand) -> int:
-    actual = _signed(node.read(0x6064))
     axis = target.axes[node.column]
+    actual = _actual(node, target, 0 if demand.start is None else demand.start[node.column])
     if demand.start is None:
         _require_inside(actual, node, axis, demand)
         return actual
@@ -421,6 +425,24 @@ def _require_start(node: Node, target: Target, demand: Demand) -> int:
             "can.start_tolerance); home it, or move it there."
         )
     return actual
+
+
+def _actual(node: Node, target: Target, near: int) -> int:
+    """Ask where the axis stands, in counts; of an axis that begins anew, as near as can be to a place.
+
+    Raises
+    ------
+    StreamAborted
+        It tells a place outside the turn after which it is said to begin anew.
+    """
+    actual, turn = _signed(node.read(0x6064)), turn_counts(target.axes[node.column])
+    if turn is not None and within(actual, turn) != actual:
+        low = int(least(turn))
+        raise node.unfit(
+            f"it stands at {actual} counts, outside the turn of axis.modulo ({low} to {low + turn - 1}), so "
+            "the drive does not begin anew there; set its modulo axis up, or leave axis.modulo out."
+        )
+    return nearest(actual, turn, near)
 
 
 def _require_inside(actual: int, node: Node, axis: AxisScale, demand: Demand) -> None:

@@ -14,15 +14,14 @@ from typing import Any, cast
 import attrs
 import can
 import canopen
-import numpy as np
 from canopen import SdoAbortedError
 from canopen.objectdictionary.datatypes import INTEGER_TYPES, SIGNED_TYPES
 
 from gen_profile.spec.can import DataSheet
 from gen_profile.support.errors import ExportError, StreamAborted
-from gen_profile_exporters.can import drive_units, frames, startup
+from gen_profile_exporters.can import frames, startup
 from gen_profile_exporters.can.host.link import Link
-from gen_profile_exporters.can.scaling import Demand, exact_counts, quick_stop_deceleration
+from gen_profile_exporters.can.scaling import Demand, quick_stop_deceleration, start_counts
 from gen_profile_exporters.can.setup import configuration
 from gen_profile_exporters.can.setup.node import Node
 from gen_profile_exporters.can.setup.restoration import HEARTBEAT_WATCHED, MAPPING, Restoration
@@ -47,11 +46,7 @@ def require_able(sheet: DataSheet, target: Target) -> None:
     ExportError
         The file cannot be read, or no motion could be exported for a drive of its kind.
     """
-    places = zip(target.start, target.axes, strict=True)
-    start = tuple(
-        int(exact_counts(np.array([place]), drive_units.exact(axis.counts_per_si))[0])
-        for place, axis in places
-    )
+    start = start_counts(target)
     fast, gentle = (ANY_VELOCITY,) * len(start), (0.0,) * len(start)
     ramp = tuple(quick_stop_deceleration(0.0, target.can, axis) for axis in target.axes)
     any_motion = Demand(

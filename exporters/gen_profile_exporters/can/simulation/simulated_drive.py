@@ -35,6 +35,7 @@ from gen_profile_exporters.can.simulation.drive_dictionary import (
     supports,
 )
 from gen_profile_exporters.can.startup import AT_ONCE, OFF, SLOW_DOWN_THEN_DISABLE
+from gen_profile_exporters.modulo import nearest
 
 HEARTBEAT_LOST, SYNC_LENGTH, SETPOINT_LOST = 0x8130, 0x8240, 0x8250  # EMCY codes of CiA 301
 FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
@@ -285,7 +286,21 @@ class SimulatedDrive:
         mode = self.value(0x6061)
         if mode == MODES["csv"]:
             return self.command + self.value(0x60FF) * self._counts(0x60A9) * self.period
-        return float(self.value(0x60C1, 1) if mode == MODES["ip"] else self.value(0x607A))
+        asked = self.value(0x60C1, 1) if mode == MODES["ip"] else self.value(0x607A)
+        return float(nearest(asked, self._turn, round(self.command)))
+
+    @property
+    def _turn(self) -> int | None:
+        """Counts after which positions begin anew (607Bh); None where they do not."""
+        low, high = self.value(0x607B, 1), self.value(0x607B, 2)
+        return high - low + 1 if low < high else None
+
+    def _told(self) -> int:
+        """Where the axis is, as the drive counts."""
+        actual, low = round(self.actual), self.value(0x607B, 1)
+        if self._turn is not None:
+            return (actual - low) % self._turn + low
+        return min(max(actual, -(2**31)), 2**31 - 1)
 
     def _counts(self, unit: int) -> float:
         """Tell how many counts/s (or counts/s²) make one unit of 60A9h (or 60AAh)."""
@@ -337,7 +352,7 @@ class SimulatedDrive:
         follows = FOLLOWS if self.state is State.ENABLED and interpolating else 0
         voltage = VOLTAGE if self.state in POWERED else 0
         self.store(0x6041, 0, self.state.bits | follows | voltage | REMOTE | self._flags)
-        self.store(0x6064, 0, min(max(round(self.actual), -(2**31)), 2**31 - 1))
+        self.store(0x6064, 0, self._told())
 
     def _tpdos(self, due: Callable[[int], bool]) -> Iterator[tuple[int, int, bytes]]:
         """Go through the TPDOs that are on and whose transmission type is due: number, COB-ID, content."""

@@ -12,8 +12,10 @@ from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.pdos import Field
+from gen_profile_exporters.can.scaling import start_counts
 from gen_profile_exporters.can.setup.standing import Standing, trembling
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.modulo import nearest, turn_counts
 
 OPERATIONAL = 5
 # command specifiers of SDO requests (CiA 301) that change nothing: upload, its segments, abort, block upload
@@ -44,8 +46,12 @@ class WatchedAxis:
         What the drive tells at each SYNC, by COB-ID: statusword and position, together or apart.
     standstill : Standing
         Whether it stands, by the positions that it reported.
-    statusword, position : int
-        The latest; 0 before the first ones.
+    position : int
+        The latest in counts, whole turns included; the motion's start before the first one.
+    turn : int or None
+        Counts after which the axis begins anew.
+    statusword : int
+        The latest; 0 before the first one.
     stated, placed, beat : int
         Instants in ns of the latest statusword, position and heartbeat; 0 before the first ones.
     """
@@ -54,8 +60,9 @@ class WatchedAxis:
     node: int
     feedback: Mapping[int, tuple[Field, ...]]
     standstill: Standing
-    statusword: int = 0
     position: int = 0
+    turn: int | None = None
+    statusword: int = 0
     stated: int = 0
     placed: int = 0
     beat: int = 0
@@ -75,8 +82,8 @@ class WatchedAxis:
         if field == pdos.STATUSWORD:
             self.statusword, self.stated = value, now
         elif field == pdos.ACTUAL_POSITION:
-            self.position, self.placed = value, now
-            self.standstill.take(value, now)
+            self.position, self.placed = nearest(value, self.turn, self.position), now
+            self.standstill.take(self.position, now)
 
     def stands(self, since: int) -> bool:
         """Whether the drive said after an instant that it is not powered to move, and the axis stood."""
@@ -236,13 +243,15 @@ class Watch:
 def _watched(target: Target) -> tuple[WatchedAxis, ...]:
     """Make an axis to be watched for each of a target's."""
     transmitted = pdos.layout(target.can).transmitted
-    drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), strict=True)
+    drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), start_counts(target), strict=True)
     return tuple(
         WatchedAxis(
             name=axis.name,
             node=node,
             feedback={own[pdo]: fields for pdo, fields in transmitted.items()},
             standstill=Standing(trembling(axis)),
+            position=start,
+            turn=turn_counts(axis),
         )
-        for axis, node, own in drives
+        for axis, node, own, start in drives
     )

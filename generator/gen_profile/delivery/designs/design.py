@@ -194,7 +194,7 @@ def _designed(
     if not exporters:
         raise SpecError("export: name at least one format.")
     require_end(exporters, stops=spec.move.stops)
-    require_targets(exporters.values(), target_of(spec))
+    require_targets(exporters, target_of(spec))
     planned = plan(spec, progress)
     spec, command = planned.spec, planned.command
     with place as staging:

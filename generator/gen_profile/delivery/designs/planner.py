@@ -21,6 +21,7 @@ from gen_profile.support.artefacts.writing import staged
 from gen_profile.support.errors import Suggestion
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.summary import Drawable
+from gen_profile.support.units import require_one_way
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -99,6 +100,8 @@ def deploy_planner(
     GenProfileError
         Nothing was written.
     """
+    for axis in spec.axis_scales():
+        require_one_way(axis, "a planner block does not", "keep its travel within a turn, and leave it out")
     progress("finding the modes over the live ranges")
     block = planner_block(spec)
     files = block_files(block, spec, formats)
