@@ -1,0 +1,111 @@
+"""The account that follows a machine whose rope changes on the way, with a machine's constants put in."""
+
+from itertools import product
+from math import factorial
+
+import numpy as np
+
+from gen_profile.motion.profile import Array
+from gen_profile_exporters.block_source import initialiser
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants
+from gen_profile_exporters.planner.blocks.texts import SIDES, constant_lines, filled, longest
+from gen_profile_exporters.playback.structured_text import literal
+
+SHARE = 0.5  # of the allowed sway, that motions may leave by stated errors
+FAST = 0.25  # of what a mode may leave, the next faster one may
+ENDS = (-1.0, 1.0)  # shares of the errors, of the machines that are watched
+CYCLE_TERMS = 3  # of the series of a cycle, as in live_account.st
+LEFT_OUT = 1e-7  # of a mode, by the series of a slot
+
+
+def account_texts(c: PlannerConstants) -> str:
+    """Write the block of the account, behind that of the machine that it has within it."""
+    modes, machines, slots = c.modes, 1 + len(ENDS), longest(c)
+    swings, rows, plan, name = modes * machines, 6 * modes + 1, 2 * slots + 4, c.name.replace("-", "_")
+    lengths = {
+        "live": len(c.live), "swing": swings, "mode": modes, "entry": rows * slots, "row": rows,
+        "pair": rows // 2, "plan": plan, "power": len(c.live) * c.degrees, "matrix": modes**2,
+        "turn": machines * modes**2, "push": 4 * swings, "state": 2 * swings, "sweep": 2 * modes * swings,
+        "sum": 2 * swings, "model_row": modes + modes**2, "step": max(3, 2 * modes), "machine": machines,
+        "part": 6 * terms(c),
+    }  # fmt: skip
+    values: dict[str, str | int] = {
+        "account": f"{name}_account",
+        "rope_model": f"{name}_rope_model",
+        **{f"last_{array}": length - 1 for array, length in lengths.items()},
+        "swings": swings,
+        "mode_count": modes,
+        "slots": slots,
+        "plan": plan,
+        "polygon": literal(float(np.cos(np.pi / SIDES))),
+        "bounds": initialiser([literal(float(v)) for v in np.tile(_bounds(c), machines)]),
+        "rope_constants": constant_lines(_of_rope(c)),
+        "live_constants": constant_lines(_of_account(c)),
+    }
+    return "\n".join(filled(part, **values) for part in ("rope_model", "live_account"))
+
+
+def _bounds(c: PlannerConstants) -> Array:
+    """Divide what motions may leave, in m, among the modes, the slowest first."""
+    parts = FAST ** np.arange(c.modes)
+    return np.asarray(SHARE * c.sway_limit / len(c.axes) * parts / parts.sum())
+
+
+def terms(c: PlannerConstants) -> int:
+    """Find the terms of a slot's series: what they leave out of a mode is less than `LEFT_OUT`."""
+    corners = product((-1.0, 1.0), repeat=len(c.live))
+    signs = [np.prod(np.where(c.exponents % 2, np.array(at)[:, None], 1.0), axis=0) for at in corners]
+    squares = c.model[: c.modes] @ np.array(signs).T
+    fastest = float(
+        np.sqrt(squares.max(axis=1)[0 if c.modes == 2 else -1])
+    )  # of two by their sum, which is more
+    angle = fastest * max(c.periods) / SLOTS_PER_PERIOD
+    return next(k for k in range(4, 20) if angle ** (2 * k) / factorial(2 * k) < LEFT_OUT)
+
+
+def _of_live(c: PlannerConstants) -> dict[str, object]:
+    return {
+        "cLives": len(c.live),
+        "cLiveLow": [low for low, _ in c.live.values()],
+        "cLiveHigh": [high for _, high in c.live.values()],
+        "cStretch": [1.0, *(1.0 + c.stated_error * share for share in ENDS)],
+    }
+
+
+def _of_rope(c: PlannerConstants) -> dict[str, object]:
+    """Give squared frequencies, then the matrix of the loads' sway, and what they are evaluated by."""
+    model = np.vstack([c.model[: c.modes], c.model[2 * c.modes : 2 * c.modes + c.modes**2]])
+    return {
+        "cModes": c.modes,
+        "cMachines": 1 + len(ENDS),
+        "cLongest": terms(c),
+        **_of_live(c),
+        "cDegrees": c.degrees,
+        "cTerms": model.shape[1],
+        "cLiveBend": [float(v) for v in c.curvatures[: len(c.live)]],
+        "cExponent": [int(v) for v in c.exponents.ravel()],
+        "cModel": [float(v) for v in model.ravel()],
+    }
+
+
+def _of_account(c: PlannerConstants) -> dict[str, object]:
+    """Give rates and ranges, and the operations of a slot and a cycle, counted cautiously."""
+    machines, n, rows = 1 + len(ENDS), c.modes, c.modes + c.modes**2
+    evaluated = c.model.shape[1] * (len(c.live) + 2 * rows) + len(c.live) * (20 + 4 * c.degrees)
+    modes = n * (n * n * n * (2 * n + 4) + 4 * n * n) + 20 * machines * n
+    slot, cycle = (
+        k * (machines * (5 * n**2 + 8 * n + 2) + 2 * n**3 + n**2) + machines * 3 * n**3 + 14 * terms(c)
+        for k in (terms(c), CYCLE_TERMS)
+    )
+    return {
+        **_of_live(c),
+        "cCycle": c.cycle,
+        "cSlotsPerPeriod": SLOTS_PER_PERIOD,
+        "cRate": [float(c.rates.get(name, 0.0)) for name in c.live],
+        "cLowers": [float(c.rope_length_gain.get(name, 0.0)) for name in c.live],
+        "cTerms": terms(c),
+        "cModelWork": evaluated + modes + slot,
+        "cRunWork": 20 + machines * n * (8 + 8 * n),
+        "cSweepWork": 20 + machines * 2 * n * (n * (8 * n + 8) + 8),
+        "cFollowWork": evaluated + cycle + machines * n * (16 + 10 * n) + 12 * len(c.live),
+    }
