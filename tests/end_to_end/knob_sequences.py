@@ -39,6 +39,8 @@ def edits_of(chance: random.Random, knobs: list[dict[str, Any]]) -> dict[str, An
             value = chance.choice(knob["choices"])
         case "switch":
             value = chance.random() < 0.5
+        case "several":
+            value = chance.sample(knob["choices"], chance.randint(0, len(knob["choices"])))
         case "interval":
             value = chance.choice([0.05, 0.1, 0.2])
         case "pair":

@@ -275,6 +275,18 @@ def test_every_knob_leads_to_its_line_in_the_manual(page):
     assert ["Help: Duration", "duration = 3.0"] in [[name, line[:14]] for name, line in found]
 
 
+def test_an_axis_is_set_free_and_held_again():
+    with studio("--preset", "gantry-crane") as running, start() as window:
+        running.open(window)
+        window.wait("return document.querySelector('.knob.several input') !== null")
+        command = "document.querySelector('#command').textContent"
+        for free in ("true", "false"):
+            window.find(".knob.several input").click()
+            window.wait(f'return {command}.includes(`move.free=["x"]`) === {free}')
+        assert window.violations() == []
+        assert window.complaints() == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_page_of_the_manual_is_accessible(scheme):
     with studio("--preset", "paper") as running, start() as window:

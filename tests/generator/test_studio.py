@@ -162,6 +162,15 @@ def test_live_ranges_and_spans_have_knobs():
     assert by_part["can.node"]["value"] == 5 and by_part["can.node"]["whole"] is True
 
 
+def test_axes_that_may_help_have_a_knob():
+    by_part = parts(picture(of("tower-crane", {"move.free": ["slew"]})))
+    (knob,) = [one for one in by_part["setting"]["knobs"] if one["path"] == "move.free"]
+    assert knob["value"] == ["slew"] and knob["choices"] == ["slew", "trolley"]
+    assert not [
+        one for one in parts(picture(of("paper", {})))["setting"]["knobs"] if one["path"] == "move.free"
+    ]
+
+
 def test_what_is_shown_is_what_a_design_finds():
     by_part = parts(picture(of("paper", {"move.duration": 3.2})))
     assert list(by_part) == ["curves", "animation", "setting", "verdict"]
@@ -263,6 +272,8 @@ def random_edits(chance, listed):
                 if chance.random() < 0.05:
                     value = chance.choice([0.0, -1.0, 1e9])
                 edits[knob.path] = value if knob.index is None else [value] * chance.randint(1, 2)
+            case "several":
+                edits[knob.path] = chance.sample(knob.choices, chance.randint(0, len(knob.choices)))
             case "interval":
                 edits[knob.path] = chance.choice([None, 0.1])
             case "pair":

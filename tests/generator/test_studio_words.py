@@ -31,6 +31,7 @@ UNFIT = {
     "interval": (0.95,),
     "pair": ([3.0, 1.0], [-1.0, 1e9]),
     "switch": (True, False),
+    "several": (["none"],),
     "text": ("",),
     "choice": (),
 }

@@ -39,7 +39,7 @@ class Knob:
         Table of the spec.
     kind : str
         ``"number"``, ``"interval"`` (a parameter's range, stated as a share of it), ``"pair"``, ``"choice"``,
-        ``"switch"`` or ``"text"``.
+        ``"switch"``, ``"several"`` (any of the choices) or ``"text"``.
     words : str
         Key of its name in the table of words.
     name : str
@@ -201,6 +201,9 @@ def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
                 choices=("minimum",),
                 **(duration or {}),
             )
+    axes = tuple(axis.name for axis in spec.machine().actuated)
+    if len(axes) > 1 and spec.path is None:
+        yield Knob(path="move.free", kind="several", value=list(spec.move.free), choices=axes)
 
 
 def _of_parameter(one: Parameter, kind: str, place: str, value: Any) -> Knob:

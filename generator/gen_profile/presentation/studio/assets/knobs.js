@@ -156,6 +156,16 @@ const knobs = (() => {
       select.addEventListener("change", () => turn(knob.choices[select.selectedIndex], true));
       return { parts: [select], show: (next) => { select.value = String(next.value); } };
     },
+    several(knob, label, turn) {
+      const boxes = knob.choices.map(() => element("input", { type: "checkbox" }));
+      const taken = () => knob.choices.filter((_, place) => boxes[place].checked);
+      for (const box of boxes) box.addEventListener("change", () => turn(taken(), true));
+      const rows = boxes.map((box, place) => element("label", { class: "word" }, box, knob.phrase(knob.choices[place])));
+      return {
+        parts: [element("div", { role: "group", "aria-label": label }, ...rows)],
+        show: (next) => boxes.forEach((box, place) => { box.checked = next.value.includes(knob.choices[place]); }),
+      };
+    },
     switch(knob, label, turn) {
       const box = element("input", { type: "checkbox", "aria-label": label });
       box.addEventListener("change", () => turn(box.checked, true));
