@@ -135,6 +135,17 @@ class TestRefusals:
         (suggestion,) = refusal.value.suggestions
         assert gp.plan(suggestion.spec).passage.nearest.room >= 0.0
 
+    def test_a_slot_that_loads_would_swing_out_of_is_named(self):
+        walls = [[20.1, 22.5, 20.4], [22.5 + WIDTH + 2.0 * SIDEWAYS, 28.0, 19.0]]
+        spec = quay(
+            walls,
+            move={"start": [0.0, 30.1], "target": [22.5 + WIDTH / 2.0 + SIDEWAYS, 26.0]},
+            check={"residual_sway": 0.005},
+            robustness={"uncertain": {"L0": 0.5}},
+        )
+        with pytest.raises(gp.SolverDiverged, match=r"stack from 20\.1 to 22\.5 m.* it has 0 m more at the"):
+            gp.plan(spec)
+
     def test_a_wall_higher_than_the_rail_has_no_cure(self):
         with pytest.raises(gp.InfeasibleProblem) as refusal:
             gp.plan(quay([[20.0, 21.0, RAIL + 1.0]]))
@@ -188,11 +199,11 @@ def test_a_load_may_begin_and_end_at_the_clearance_itself(end):
     if end == "target":
         ends = {"start": [0.0, 30.1], "target": [22.5 + WIDTH / 2.0 + SIDEWAYS, 26.0]}
     plan = gp.plan(quay([[20.1, 22.5, 10.4]], move=ends))
-    times = np.linspace(0.0, plan.motion.duration, 20001)
+    times = np.linspace(0.0, plan.motion.duration + 20.0, 40001)  # it swings on beside the stack
     for rope in (0.9, 1.0, 1.1):
         x, z, _ = followed(plan.motion, rope * ROPE, times)
         assert shortage(x, z, plan.spec.path, *(ends[key][0] for key in ends)) <= NEARER
-    assert plan.motion.duration < 22.0  # as it takes with a centimetre more
+    assert plan.motion.duration < 23.0  # a centimetre farther away it takes 21 s
 
 
 def test_hook_and_load_of_a_machine_of_ones_own_keep_the_clearance(tmp_path):

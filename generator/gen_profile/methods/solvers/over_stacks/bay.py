@@ -140,6 +140,21 @@ class Bay:
         return low, high
 
     def events(self, machine: int, up: Pieces) -> Array:
+    @property
+    def tightest(self) -> tuple[StackZone | None, float]:
+        """The stack that a body of the nominal machine is nearest beside at the target, and its room in m."""
+        still = self.still(0)[:, 0]
+        low = [zone for zone in self.zones if self.hang[0, zone.body] + self.rise < zone.top]
+        rooms = [(zone, float(zone.beside(still[zone.body]))) for zone in low]
+        return min(rooms, key=lambda pair: pair[1], default=(None, math.inf))
+
+    def still(self, machine: int) -> Array:
+        """Where the bodies of a machine hang at the target in m, and their derivatives by its state."""
+        state = np.zeros(self.others.states)
+        state[0] = self.target
+        hoist = np.array([self.spec.move.target[self.hoist], 0.0, 0.0])
+        return self.others.seen(state, hoist, self.machines[machine])[:-1]
+
         """List the times at which bodies of a machine cross the heights of stacks."""
         fine = np.linspace(0.0, up.duration, FINE)
         lifted = up.at(fine)[:, 0]

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.dynamics.evaluation.clearance import Nearest, nearest
+from gen_profile.dynamics.evaluation.residual_sway import observation_time
 from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.dynamics.problem.parameter_box import machines_of
 from gen_profile.dynamics.problem.problem import problem_of
@@ -34,10 +35,11 @@ from gen_profile.support.errors import (
 )
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.progress import Progress, no_progress
+from gen_profile.support.work import OutOfWork
 
 METHOD = "over stacks"
 RESERVE = 2e-3  # m of clearance, for what lies between the steps of programs
-ENOUGH = 5e-4  # m that may be missing to it
+ENOUGH = 4e-4  # m that may be missing to it, less than the check allows
 # how much room is missing falls with the duration by about the trolley's speed
 ROUGH = Search(precision=4e-3, close=8e-3, slope=2.0, believed=(0.2, 20.0), longest=0.4, downward=True)
 EXACT = attrs.evolve(ROUGH, precision=8e-4, close=1e-3)
@@ -109,12 +111,12 @@ class _Planner:
         bay, alone = self.bay, _Planner(bay=self.bay.alone())
         start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
         lifted: Lifted = partial(bay.lifted, top=bay.top)
-        rough = _there(alone.quickest(lifted, start, ROUGH))
+        rough = _there(bay, alone.quickest(lifted, start, ROUGH))
         if rough.up.duration > bay.quickest_lift(bay.needed) + DECIDED_BY_HOIST:
             rough, lifted = alone.otherwise_lifted(rough, lifted)
         self.programs += alone.programs
         if len(bay.machines) > 1:
-            rough = _there(self.quickest(lifted, rough.up.duration, ROUGH))
+            rough = _there(bay, self.quickest(lifted, rough.up.duration, ROUGH))
         near = self.solved(rough) or rough
         course = self.quickest(lifted, near.up.duration, EXACT, near) or near
         duration = course.up.duration
@@ -182,16 +184,16 @@ def stretched(course: Course, up: Pieces) -> Course:
     return attrs.evolve(course, up=up, jerks=course.jerks * ratio**3, nodes=nodes)
 
 
-def _there(course: Course | None) -> Course:
+def _there(bay: Bay, course: Course | None) -> Course:
     if course is None:
-        raise _none_found()
+        raise _none_found(bay)
     return course
 
 
-def _none_found() -> SolverDiverged:
-    return SolverDiverged(
-        Phrase("move.duration: no duration was found in which the load passes the stacks; widen the limits."),
-        reasons=[Reason(code=Code.DIVERGED, place="move.duration")],
+def _none_found(bay: Bay) -> SolverDiverged:
+    """Say that no motion was found: the likeliest cause is an end beside which loads swing on too far."""
+    sentence = Phrase(
+        "move.duration: no duration was found in which the load passes the stacks; widen the limits."
     )
 
 
@@ -201,18 +203,31 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
     Raises
     ------
     InfeasibleProblem, SolverDiverged
+    zone, room = bay.tightest
+    path, allowed = bay.spec.path, max(bay.spec.check.residual_sway.values())
+    if len(bay.machines) > 1 and zone is not None and room < allowed:
+        assert path is not None
+        sentence = Phrase(
+            "move.target: no motion was found after which the {body} keeps its clearance to the stack from "
+            "{stack}, to which it has {room:.3g} m more at the target; move the target away from it, narrow "
+            "the ranges, or allow a smaller path.clearance.",
+            body=bay.plant.bodies[zone.body],
+            stack=path.named(zone.stack),
+            room=room,
+        )
+    place = sentence.split(":")[0]
+    return SolverDiverged(sentence, reasons=[Reason(code=Code.DIVERGED, place=place)])
         With what is in the way, and by how much.
     """
-    began, reserve, before = time.perf_counter(), RESERVE, -math.inf
+    began, reserve = time.perf_counter(), RESERVE
     progress("solving")
     for _ in range(ROUNDS):
         planner = _Planner(bay=bay_of(spec, reserve))
         course = planner.course()
         motion = _profile(planner.bay, course)
         near = _nearest(spec, motion)
-        if near.room >= 0.0 or -ENOUGH <= near.room < before + OVERALL / 2.0:
-            break  # beside an end at the clearance itself there is no reserve
-        before = near.room
+        if near.room >= -ENOUGH:
+            break
         reserve += OVERALL - near.room
     if near.room < -ENOUGH:
         raise _none_found()
@@ -232,12 +247,11 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
 
 
 def _nearest(spec: Spec, motion: Profile) -> Nearest:
-    """Look for the least room of machines all over the ranges."""
+    """Look for the least room of machines all over the ranges, on the way and while they swing on."""
     named = machines_of(problem_of(spec, whole=True))
-    swing = PlantSimulation(
-        spec.machine(), motion, named, motion.duration, spec.move.initial, accuracy=ACCURACY
-    )
-    times = np.linspace(0.0, motion.duration, WATCHED)
+    until = motion.duration + observation_time(spec)
+    swing = PlantSimulation(spec.machine(), motion, named, until, spec.move.initial, accuracy=ACCURACY)
+    times = np.linspace(0.0, until, WATCHED)
     return min((nearest(spec, times, bodies) for bodies in swing.bodies(times)), key=lambda one: one.room)
 
 

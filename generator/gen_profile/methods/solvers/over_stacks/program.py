@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from gen_profile.dynamics.problem.linearization import linear_terms, linearize
+from gen_profile.dynamics.problem.linearization import Linearization, linear_terms, linearize
 from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Entries, place, squares
 from gen_profile.methods.solvers.over_stacks.bay import Bay
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
@@ -160,7 +160,7 @@ class Program:
         for machine in range(len(self.bay.machines)):
             self._beside(program, machine)
             self._sway(program, machine)
-            if machine and self.bay.spec.robustness.method != "none":
+            if machine:
                 self._left(program, machine)
         least = -self._alone(self.variables - 1)
         program.at_most(least, np.array([-1.0 if smooth else MARGIN - 1.0]))
@@ -279,21 +279,29 @@ class Program:
         program.at_most(-matrix, (KEPT_SWAY * limit + now).ravel())
 
     def _left(self, program: ConicProgram, machine: int) -> None:
-        """Hold what is left of a machine's sway at the target to its limit."""
-        bay = self.bay
-        shown, limits = _residual(bay, machine)
-        columns = self._columns(machine)[TROLLEY:-1]
-        at = len(self.about.jerks) * (self.width + 1)
-        wide = np.zeros((len(shown), self.width))
-        wide[:, columns] = shown
-        matrix = place(wide[None], np.array([at]))
-        now = shown @ self.about.nodes[1][machine - 1][-1, TROLLEY:]
-        program.at_most(matrix, limits - now)
-        program.at_most(-matrix, limits + now)
+        """Hold what a machine swings by at the target to the limits of residual sway, and off stacks."""
+        bay, up, at = self.bay, self.about.up, len(self.about.jerks) * (self.width + 1)
+        linear, turns = _swinging_on(bay, machine)
+        sways = np.concatenate([linear.sway_gain, np.zeros_like(linear.sway_gain)], axis=1)
+        limits = KEPT_RESIDUAL * np.array(list(bay.spec.check.residual_sway.values()))
+        held = [] if bay.spec.robustness.method == "none" else [(sways, limits, 0.0)]
+        for body, still in enumerate(bay.still(machine)):
+            low, high = bay.bounds(machine, body, up, np.array([up.duration]))
+            held.append((still[None, 1 + TROLLEY :], np.minimum(still[0] - low, high - still[0]), 1.0))
+        last = self.about.nodes[1][machine - 1][-1, TROLLEY:]
+        for outputs, limit, give in held:
+            if np.isinf(limit).all():
+                continue
+            shown = np.concatenate([outputs @ turned for turned in turns])
+            wide = np.zeros((1, len(shown), self.width))
+            wide[0, :, self._columns(machine)[TROLLEY:-1]] = shown.T
+            for sign in (1.0, -1.0):
+                side = np.tile(limit, len(turns)) - sign * shown @ last
+                program.at_most(place(sign * wide, np.array([at])), side, give=give)
 
 
-def _residual(bay: Bay, machine: int) -> tuple[Array, Array]:
-    """Rows on (q_u, q̇_u) at the target that are the sways of loads in the time to come, and their limits."""
+def _swinging_on(bay: Bay, machine: int) -> tuple[Linearization, list[Array]]:
+    """Linearise a machine at the target, and tell what (q_u, q̇_u) there becomes at times to come."""
     plant, target = bay.plant, bay.spec.move.target
     rows = bay.machines[machine : machine + 1]
     stiffness, damping = (terms[0] for terms in linear_terms(plant, rows, target))
@@ -304,12 +312,10 @@ def _residual(bay: Bay, machine: int) -> tuple[Array, Array]:
     times = TURNS * (1 if n == 1 else 4)
     step = periods * 2.0 * math.pi / float(linear.frequencies[0]) / times
     once = expm(step * np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
-    shown = np.concatenate([linear.sway_gain, np.zeros_like(linear.sway_gain)], axis=1)
-    found = [shown]
+    turns = [np.eye(2 * n)]
     for _ in range(times - 1):
-        found.append(found[-1] @ once)
-    limits = KEPT_RESIDUAL * np.array(list(bay.spec.check.residual_sway.values()))
-    return np.concatenate(found), np.tile(limits, times)
+        turns.append(turns[-1] @ once)
+    return linear, turns
 
 
 def _control_points(span: float, order: int) -> Array:
