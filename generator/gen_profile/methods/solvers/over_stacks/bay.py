@@ -19,6 +19,7 @@ from gen_profile.spec.stacks import StackZone, hanging, trolley_and_hoist, zones
 FINE = 4001  # times at which levels are compared; between them they are straight lines
 UNLIMITED = 1e4  # in place of a limit of the trolley that is not stated
 EDGE = 1e-9  # s, to either side of a crossing
+LEVEL = 1e-5  # m, by which a level may be too low: between the times at which it is known it is higher
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -139,7 +140,6 @@ class Bay:
                 high[counts] = np.minimum(high[counts], right)
         return low, high
 
-    def events(self, machine: int, up: Pieces) -> Array:
     @property
     def tightest(self) -> tuple[StackZone | None, float]:
         """The stack that a body of the nominal machine is nearest beside at the target, and its room in m."""
@@ -155,6 +155,7 @@ class Bay:
         hoist = np.array([self.spec.move.target[self.hoist], 0.0, 0.0])
         return self.others.seen(state, hoist, self.machines[machine])[:-1]
 
+    def events(self, machine: int, up: Pieces) -> Array:
         """List the times at which bodies of a machine cross the heights of stacks."""
         fine = np.linspace(0.0, up.duration, FINE)
         lifted = up.at(fine)[:, 0]
@@ -229,7 +230,7 @@ def _side(zone: StackZone, end: float) -> tuple[float, float]:
 def _crossings(times: Array, level: Array, top: float) -> tuple[float, float]:
     """Tell until when a level is too low on its way up, and from when on its way down."""
     peak = int(np.argmax(level))
-    low = level < top
+    low = level < top - LEVEL
     if low[peak]:
         return float(times[peak]), float(times[peak])
     before, after = np.flatnonzero(low[:peak]), np.flatnonzero(low[peak:])
@@ -239,5 +240,5 @@ def _crossings(times: Array, level: Array, top: float) -> tuple[float, float]:
 
 
 def _crossed(times: Array, level: Array, top: float, k: int) -> float:
-    share = (top - level[k]) / (level[k + 1] - level[k])
+    share = (top - LEVEL - level[k]) / (level[k + 1] - level[k])
     return float(times[k] + share * (times[k + 1] - times[k]))

@@ -44,8 +44,9 @@ ENOUGH = 4e-4  # m that may be missing to it, less than the check allows
 ROUGH = Search(precision=4e-3, close=8e-3, slope=2.0, believed=(0.2, 20.0), longest=0.4, downward=True)
 EXACT = attrs.evolve(ROUGH, precision=8e-4, close=1e-3)
 DECIDED_BY_HOIST = 0.3  # s, beyond the hoist's own least time, up to which no other height is quicker
+SPARE = 0.02  # m above the height that is needed, for clearance that is asked for later
 LOWER = (0.0, 0.25, 0.5, 0.75)  # of the way from the height that is needed to the top, as other heights
-WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # s before the hoist starts, and after it ends
+WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (3.0, 0.0))  # s before the hoist starts, and after it ends
 WORTH = 2e-3  # of the duration, that another height must save; then twice as much, and so on
 ROUNDS = 8  # of linearising anew
 SETTLED = 1e-7  # m, rad and their rates, by which a machine may be elsewhere after an interval
@@ -68,6 +69,7 @@ class _Planner:
 
     bay: Bay
     programs: int = 0
+    chosen: tuple[Course, Lifted] | None = None  # of the least duration, with a little less clearance
 
     def solved(self, about: Course, *, smooth: bool = False) -> Course | None:
         """Solve a program about a course."""
@@ -108,6 +110,19 @@ class _Planner:
 
     def shortest(self) -> Course:
         """Find the quickest course that machines themselves follow with room; it ends on a cycle."""
+        bay = self.bay
+        course, lifted = self.chosen = self.chosen or self.linear()
+        duration = course.up.duration
+        for _ in range(TRIES):
+            up = lifted(in_cycles(bay.spec, duration))
+            assert up is not None  # in more time than before
+            if (settled := self.settled(stretched(course, up))) is not None:
+                return settled
+            duration *= 1.0 + LONGER
+        raise _none_found(bay)
+
+    def linear(self) -> tuple[Course, Lifted]:
+        """Find how the hoist lifts, and the quickest course of machines that are linear about another."""
         bay, alone = self.bay, _Planner(bay=self.bay.alone())
         start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
         lifted: Lifted = partial(bay.lifted, top=bay.top)
@@ -118,20 +133,13 @@ class _Planner:
         if len(bay.machines) > 1:
             rough = _there(bay, self.quickest(lifted, rough.up.duration, ROUGH))
         near = self.solved(rough) or rough
-        course = self.quickest(lifted, near.up.duration, EXACT, near) or near
-        duration = course.up.duration
-        for _ in range(TRIES):
-            up = lifted(in_cycles(bay.spec, duration))
-            assert up is not None  # in more time than before
-            if (settled := self.settled(stretched(course, up))) is not None:
-                return settled
-            duration *= 1.0 + LONGER
-        raise _none_found()
+        return self.quickest(lifted, near.up.duration, EXACT, near) or near, lifted
 
     def otherwise_lifted(self, best: Course, lifted: Lifted) -> tuple[Course, Lifted]:
         """Look for a lower top, then for waits of the hoist, that are quicker: where the trolley decides."""
         bay, top = self.bay, self.bay.top
-        tops = [bay.needed + share * (bay.top - bay.needed) for share in LOWER]
+        least = min(bay.needed + SPARE, bay.top)
+        tops = [least + share * (bay.top - least) for share in LOWER]
         for lower, waits in [*((lower, WAITS[0]) for lower in tops), *((None, waits) for waits in WAITS[1:])]:
             way: Lifted = partial(bay.lifted, top=top if lower is None else lower, waits=waits)
             saved = WORTH
@@ -195,14 +203,6 @@ def _none_found(bay: Bay) -> SolverDiverged:
     sentence = Phrase(
         "move.duration: no duration was found in which the load passes the stacks; widen the limits."
     )
-
-
-def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
-    """Find the motion of trolley and hoist over what stands there.
-
-    Raises
-    ------
-    InfeasibleProblem, SolverDiverged
     zone, room = bay.tightest
     path, allowed = bay.spec.path, max(bay.spec.check.residual_sway.values())
     if len(bay.machines) > 1 and zone is not None and room < allowed:
@@ -217,20 +217,32 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
         )
     place = sentence.split(":")[0]
     return SolverDiverged(sentence, reasons=[Reason(code=Code.DIVERGED, place=place)])
+
+
+def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
+    """Find the motion of trolley and hoist over what stands there.
+
+    Raises
+    ------
+    InfeasibleProblem, SolverDiverged
         With what is in the way, and by how much.
     """
     began, reserve = time.perf_counter(), RESERVE
     progress("solving")
+    planner = _Planner(bay=bay_of(spec, reserve))
     for _ in range(ROUNDS):
-        planner = _Planner(bay=bay_of(spec, reserve))
-        course = planner.course()
+        try:
+            course = planner.course()
+        except OutOfWork as error:
+            raise _none_found(planner.bay) from error
         motion = _profile(planner.bay, course)
         near = _nearest(spec, motion)
         if near.room >= -ENOUGH:
             break
         reserve += OVERALL - near.room
-    if near.room < -ENOUGH:
-        raise _none_found()
+        planner.bay = bay_of(spec, reserve)
+    else:
+        raise _none_found(planner.bay)
     passage = Passage(
         lift=course.up.peak(),
         one_by_one=_one_by_one(planner.bay),
