@@ -16,7 +16,6 @@ from command_line import run_here, run_process
 from gen_profile.delivery.designs.design import design
 from gen_profile.presentation.charts.comparison import comparison_figure
 from gen_profile.presentation.report.content import Section
-from gen_profile.presentation.report.page import require_pages
 from gen_profile.presentation.report.print import printed
 from gen_profile.presentation.report.sections import sections
 from gen_profile.spec.reading import preset_spec
@@ -339,14 +338,6 @@ def test_a_page_that_cannot_be_written_is_a_sentence(tmp_path):
 def test_a_folder_is_no_file_to_write(tmp_path):
     outcome = run_here("report", *QUICK, "--out", tmp_path)
     assert outcome.code == 2 and list(tmp_path.iterdir()) == []
-
-
-def test_without_its_library_the_sentence_tells_what_to_install(monkeypatch):
-    monkeypatch.setattr(
-        "gen_profile.support.plugins.find_spec", lambda name: None if name == "plotly" else name
-    )
-    with pytest.raises(OutputError, match=r"pip install 'gen-profile\[report\]'"):
-        require_pages()
 
 
 def test_the_report_is_named_after_the_spec_by_default(tmp_path, monkeypatch):

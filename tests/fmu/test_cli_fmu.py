@@ -79,13 +79,6 @@ def test_is_named_after_the_spec(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_same_spec_same_archive(tmp_path):
-    for name in ("a.fmu", "b.fmu"):
-        assert run_here("fmu", "system", *FAST, "--out", tmp_path / name).code == 0
-    assert (tmp_path / "a.fmu").read_bytes() == (tmp_path / "b.fmu").read_bytes()
-
-
-@pytest.mark.slow
 def test_a_velocity_of_ideal_drives_has_no_lag(tmp_path):
     """The motion's own velocity, held in steps of 4 ms at its mean, calms the loads as its setpoints do."""
     motion, plant = tmp_path / "motion.fmu", tmp_path / "plant.fmu"

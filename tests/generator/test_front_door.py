@@ -303,16 +303,6 @@ def test_one_measurement_needs_no_list_and_no_log_is_drawn_of_it(tmp_path):
         gp.plot(found, tmp_path / "fit.svg")
 
 
-def test_none_takes_a_table_away():
-    limited = gp.evolve_spec(gp.preset_spec("paper"), limits={"velocity": 0.3})
-    assert gp.evolve_spec(limited, limits=None).limits.velocity is None
-
-
-def test_what_is_said_of_all_axes_replaces_what_was_said_of_one():
-    spec = gp.preset_spec("paper")
-    assert {axis.unit for axis in gp.evolve_spec(spec, axis={"unit": "um"}).axis.values()} == {"um"}
-
-
 def test_curves_of_motions_that_users_bring_differ():
     styles = method_styles(["zvd", "mine", "yours"])
     assert len({style.colour for style in styles.values()}) == 3

@@ -129,9 +129,3 @@ def test_a_spec_may_be_a_path_and_names_one_name(tmp_path, results):
     table = results["Design"].folder / "paper.csv"
     judged = gp.check_artefact(table, path, scale="1.0")
     assert judged.spec == gp.read_spec(path)
-
-
-def test_a_single_time_is_one_sample(results):
-    motion = results["Profile"]
-    assert motion(1.5).position.shape == (1, 1)
-    assert motion(1.5).position == pytest.approx(motion([1.0, 1.5]).position[1:])
