@@ -1,0 +1,57 @@
+"""The observer of what a sensor of the load shows, with a machine's constants put in."""
+
+import numpy as np
+
+from gen_profile_exporters.planner.block import PlannerConstants
+from gen_profile_exporters.planner.blocks.texts import constant_lines, filled
+from gen_profile_exporters.planner.sensor_constants import (
+    SensorConstants,
+    model_rows,
+    real_constants,
+    whole_constants,
+)
+
+ROWS_BEFORE = 3  # of the model by mode: frequency, decay and error; then sway, axis by axis
+# names in the block, by those of the constants that today's block has
+NAMES = {
+    "cSensorOldest": "cOldest", "cSensorMost": "cMost", "cSensorStep": "cStep", "cSensorGate": "cGate",
+    "cSensorFrozen": "cFrozen", "cSensorHides": "cHides", "cSensorNoisy": "cMostNoise",
+    "cSensorSmoothing": "cSmoothing", "cSensorScale": "cMisread", "cSensorAlike": "cCorrelated",
+    "cSensorForgets": "cForgets", "cSensorFloor": "cFloor", "cSwing": "cSwing",
+    "cExpectedLength": "cLength", "cDropOutCycles": "cDropOut",
+}  # fmt: skip
+
+
+def observer(c: PlannerConstants, sensor: SensorConstants, number: int = 0) -> str:
+    """Write the block of the observer along an axis, by its number among those that are planned."""
+    modes, lives = c.modes, c.live or {"": (0.0, 1.0)}
+    first = (ROWS_BEFORE + len(c.axes)) * modes + number * model_rows(modes)
+    model = np.vstack([c.model[: 2 * modes], c.model[first : first + model_rows(modes)]])
+    axes = len(c.axes)
+    known = real_constants(sensor, c.cycle) | whole_constants(sensor, modes, axes, c.cycle)
+    exponents = c.exponents if c.live else np.zeros((1, model.shape[1]), dtype=np.int64)
+    constants = {
+        **{name: known[ours] for ours, name in NAMES.items()},
+        "cRate": int(sensor.rate),
+        "cMostPush": c.axes[number].quick_deceleration,
+        "cModes": modes,
+        "cCycle": c.cycle,
+        "cLives": len(c.live),
+        "cDegrees": c.degrees,
+        "cTerms": model.shape[1],
+        "cLiveLow": [low for low, _ in lives.values()],
+        "cLiveHigh": [high for _, high in lives.values()],
+        "cLiveBend": [float(v) for v in c.curvatures or (0.0, 0.0)],
+        "cExponent": [int(v) for v in exponents.ravel()],
+        "cModel": [float(v) for v in model.ravel()],
+    }
+    lengths = {
+        "live": len(lives), "mode": modes, "observed": len(model), "power": len(lives) * c.degrees,
+        "expected": int(known["cExpectedLength"]),
+    }  # fmt: skip
+    return filled(
+        "observer",
+        observer=f"{c.name.replace('-', '_')}_observer",
+        observer_constants=constant_lines(constants),
+        **{f"last_{array}": length - 1 for array, length in lengths.items()},
+    )
