@@ -164,7 +164,7 @@ def _parsed(text: str) -> BlockSource:
             raise ExportError(
                 f"{kind}: {other[0][:40]!r} stands beside the declarations; export the block again."
             )
-        variables += _variables(kind, section[2])
+        variables += declared_variables(kind, section[2])
         at = section.end()
     body = text[at:].lstrip("\n")
     if not _END.search(body):
@@ -187,7 +187,8 @@ def ordered(source: BlockSource, names: Iterable[str]) -> BlockSource:
     return attrs.evolve(source, variables=tuple(variables))
 
 
-def _variables(section: str, text: str) -> list[BlockVariable]:
+def declared_variables(section: str, text: str) -> list[BlockVariable]:
+    """Read declarations."""
     return [
         BlockVariable(section, name, type_.strip(), initial=initial.strip(), comment=comment.strip())
         for name, type_, initial, comment in _VARIABLE.findall(text)

@@ -3,7 +3,6 @@
 ``{{ name }}`` is what a text leaves open; a line that is nothing but a statement ``{% … %}`` leaves no trace.
 """
 
-import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 FOLDER = Path(__file__).parent
-_PART = re.compile(r"(?m)^@part (\w+)\n")
 
 
 def filled(path: str | Path, **values: object) -> str:
@@ -25,48 +23,35 @@ def filled(path: str | Path, **values: object) -> str:
     jinja2.UndefinedError
         One is missing.
     """
-    return _environment().get_template(str(path)).render(values)
+    return _environment(is_open=False).get_template(str(path)).render(values)
+
+
+def left_open(path: str, **values: object) -> str:
+    """Fill a template where there are values; elsewhere ``@name`` stands for what is missing."""
+    return _environment(is_open=True).get_template(path).render(values)
 
 
 def macros(path: str) -> Any:
     """Give what a template of this package defines: its macros, and its values, as attributes."""
-    return _environment().get_template(path).module
+    return _environment(is_open=False).get_template(path).module
 
 
 @cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, FunctionLoader, StrictUndefined  # noqa: PLC0415  # slow to import
+def _environment(*, is_open: bool) -> "Environment":
+    from jinja2 import Environment, FunctionLoader, StrictUndefined, Undefined  # noqa: PLC0415  # slow to import
+
+    class Hole(Undefined):
+        def __str__(self) -> str:
+            return f"@{self._undefined_name}"
 
     return Environment(
         autoescape=lambda path: str(path).endswith(".html"),
         loader=FunctionLoader(lambda path: (FOLDER / path).read_text("utf-8")),
-        undefined=StrictUndefined,
+        undefined=Hole if is_open else StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-
-
-@cache
-def text_parts(path: str) -> dict[str, Any]:
-    """Read the parts of a file of this package, each below a line ``@part NAME``.
-
-    The last line of a part has no end.
-    """
-    _, *pieces = _PART.split((FOLDER / path).read_text("utf-8"))
-    return {name: text.removesuffix("\n") for name, text in zip(pieces[::2], pieces[1::2], strict=True)}
-
-
-def names_by_type(part: str) -> dict[str, tuple[str, ...]]:
-    """Read lines of a type and names of variables that have it."""
-    return {type_: tuple(names) for type_, *names in map(str.split, part.splitlines())}
-
-
-def put_in(text: str, **values: str) -> str:
-    """Put in what stands in Structured Text as ``@name``; alone on its line, it is whole lines, or none."""
-    lines = {name: f"{value}\n" if value else "" for name, value in values.items()}
-    text = re.sub(r"(?m)^@(\w+)\n", lambda hole: lines.get(hole[1], hole[0]), text)
-    return re.sub(r"@(\w+)", lambda hole: values.get(hole[1], hole[0]), text)
 
 
 def indented(lines: Iterable[str]) -> str:

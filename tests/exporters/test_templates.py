@@ -1,9 +1,18 @@
 """One template language, and the white space that it leaves."""
 
+import re
+
 import jinja2
 import pytest
 
-from gen_profile_exporters.templates import filled
+from gen_profile_exporters.templates import FOLDER, filled, left_open
+
+TEXTS = [
+    path
+    for suffix in ("st", "c", "h", "xml", "txt")
+    for path in FOLDER.rglob(f"*.{suffix}")
+    if path.parent.name != "blocks" and "planner/text" not in path.as_posix()
+]
 
 
 @pytest.fixture
@@ -30,3 +39,12 @@ def test_a_value_that_is_missing_is_an_error(template):
 def test_what_others_wrote_ends_no_element_of_a_page(template):
     assert filled(template("{{ name }}", "page.html"), name="<b>") == "&lt;b&gt;"
     assert filled(template("{{ name }}"), name="a < b") == "a < b"
+
+
+def test_what_stays_open_stands_by_its_name(template):
+    assert left_open(str(template("{{ position }} of {{ axis }}")), axis="x") == "@position of x"
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_no_text_has_another_notation(path):
+    assert not re.findall(r"(?m)^@\w+|\$\w+|^% *[A-Z]\w+", path.read_text("utf-8")), path

@@ -24,14 +24,12 @@ def numbers(header, variable):
 
 
 PLAYBACK, PLAYBACK_WRAPPER = (
-    (BLOCKS / "playback" / "text" / name).read_text("utf-8") for name in ("template.st", "axis_wrapper.st")
+    (BLOCKS / "playback" / "text" / name).read_text("utf-8") for name in ("block.st", "axis_wrapper.st")
 )
 PLANNER, PLANNER_WRAPPER = (
     (BLOCKS / "planner" / name).read_text("utf-8") for name in ("text/interface.st", "axis_wrapper.st")
 )
-WRAPPERS = numbers(PLAYBACK_WRAPPER, "nErrorId") | set(
-    re.findall(r"^@part \w+_more\n(\d+) ", PLAYBACK_WRAPPER, flags=re.MULTILINE)
-)
+WRAPPERS = numbers(PLAYBACK_WRAPPER, "nErrorId")
 LISTED = [
     {code.value for code in Code},
     numbers(PLAYBACK, "nErrorId") | {"6"},  # of a library alone, explained where profiles are selected

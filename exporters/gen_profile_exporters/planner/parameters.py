@@ -21,19 +21,19 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
-from gen_profile_exporters.playback.block import CHECKSUM
-from gen_profile_exporters.templates import names_by_type, put_in, text_parts
+from gen_profile_exporters.templates import filled, left_open
 
 OURS = "OfBuffer"  # behind names that the block has already
 _WORD = re.compile(r"\w+")
 _ENABLE = re.compile(r"\bbEnable\b")
-_SHARED = text_parts("playback/text/buffers.st")
-_ROUND = "        nCheckRow := nCheckRow + 1;"
 _NUMBER = re.compile(r"c[A-Z]\w*")
-_MEMBERS = {
-    type_: (*buffers.VARIABLES[type_], *more)
-    for type_, more in names_by_type(_SHARED["planner_variables"]).items()
+_MORE = {
+    "DINT": ("nCheck", "nCheckRow", "nHead", "nUpper", "nWord"),
+    "LREAL": ("fValue", "fMantissa", "fWord", "fSum"),
+    "BOOL": ("bChecked", "bIntact", "bForget", "bMayEnable"),
 }
+_MEMBERS = {type_: (*buffers.VARIABLES[type_], *names) for type_, names in _MORE.items()}
+_HOLE = re.compile(r"@(\w+)")
 _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 
 
@@ -153,18 +153,19 @@ def _around(
     """Write what stands ahead of the statements that plan, and behind them."""
     axes = int(_initial(numbers, "cAxes"))
     moving = "".join(f" OR (ABS(aVelocity[{axis}]) > cStill[{axis}])" for axis in range(axes))
-    check = "\n".join((_SHARED["checked_value"], CHECKSUM.rstrip(), _ROUND, _SHARED["checked_end"]))
-    text = put_in(f"{_SHARED['requests']}\n", selection="", forgotten="", loads=_SHARED["planner"])
-    text = distinct(text + put_in(f"{_SHARED['planner_check']}\n", checked=check))
-    text = put_in(
-        text.replace("cCycleTime", "cCycle"),
-        moves=f"(bEnable OR (nState <> cDisabled){moving})",
-        plays="(nState <> cDisabled)",
-        taken="\n".join(f"        {line}" for line in _taken(numbers, *map(distinct, ("nBase", "nCheck")))),
-        begun="\n".join(f"            {line}" for line in _begun(source, distinct("nCheck"))),
-    )
-    state = put_in(distinct(_SHARED["planner_state"]), last=str(buffers.state_length(axes) - 1))
-    return narrow(with_while_loops(text)), narrow(with_while_loops(f"{state}\n"))
+    values = {
+        "moves": f"(bEnable OR (nState <> cDisabled){moving})",
+        "plays": "(nState <> cDisabled)",
+        "taken": "\n".join(
+            f"        {line}" for line in _taken(numbers, *map(distinct, ("nBase", "nCheck")))
+        ),
+        "begun": "\n".join(f"            {line}" for line in _begun(source, distinct("nCheck"))),
+    }
+    # what is put in has the block's names, which are not ours
+    text = distinct(left_open("planner/requests.st")).replace("cCycleTime", "cCycle")
+    text = _HOLE.sub(lambda hole: values[hole[1]], text)
+    state = distinct(filled("planner/state.st", last=buffers.state_length(axes) - 1))
+    return narrow(with_while_loops(text)), narrow(with_while_loops(state))
 
 
 def _taken(numbers: list[BlockVariable], base: str, counter: str) -> Iterator[str]:

@@ -1,35 +1,35 @@
 """The playback block's template, filled in for writing and matched for reading.
 
-The template (``text/template.st``) is portable IEC 61131-3 Structured Text. ``@name`` is a hole for a value.
-``$name`` is a part that the number of axes or the layout of the table decides; alone on its line, it is whole
-lines. A line that begins with ``%`` stands in blocks of several axes only. ``~`` after a name is the index of
-the axis there, and nothing where there is one axis.
+The template (``text/block.st``) is portable IEC 61131-3 Structured Text, which a file for each layout of the
+table extends. Statements of an axis stand in it as they do where there are several: with ``[nAxis]``.
 """
 
 import re
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from itertools import islice
-from pathlib import Path
+from typing import Any
 
 import attrs
 
 from gen_profile.support.errors import ExportError
-from gen_profile_exporters.block_source import COMMENT, TOKEN, bare
-from gen_profile_exporters.playback.layouts import LAYOUTS
+from gen_profile_exporters.block_source import (
+    COMMENT,
+    TOKEN,
+    BlockVariable,
+    bare,
+    declared_variables,
+    parse_function_block,
+)
+from gen_profile_exporters.templates import filled, left_open
 
-_TEXT = Path(__file__).with_name("text")
-TEMPLATE = (_TEXT / "template.st").read_text("ascii")
-CHECKSUM = (_TEXT / "checksum.st").read_text("ascii")  # lines that take the next value in
-_CHECKED = {  # how the value of a constant enters the checksum
-    "DINT": "fValue := DINT_TO_LREAL({});",
-    "LREAL": "fValue := {};",
-    "BOOL": "IF {} THEN fValue := 1.0; END_IF;",
+SAMPLED = ("Position", "Velocity", "Acceleration")
+COLUMNS = {  # of each layout's table
+    "segments": (*(f"Power{power}" for power in range(6)), "First"),
+    "samples": SAMPLED,
+    "counts": SAMPLED,
 }
-_DECLARED = {"LREAL~": "$reals", "BOOL~": "$switches"}
 _HOLE = re.compile(r"@(\w+)")
-_LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
-_PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")
 
 
 @attrs.frozen
@@ -49,7 +49,12 @@ class Token:
 
 def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
     """Write a block: a value for every hole, by its name."""
-    return _HOLE.sub(lambda hole: values[hole[1]], _program(layout, axes))
+    return filled(
+        f"playback/text/layout_{layout}.st",
+        **_frame(layout, axes),
+        constants=_constants(layout, axes, {}),
+        **values,
+    )
 
 
 def match(text: str, layout: str, axes: int) -> dict[str, Token]:
@@ -77,22 +82,35 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
     return values
 
 
+def statements(layout: str, axes: int, *, is_buffered: bool = False, is_library: bool = False) -> str:
+    """Write a block's statements, which hold no value of a motion.
+
+    Parameters
+    ----------
+    layout : str
+    axes : int
+    is_buffered : bool
+        Whether they check a buffer in place of the table; constants have their names all the same.
+    is_library : bool
+        Whether they refuse to start while ``nProfile`` counts no motion.
+    """
+    text = _open_program(layout, axes, is_buffered=is_buffered, is_library=is_library)
+    return parse_function_block(text).body
+
+
 def variable_names(layout: str, axes: int) -> list[str]:
     """List the block's variables in the order of their declaration."""
-    return re.findall(r"^ +(\w+) : ", _program(layout, axes), re.MULTILINE)
+    return re.findall(r"^ +(\w+) : ", _open_program(layout, axes), re.MULTILINE)
 
 
 def constants(values: Mapping[str, str], layout: str, axes: int) -> list[str]:
     """List the initial values of all constants that enter the checksum, a text for each."""
-    return [
-        _HOLE.sub(lambda hole: values[hole[1]], initial.replace("$axes", str(axes)))
-        for _, _, initial, _ in LAYOUTS[layout]["constants"]
-    ]
+    return [one.initial for one in _constants(layout, axes, values)]
 
 
 def constant_count(layout: str, axes: int) -> int:
     """Count them; each is counted once for every axis."""
-    return len(LAYOUTS[layout]["constants"]) * axes
+    return len(_constants(layout, axes, {})) * axes
 
 
 def layout_of(text: str) -> str:
@@ -106,54 +124,54 @@ def layout_of(text: str) -> str:
 @cache
 def _due(layout: str, axes: int) -> list[tuple[str, str]]:
     """List the pieces of the template, each with the name of the hole that it is, if it is one."""
-    pieces = TOKEN.findall(_without_comments(_program(layout, axes)))
+    pieces = TOKEN.findall(_without_comments(_open_program(layout, axes)))
     return [(piece, hole[1] if (hole := _HOLE.fullmatch(piece)) else "") for piece in pieces]
 
 
 @cache
-def _program(layout: str, axes: int) -> str:
-    """Put the layout's parts in, and settle what the number of axes decides."""
-    array = f"ARRAY [1..{axes}] OF " if axes > 1 else ""
-    constants = LAYOUTS[layout]["constants"]
-    parts = LAYOUTS[layout] | {
-        "checksum": CHECKSUM,
-        "constants": "".join(map(_declaration, constants)),
-        "constant_count": str(constant_count(layout, axes)),
-        "checked_constant": _checked(constants, axes),
-        "ones": f"[{', '.join(['1.0'] * axes)}]" if axes > 1 else "1.0",
-        "switches": f"{array}BOOL",
-        "axes": str(axes),
-        "number": "DINT" if layout == "counts" else "LREAL",
+def _open_program(layout: str, axes: int, *, is_buffered: bool = False, is_library: bool = False) -> str:
+    frame = _frame(layout, axes, is_buffered=is_buffered, is_library=is_library)
+    return left_open(f"playback/text/layout_{layout}.st", **frame, constants=_constants(layout, axes, {}))
+
+
+def _constants(layout: str, axes: int, values: Mapping[str, str]) -> list[BlockVariable]:
+    """List the constants that enter the checksum."""
+    text = left_open("playback/text/constants.st", **_frame(layout, axes), **values)
+    return declared_variables("VAR CONSTANT", text)
+
+
+def _frame(layout: str, axes: int, *, is_buffered: bool = False, is_library: bool = False) -> dict[str, Any]:
+    """Give what the layout and the number of axes decide."""
+    several = axes > 1
+    array = f"ARRAY [1..{axes}] OF " if several else ""
+    whole = layout == "counts"
+    return {
+        "has_segments": layout == "segments",
+        "is_buffered": is_buffered,
+        "is_library": is_library,
+        "columns": len(COLUMNS[layout]),
+        "axes": axes,
+        "each_axis": partial(each_axis, axes),
+        "number": "DINT" if whole else "LREAL",
+        "real": ("DINT_TO_LREAL({})" if whole else "{}").format,
         "reals": f"{array}LREAL",
-        "real": "DINT_TO_LREAL({})" if layout == "counts" else "{}",
-        "row": "{} * cAxes + nAxis - 1" if axes > 1 else "{}",
-        "per_axis": "{} / cAxes" if axes > 1 else "{}",
+        "switches": f"{array}BOOL",
         "whole_numbers": f"{array}DINT",
+        "ones": f"[{', '.join(['1.0'] * axes)}]" if several else "1.0",
+        "row_of_axis": " * cAxes + nAxis - 1" if several else "",
+        "by_axes": " / cAxes" if several else "",
     }
-    text = _LINES.sub(lambda lines: parts[lines[1]], TEMPLATE)
-    text = _PART.sub(lambda part: parts[part[1]].format(part[2]), text)
-    lines = text.replace("~", "[nAxis]" if axes > 1 else "").splitlines(keepends=True)
-    return "".join(line.replace("%", "", 1) for line in lines if axes > 1 or not line.startswith("%"))
 
 
-def _declaration(constant: tuple[str, str, str, str]) -> str:
-    name, type_, initial, comment = constant
-    return f"    {name} : {_DECLARED.get(type_, type_)} := {initial};{comment and f' (* {comment} *)'}\n"
-
-
-def _checked(constants: Sequence[tuple[str, str, str, str]], axes: int) -> str:
-    """Give the checksum's value in a row behind the table: each constant, for each axis."""
-    indent, count = " " * 12, len(constants)
-    lines = [f"{indent}CASE nCheckRow OF"]
-    if axes > 1:
-        lines = [
-            f"{indent}nAxis := nCheckRow / {count} + 1;",
-            f"{indent}CASE nCheckRow - (nAxis - 1) * {count} OF",
-        ]
-    for number, (name, type_, _, _) in enumerate(constants):
-        value = _CHECKED[type_.removesuffix("~")].format(name + "~" * type_.endswith("~"))
-        lines.append(f"{indent}    {number}: {value}")
-    return "\n".join([*lines, f"{indent}END_CASE;", ""])
+def each_axis(axes: int, caller: Callable[[], str]) -> str:
+    """Repeat statements for every axis; where there is one, it has no index."""
+    text = caller()
+    if axes == 1:
+        return text.replace("[nAxis]", "")
+    margin = " " * (
+        len(text) - len(text.lstrip(" ")) - 1
+    )  # a column less: files stay the same, byte for byte
+    return f"{margin}FOR nAxis := 1 TO cAxes DO\n{text}{margin}END_FOR;\n"
 
 
 def _without_comments(text: str) -> str:

@@ -17,11 +17,9 @@ has a wrong one here. A motion's own is that of its block of constants, which fo
 
 import re
 import zlib
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import accumulate, chain
 from math import ceil
-from pathlib import Path
 
 import attrs
 import numpy as np
@@ -29,11 +27,10 @@ import numpy as np
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser, parse_function_block
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.block import fill, layout_of
-from gen_profile_exporters.playback.layouts import LAYOUTS
+from gen_profile_exporters.playback.block import COLUMNS, fill, layout_of, statements
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
-from gen_profile_exporters.templates import names_by_type, put_in, text_parts
+from gen_profile_exporters.templates import filled
 
 INTERFACE = 2  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
@@ -41,6 +38,10 @@ LEAST_CAPACITY, MOST_CAPACITY = 2048, 1 << 17
 PATIENCE = 30.0  # s that a client may be silent before another one may write
 REQUEST, REPLY, STATE, TABLE = "aRequest", "aReply", "aState", "aTable"
 
+OF_HEADER = (  # values of a block of constants that only comments tell
+    *("name", "layout", "accuracy", "samples", "cycle", "kilobytes", "check_cycles", "axis_lines", "units"),
+    "sha256",
+)
 HEAD = ("length", "checksum", "checks")
 CHECKSUM = HEAD.index("checksum")
 SCALARS = ("Rows", "Checks", "LastSegment", "Last", "PlayOn", "Checksum", "Slope", "SlopeRate")
@@ -48,17 +49,9 @@ PER_AXIS = ("Room", "Inverse", "StopJerk", "Start", "Target", "LeastScale", "Mir
 OF_BUFFER = ("Checks", "Checksum")  # not the motion's own: that of the whole buffer counts
 WHOLE = SCALARS[:6]
 PLANNER = "planner"
-LAYOUT_NAMES = (*LAYOUTS, PLANNER)
-SAMPLED = ("Position", "Velocity", "Acceleration")
-COLUMNS = {
-    "segments": (*(f"Power{power}" for power in range(6)), "First"),
-    "samples": SAMPLED,
-    "counts": SAMPLED,
-}
+LAYOUT_NAMES = (*COLUMNS, PLANNER)
 MOVES = "((nState = cWaiting) OR (nState = cMoving))"
 LIBRARY = "nProfile"  # the input that a library has
-_REFUSAL = "    IF nProfile <> nSelected THEN nErrorId := 6; END_IF;\n"
-_LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others mean nothing without a motion
 ALTERED = "The block's buffers were altered; export it again."
 STATE_HEAD = 14  # values of the state ahead of those of each axis
 AXIS_STATE = ("Position", "Velocity", "Acceleration", "Gain", "Shift")
@@ -77,15 +70,28 @@ NOTE = """\
 
 DROPPED = ("nCheckRows", "nCheckColumn")  # of the block of constants
 
-_PARTS = text_parts("playback/text/buffers.st")
-VARIABLES = names_by_type(_PARTS["variables"])
-_STATE = Path(__file__).with_name("text").joinpath("state.st").read_text("ascii")
+VARIABLES = {
+    "LREAL": ("fHolder", "fCalls"),
+    "DINT": (
+        "nBase",
+        "nIdle",
+        "nMotion",
+        "nTable",
+        "nLength",
+        "nChecks",
+        "nPlace",
+        "nCount",
+        "nResult",
+        "nTrial",
+        "nQuiet",
+        "nRuns",
+    ),
+    "BOOL": ("bLoaded", "bLoad", "bAgain", "bAsked", "bSwitch", "bTrial", "bBusyBefore"),
+}
 _OWN = re.compile(rf"\bc({'|'.join((*SCALARS, *PER_AXIS))})\b")
 _COLUMN = re.compile(
     r"(DINT_TO_LREAL\()?\bc(Power\d|First|Position|Velocity|Acceleration)\[([^\[\]]*)\](?(1)\))"
 )
-_CHECKED = re.compile(r" *fValue := 0\.0;\n.*?(?= *(?:\(\*[^*]*\*\)\s*)?nHead := 2048;)", re.DOTALL)
-_CHECKED_END = re.compile(r" *IF nCheckRow >= nCheckRows THEN\n.*?(?= *END_FOR;\nEND_IF;)", re.DOTALL)
 _WAIT = re.compile(r"\d+ cycles after power-up")
 
 
@@ -154,7 +160,7 @@ def _buffered(
         name=sources[0].name,
         variables=(*taken, *added, *(SELECTION if library else ())),
         body=_prelude(layout, axes, library=library)
-        + _from_buffer(refusing(sources[0].body) if library else sources[0].body, layout)
+        + _from_buffer(statements(layout, axes, is_buffered=True, is_library=library), layout)
         + _shown_state(axes, library=library),
     )
 
@@ -255,11 +261,6 @@ def constant_sources(source: BlockSource, target: Target) -> list[BlockSource]:
     return back
 
 
-def refusing(body: str) -> str:
-    """Refuse to start while `LIBRARY` counts no motion."""
-    return body.replace(_LAST_REFUSAL, _LAST_REFUSAL + _REFUSAL)
-
-
 def is_library(source: BlockSource) -> bool:
     """Tell whether an input selects what a block plays."""
     return any(variable.name == LIBRARY for variable in source.variables)
@@ -332,7 +333,7 @@ def constant_block(values: Mapping[str, Sequence[str]], like: BlockSource, layou
         "start_tolerance": shared["fStartTolerance"],
         "block": like.name,
     }
-    written = parse_function_block(fill(defaultdict(str, holes), layout, axes))
+    written = parse_function_block(fill(dict.fromkeys(OF_HEADER, "") | holes, layout, axes))
     return attrs.evolve(written, header=like.header)
 
 
@@ -352,9 +353,6 @@ def _from_buffer(body: str, layout: str) -> str:
         # one that is wanted as a real number need not fit DINT if it was altered
         return f"LREAL_TO_DINT({text})" if _is_whole(name, layout) and not match[1] else text
 
-    body = _CHECKED.sub(lambda _: f"{_PARTS['checked_value']}\n", body, count=1)
-    body = _CHECKED_END.sub(lambda _: f"{_PARTS['checked_end']}\n", body, count=1)
-    body = body.replace("TO cChecks DO", "TO nChecks DO")
     return _OWN.sub(r"t\1", _COLUMN.sub(place, body))
 
 
@@ -380,15 +378,8 @@ def _prelude(layout: str, axes: int, *, library: bool) -> str:
         for number, name in enumerate(PER_AXIS)
     ]
     lines += ["FOR nAxis := 1 TO cAxes DO", *own, "END_FOR;"] if axes > 1 else own
-    place = _PARTS["place"] if library else f"    nMotion := nBase + {len(HEAD)};"
-    taken_over = "\n".join(f"        {line}" for line in lines)
-    return put_in(
-        f"{_PARTS['requests']}\n",
-        selection=_PARTS["selection"] if library else "",
-        forgotten="    bLeft := FALSE;",
-        loads=put_in(_PARTS["motion"], place=place, taken=taken_over),
-        moves=MOVES,
-        plays=MOVES,
+    return filled(
+        "playback/text/requests_motion.st", is_library=library, taken=lines, moves=MOVES, plays=MOVES
     )
 
 
@@ -401,4 +392,4 @@ def _shown_state(axes: int, *, library: bool) -> str:
     ]
     lines = ["FOR nAxis := 1 TO cAxes DO", *lines, "END_FOR;"] if axes > 1 else lines
     motion = "DINT_TO_LREAL(nSelected)" if library else "0.0"
-    return put_in(_STATE, axes="\n".join(lines), last=str(state_length(axes) - 1), motion=motion)
+    return filled("playback/text/state.st", axes=lines, last=state_length(axes) - 1, motion=motion)

@@ -10,7 +10,6 @@ numbers found, and a library of these, which must be the same.
 import re
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from pathlib import Path
 
 import attrs
 
@@ -19,7 +18,7 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback import buffers
-from gen_profile_exporters.playback.block import layout_of
+from gen_profile_exporters.playback.block import COLUMNS, SAMPLED, layout_of, statements
 from gen_profile_exporters.playback.buffers import buffered, constant_sources, is_buffered, is_library
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
@@ -32,11 +31,9 @@ from gen_profile_exporters.playback.table import MOST_SAMPLES
 from gen_profile_exporters.templates import filled
 
 SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.SCALARS, buffers.PER_AXIS))
-*POWERS, SEGMENTS = (f"c{name}" for name in buffers.COLUMNS["segments"])
-TABLES = (*(f"c{name}" for name in buffers.SAMPLED), *POWERS)
+*POWERS, SEGMENTS = (f"c{name}" for name in COLUMNS["segments"])
+TABLES = (*(f"c{name}" for name in SAMPLED), *POWERS)
 ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
-
-SELECTION = Path(__file__).with_name("text").joinpath("selection.st").read_text("ascii") + "\n"
 
 OUTPUTS = ("fPosition",)  # which begins at the start
 OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *OUTPUTS)
@@ -141,9 +138,13 @@ def _singles(library: BlockSource) -> list[BlockSource]:
 
 def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockSource:
     """Put blocks together that differ in their motions only."""
+    axes = next(len(variable.values) for variable in sources[0].variables if variable.name == "cStart")
     merged = [_merged(same) for same in zip(*(source.variables for source in sources), strict=True)]
     return BlockSource(
-        header=header, name=name, variables=(*merged, *_selector(sources)), body=_selecting(sources[0].body)
+        header=header,
+        name=name,
+        variables=(*merged, *_selector(sources)),
+        body=_selecting(statements(layout_of(sources[0].declaration()), axes, is_library=True)),
     )
 
 
@@ -205,7 +206,7 @@ def _selecting(body: str) -> str:
     body = _AXIS.sub(r"\1[nSelected * cAxes + nAxis - 1]", body)
     body = _TABLE.sub(rf"\1[{FIRST_ROW}[nSelected] + \2]", body)
     body = _SEGMENT.sub(rf"{SEGMENTS}[{FIRST_SEGMENT}[nSelected] + \1]", body)
-    return SELECTION + buffers.refusing(body)
+    return f"{filled('playback/text/selection.st')}\n{body}"
 
 
 def _values(arrays: Mapping[str, list[str]], number: int) -> dict[str, list[str]]:

@@ -1,6 +1,6 @@
 """Playback function block in IEC 61131-3 Structured Text, for any controller that takes this language.
 
-The block (``text/template.st``) holds the motion as a table, by default as quintic
+The block (``text/block.st``) holds the motion as a table, by default as quintic
 segments, and issues position, velocity and acceleration every cycle of its task. It keeps to what independent
 compilers have in common: ASCII, ``(* *)`` comments, one-dimensional arrays in ``VAR CONSTANT``, literals such
 as ``-1.5E-7`` that a REAL could hold.
