@@ -14,6 +14,7 @@ LOAD = 1400.0
 ORDERS = {
     "nOrder": "DINT", "fTaken": "LREAL", "nBefore": "DINT", "nSlots": "DINT", "nMet": "DINT", "nGap": "DINT",
     "fAfter": "LREAL", "fPart": "LREAL", "bRests": "BOOL", "fRope": "LREAL",
+    "fSwing": "LREAL", "fSwingRate": "LREAL",
 }  # fmt: skip
 BUDGET = 9000
 
@@ -295,3 +296,21 @@ def test_noise_of_the_hoist_s_encoder_makes_little_of_the_state(spec):
         account.call(1)
         sways.append(account.call(22)[1])
     assert sways[1] == pytest.approx(sways[0], rel=0.03)
+
+
+def test_a_measured_mode_takes_the_place_of_what_the_axis_alone_caused(spec, account):
+    """The fast one stays as it was, whatever the slow one is measured to be."""
+    hoisted(account, 0.0)
+    ends = []
+    for swing, rate in ((None, None), (0.3, -0.1), (0.0, 0.0)):
+        if swing is not None:
+            account.call(23, fSwing=swing, fSwingRate=rate)
+        account.call(1)
+        *_, values, _rows = account.call(2, nSlots=3, nMet=2)
+        ends.append(2.0 * SLOT * np.hypot(values[0:4:2], values[1:4:2]))
+    slow = np.sqrt(np.linalg.eigvals(stiffness(spec, 6.0)).min())
+    before, measured, none = ends
+    assert before.min() > 1e-3
+    assert measured[0] == pytest.approx(np.hypot(0.3, 0.1 / slow), rel=1e-4)
+    assert none[0] < 1e-9
+    assert measured[1] == pytest.approx(before[1], rel=1e-6) == pytest.approx(none[1], rel=1e-6)
