@@ -16,6 +16,10 @@ import pytest
 from hypothesis import settings
 from turns import TURNS, near, rooms_of, turns
 
+from gen_profile.support.same_bits import choose_common_kernels
+
+choose_common_kernels()  # before NumPy is loaded, too: bytes are compared with those of the program
+
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
 

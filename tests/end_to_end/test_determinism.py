@@ -3,6 +3,7 @@
 import locale
 import os
 
+import numpy as np
 import pytest
 from command_line import run_process
 from system_parts import missing
@@ -44,6 +45,18 @@ def test_a_german_locale_with_its_decimal_comma_in_a_folder_elsewhere(first, tmp
         locale.setlocale(locale.LC_ALL, before)
     folder = tmp_path / "anderer Ort, weit weg ‒ très loin"
     assert outputs(folder, LC_ALL=GERMAN, LANG=GERMAN, LANGUAGE="de") == first
+
+
+@pytest.mark.parametrize("kernels", ["Haswell", "SkylakeX"])
+def test_a_processor_with_other_kernels_of_blas(first, tmp_path, kernels):
+    assert outputs(tmp_path / "run", OPENBLAS_CORETYPE=kernels) == first
+
+
+def test_a_processor_without_wide_registers(first, tmp_path):
+    rare = (
+        "X86_V3 X86_V4" if np.lib.NumpyVersion(np.__version__) >= "2.4.0" else "AVX2 FMA3 AVX512F AVX512_SKX"
+    )
+    assert outputs(tmp_path / "run", NPY_DISABLE_CPU_FEATURES=rare) == first
 
 
 def test_artefacts_name_neither_machine_nor_clock(first, tmp_path):

@@ -34,6 +34,9 @@ def cli() -> None:
 
     Without a command: design, export and verify.
     """
+    from gen_profile.support.same_bits import choose_common_kernels
+
+    choose_common_kernels()
 
 
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
