@@ -85,6 +85,8 @@ class Mutant:
     now : str
         What stands there in place of what stood there.
     before : str
+    place : int
+        Which one it is, from 1, of the changes of its line in this way.
     """
 
     way: str
@@ -92,11 +94,13 @@ class Mutant:
     line: int
     now: str
     before: str
+    place: int = attrs.field(default=1, eq=False)
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What names it: its part, and the line before and now."""
-        return self.part, self.before.strip(), self.now.strip()
+        """What names it: its part, the line before, and the way with its place, or a constant's factor."""
+        change = self.now if self.way == "constant" else f"{self.way} {self.place}"
+        return self.part, self.before.strip(), change
 
     def __str__(self) -> str:
         return f"{self.way:10} {self.part}:{self.line + 1}: {self.before.strip()}  ->  {self.now.strip()}"
@@ -107,8 +111,10 @@ def mutants(text: str) -> Iterator[Mutant]:
     for path in sorted(block.TEXT.rglob("*.st")):
         if path.stem not in UNKNOWN:
             for number, line in enumerate(_code(path.read_text("ascii"))):
+                ways = Counter[str]()
                 for way, now in _changed(line):
-                    yield Mutant(way=way, part=path.stem, line=number, now=now, before=line)
+                    ways[way] += 1
+                    yield Mutant(way=way, part=path.stem, line=number, now=now, before=line, place=ways[way])
     for name, _, values in CONSTANT.findall(text):
         for place, value in enumerate(values.split(",")[:FIRST]):
             if float(value):
@@ -266,10 +272,12 @@ def altered(text: str, mutant: Mutant) -> str:
 def listed() -> dict[tuple[str, str, str], str]:
     """Read why some mutants are equivalent, by their keys."""
     return {
-        (one["part"], one["before"], now): why["why"]
-        for why in tomllib.loads(LISTED.read_text("utf-8"))["reason"]
-        for one in why["mutants"]
-        for now in one["now"]
+        (part, before, change): reason["why"]
+        for reason in tomllib.loads(LISTED.read_text("utf-8"))["reason"]
+        for part, lines in reason.items()
+        if part != "why"
+        for before, changes in lines.items()
+        for change in changes
     }
 
 
@@ -466,7 +474,7 @@ def report(arguments: argparse.Namespace) -> None:
             if what == "killed":
                 ways[how.partition(": ")[2].partition(";")[0]] += 1
             elif what not in NOTICED:
-                survivors.append(f"{what}: {number}: {mutant} ({how})")
+                survivors.append(f"{what}: {number}: {mutant} ({mutant.key[2]}: {how})")
             print(f"{number}: {mutant}\n    {what}: {how} ({took:.1f} s)", flush=True)
     noticed = sum(tally[what] for what in NOTICED)
     print(f"by judge: {dict(ways.most_common())}")
