@@ -17,6 +17,8 @@ ORDERS = {
     "fSwing": "LREAL", "fSwingRate": "LREAL",
 }  # fmt: skip
 BUDGET = 9000
+SENSOR = 'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}'
+DISTURBANCE = "planner.disturbance={swing={payload=0.5}, settle=12.0}"
 
 
 @pytest.fixture(scope="module")
@@ -232,6 +234,25 @@ def test_rows_give_what_a_row_of_coefficients_leaves_on_each_machine(spec, accou
             assert SLOT * np.hypot(*left) == pytest.approx(due[mode], rel=5e-3, abs=1e-5)
     inner = 0.9 * np.cos(np.pi / 12) * 0.7 / SLOT / 2.0
     assert np.allclose(radii[:4], inner * account.bound[2:])
+
+
+def test_a_machine_with_a_sensor_is_followed_on_the_rope_that_it_has():
+    changes = ["planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}", SENSOR, DISTURBANCE]
+    spec = preset_spec("bay-crane", changes)
+    account = Account(spec)
+    account.call(5)
+    account.call(23, fSwing=0.2, fSwingRate=0.1)
+    for coefficient in (0.1, -0.2, 0.3):
+        account.call(1, fTaken=coefficient)
+    _, left, *_ = account.call(22)
+    squares, shapes = np.linalg.eig(stiffness(spec, 6.0))
+    shape = shapes[:, squares.argmin()]
+    state = np.outer([0.2, 0.1], shape / shape[np.abs(shape).argmax()]).ravel()
+    due = [
+        shown(spec, 6.0, ahead(spec, state, np.r_[0.1, -0.2, 0.3, 0.0, 0.0], 3 * [6.0], s), s).sum()
+        for s in stretches(account)
+    ]
+    assert left == pytest.approx(max(due), rel=1e-4)
 
 
 def test_plans_are_weighed_committed_foreseen_and_calm_or_not(spec, account):

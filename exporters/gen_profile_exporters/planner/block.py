@@ -78,6 +78,25 @@ TEXT = Path(__file__).with_name("text")
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class SwayConstants:
+    """How loads on ropes sway: sums of products of Chebyshev polynomials of the live parameters.
+
+    Attributes
+    ----------
+    curvatures : sequence of float
+        Bends of the live parameters, as in `PlannerConstants`.
+    exponents : (parameters, terms) array of int
+    coefficients : (rows, terms) array
+        For the squared frequencies (of two, for their sum and product), then for the matrix of the loads'
+        sway, row by row, in 1/s².
+    """
+
+    curvatures: Sequence[float]
+    exponents: NDArray[np.int64]
+    coefficients: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class PlannerConstants:
     """What the block needs to know of a machine.
 
@@ -134,6 +153,8 @@ class PlannerConstants:
         with rates for the matrix of the linear machine in the loads' sway, row by row, or else for the
         errors of the frequencies and the loads' sway by what is left in a mode, axis by axis; for a sensor.
     sensor : SensorConstants or None
+    sway : SwayConstants or None
+        Where the loads hang on ropes, and the rope changes on the way or the load is measured.
     """
 
     name: str
@@ -162,6 +183,7 @@ class PlannerConstants:
     modes: int
     model: Array
     sensor: of_sensor.SensorConstants | None = None
+    sway: SwayConstants | None = None
 
 
 def block_text(constants: PlannerConstants) -> str:

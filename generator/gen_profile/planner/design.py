@@ -19,6 +19,7 @@ from gen_profile.planner.machine import (
     live_modes,
     lowered,
     second_order_sway,
+    sway_model,
 )
 from gen_profile.planner.sensor import between, sensor_constants
 from gen_profile.planner.stated import STEADY, quick_limits, target_range, unstated_limits
@@ -28,7 +29,12 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import Phrase, placed
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, block_text
+from gen_profile_exporters.planner.block import (
+    SLOTS_PER_PERIOD,
+    PlannerConstants,
+    SwayConstants,
+    block_text,
+)
 
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
@@ -144,6 +150,19 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         modes=modes_of_live.modes,
         model=np.vstack(coefficients),
         sensor=sensed[0] if sensed else None,
+        sway=_sway(spec, modes_of_live),
+    )
+
+
+def _sway(spec: Spec, modes_of_live: LiveModes) -> SwayConstants | None:
+    """Find how the loads sway on any ropes, where the block follows them."""
+    if not spec.planner.live_rate and spec.planner.sensor is None:
+        return None
+    found = sway_model(spec, modes_of_live.interpolant)
+    if found is None:
+        return None
+    return SwayConstants(
+        curvatures=found.curvatures, exponents=found.exponents, coefficients=found.coefficients
     )
 
 

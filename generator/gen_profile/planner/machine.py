@@ -294,6 +294,28 @@ def _sway_matrix(linear: Linearization) -> Array:
     return np.asarray(first)
 
 
+def sway_model(spec: Spec, known: Interpolant) -> Interpolant | None:
+    """Find squared frequencies (of two their sum and product), then the matrix of the loads' sway by rows.
+
+    None where the loads do not hang on ropes alone, or sway otherwise along another axis. `known` are the
+    same frequencies, whose degree and bends are taken.
+    """
+
+    def rows(point: Sequence[float]) -> Array:
+        linear = linearized(spec, point)
+        squares = linear.distinct_frequencies**2
+        invariants = [squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares
+        return np.array([*invariants, *_sway_matrix(linear).ravel()])
+
+    middle = linearized(spec, [0.0] * len(spec.planner.live))
+    try:
+        if len(_sway_matrix(middle)) != len(middle.distinct_frequencies):
+            return None
+    except ValueError:
+        return None
+    return interpolate(rows, known.curvatures, int(known.exponents.max(initial=0))).without(NEGLIGIBLE)
+
+
 def _refuse_rates(spec: Spec) -> None:
     """Refuse live parameters that change on the way, of machines that sway otherwise than loads on ropes."""
     plant, rates = spec.machine(), spec.planner.live_rate

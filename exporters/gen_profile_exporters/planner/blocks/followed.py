@@ -6,16 +6,16 @@ from math import factorial
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import initialiser
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, SwayConstants
 from gen_profile_exporters.planner.blocks.texts import SIDES, constant_lines, filled, longest
 from gen_profile_exporters.playback.structured_text import literal
 
 SHARE = 0.5  # of the allowed sway, that motions may leave by stated errors
 FAST = 0.25  # of what a mode may leave, the next faster one may
 ENDS = (-1.0, 1.0)  # shares of the errors, of the machines that are watched
-CYCLE_TERMS = 3  # of the series of a cycle, as in live_account.st
-LEFT_OUT = 1e-7  # of a mode, by the series of a slot
+LEFT_OUT = 1e-7  # of a mode, by the series of a slot or a cycle
 
 
 def account_texts(c: PlannerConstants) -> str:
@@ -24,10 +24,10 @@ def account_texts(c: PlannerConstants) -> str:
     swings, rows, plan, name = modes * machines, 6 * modes + 1, 2 * slots + 4, c.name.replace("-", "_")
     lengths = {
         "live": len(c.live), "swing": swings, "mode": modes, "entry": rows * slots, "row": rows,
-        "pair": rows // 2, "plan": plan, "power": len(c.live) * c.degrees, "matrix": modes**2,
+        "pair": rows // 2, "plan": plan, "power": len(c.live) * _degrees(c), "matrix": modes**2,
         "turn": machines * modes**2, "push": 4 * swings, "state": 2 * swings, "sweep": 2 * modes * swings,
         "sum": 2 * swings, "model_row": modes + modes**2, "step": max(3, 2 * modes), "machine": machines,
-        "part": 6 * terms(c),
+        "part": 6 * terms(c, _longest_slot(c)),
     }  # fmt: skip
     values: dict[str, str | int] = {
         "account": f"{name}_account",
@@ -51,16 +51,27 @@ def _bounds(c: PlannerConstants) -> Array:
     return np.asarray(SHARE * c.sway_limit / len(c.axes) * parts / parts.sum())
 
 
-def terms(c: PlannerConstants) -> int:
-    """Find the terms of a slot's series: what they leave out of a mode is less than `LEFT_OUT`."""
-    corners = product((-1.0, 1.0), repeat=len(c.live))
-    signs = [np.prod(np.where(c.exponents % 2, np.array(at)[:, None], 1.0), axis=0) for at in corners]
-    squares = c.model[: c.modes] @ np.array(signs).T
-    fastest = float(
-        np.sqrt(squares.max(axis=1)[0 if c.modes == 2 else -1])
-    )  # of two by their sum, which is more
-    angle = fastest * max(c.periods) / SLOTS_PER_PERIOD
-    return next(k for k in range(4, 20) if angle ** (2 * k) / factorial(2 * k) < LEFT_OUT)
+def terms(c: PlannerConstants, time: float) -> int:
+    """Find the terms of a time's series: what they leave out of a mode is less than `LEFT_OUT`."""
+    sway, corners = _sway(c), product((-1.0, 1.0), repeat=len(c.live))
+    signs = [np.prod(np.where(sway.exponents % 2, np.array(at)[:, None], 1.0), axis=0) for at in corners]
+    squares = (sway.coefficients[: c.modes] @ np.array(signs).T).max(axis=1)
+    angle = time * float(np.sqrt(squares[0 if c.modes == 2 else -1]))  # of two by their sum, which is more
+    return next(k for k in range(2, 20) if angle ** (2 * k) / factorial(2 * k) < LEFT_OUT)
+
+
+def _longest_slot(c: PlannerConstants) -> float:
+    return max(c.periods) / SLOTS_PER_PERIOD
+
+
+def _sway(c: PlannerConstants) -> SwayConstants:
+    if c.sway is None:
+        raise ExportError("The loads do not hang on ropes alone, so the block does not follow them.")
+    return c.sway
+
+
+def _degrees(c: PlannerConstants) -> int:
+    return int(_sway(c).exponents.max(initial=0)) + 1
 
 
 def _of_live(c: PlannerConstants) -> dict[str, object]:
@@ -74,28 +85,30 @@ def _of_live(c: PlannerConstants) -> dict[str, object]:
 
 def _of_rope(c: PlannerConstants) -> dict[str, object]:
     """Give squared frequencies, then the matrix of the loads' sway, and what they are evaluated by."""
-    model = np.vstack([c.model[: c.modes], c.model[2 * c.modes : 2 * c.modes + c.modes**2]])
+    sway = _sway(c)
     return {
         "cModes": c.modes,
         "cMachines": 1 + len(ENDS),
-        "cLongest": terms(c),
+        "cLongest": terms(c, _longest_slot(c)),
         **_of_live(c),
-        "cDegrees": c.degrees,
-        "cTerms": model.shape[1],
-        "cLiveBend": [float(v) for v in c.curvatures[: len(c.live)]],
-        "cExponent": [int(v) for v in c.exponents.ravel()],
-        "cModel": [float(v) for v in model.ravel()],
+        "cDegrees": _degrees(c),
+        "cTerms": sway.coefficients.shape[1],
+        "cLiveBend": [float(v) for v in sway.curvatures],
+        "cExponent": [int(v) for v in sway.exponents.ravel()],
+        "cModel": [float(v) for v in sway.coefficients.ravel()],
     }
 
 
 def _of_account(c: PlannerConstants) -> dict[str, object]:
     """Give rates and ranges, and the operations of a slot and a cycle, counted cautiously."""
     machines, n, rows = 1 + len(ENDS), c.modes, c.modes + c.modes**2
-    evaluated = c.model.shape[1] * (len(c.live) + 2 * rows) + len(c.live) * (20 + 4 * c.degrees)
+    found = _sway(c).coefficients.shape[1]
+    evaluated = found * (len(c.live) + 2 * rows) + len(c.live) * (20 + 4 * _degrees(c))
     modes = n * (n * n * n * (2 * n + 4) + 4 * n * n) + 20 * machines * n
+    longest_series, short_series = terms(c, _longest_slot(c)), terms(c, c.cycle)
     slot, cycle = (
-        k * (machines * (5 * n**2 + 8 * n + 2) + 2 * n**3 + n**2) + machines * 3 * n**3 + 14 * terms(c)
-        for k in (terms(c), CYCLE_TERMS)
+        k * (machines * (5 * n**2 + 8 * n + 2) + 2 * n**3 + n**2) + machines * 3 * n**3 + 14 * longest_series
+        for k in (longest_series, short_series)
     )
     return {
         **_of_live(c),
@@ -103,7 +116,8 @@ def _of_account(c: PlannerConstants) -> dict[str, object]:
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cRate": [float(c.rates.get(name, 0.0)) for name in c.live],
         "cLowers": [float(c.rope_length_gain.get(name, 0.0)) for name in c.live],
-        "cTerms": terms(c),
+        "cTerms": longest_series,
+        "cCycleTerms": short_series,
         "cModelWork": evaluated + modes + slot,
         "cRunWork": 20 + machines * n * (8 + 8 * n),
         "cSweepWork": 20 + machines * 2 * n * (n * (8 * n + 8) + 8),
