@@ -22,6 +22,9 @@ SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterat
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.2  # times that, of machines between both ends of the errors, which have no rows
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
+MACHINES = 16  # that are watched, where there are operations for them:
+SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
+WIDE = 0.06  # of a slow swing's turn: as errors turn a swing so much, one machine more on each side has rows
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
 
@@ -34,21 +37,17 @@ class Sizes:
     ----------
     watched : tuple of float
         Machines that are watched: shares of the stated errors.
-    more : int
-        Swings that a programme has rows of, besides those of the machine as given, the first and the last
-        one: those nearest to their bounds.
+        None for as many as there are operations for.
     """
 
-    watched: tuple[float, ...] = (-1.0, 1.0)
-    more: int = 0
+    watched: tuple[float, ...] | None = None
 
-    def shown(self, modes: int) -> int:
-        """Swings that a programme has rows of."""
-        return 3 * modes + self.more
-
-    def rows(self, modes: int) -> int:
-        """Rows of a programme: those of the swings, and a target's way."""
-        return 2 * self.shown(modes) + 1
+    def of(self, constants: PlannerConstants) -> tuple[float, ...]:
+        """Give the machines that are watched."""
+        if self.watched is not None:
+            return self.watched
+        room = (operations(constants) // len(constants.axes) - OTHER_WORK) // (SWING_WORK * constants.modes)
+        return tuple(np.linspace(-1.0, 1.0, max(2, min(MACHINES, room - 1))).tolist())
 
 
 def linear_programme(name: str, *, slots: int, rows: int) -> str:
@@ -91,19 +90,19 @@ def longest(constants: PlannerConstants) -> int:
 
 def planner(constants: PlannerConstants, sizes: Sizes) -> str:
     """Write a planner of one axis, behind the blocks that it has within it."""
-    modes, swings = constants.modes, constants.modes * (1 + len(sizes.watched))
+    watched = sizes.of(constants)
+    modes, swings = constants.modes, constants.modes * (1 + len(watched))
     name = constants.name.replace("-", "_")
     names = {part: f"{name}_{part}" for part in ("linear_programme", "account", "modes", "planner")}
-    ends = [*range(2 * modes), *range(swings - modes, swings)]
-    shown = [*ends, *sizes.more * [2 * modes]]
-    rows, slots = sizes.rows(modes), longest(constants)
+    shown = _shown(constants, watched)
+    rows, slots = 2 * len(shown) + 1, longest(constants)  # those of the swings, and a target's way
     plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
     share = (constants.sway_share or LEAST_SHARE * constants.sway_limit) / len(constants.axes)
     stops = _stop_share(constants)
-    parts = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in sizes.watched)]
+    parts = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in watched)]
     bounds = np.outer(share * np.array(parts), _shares(constants)).ravel()
     lengths = {
-        "live": max(1, len(constants.live)), "swing": swings, "shown": len(shown), "slot": slots,
+        "live": max(1, len(constants.live)), "swing": swings, "rowed": len(shown), "slot": slots,
         "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
         "power": max(1, len(constants.live)) * constants.degrees, "model": len(constants.model),
         "future": plan + 4, "plan": plan,
@@ -112,16 +111,16 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
         **names,
         **{f"last_{array}": length - 1 for array, length in lengths.items()},
         "swings": swings,
-        "shown": len(shown),
         "mode_count": modes,
+        "rowed": len(shown),
+        "shown": initialiser([str(v) for v in shown]),
         "slots": slots,
         "stop_share": literal(_stop_share(constants)),
         "polygon": literal(float(np.cos(np.pi / SIDES))),
         "bounds": initialiser([literal(float(v)) for v in bounds]),
-        "shown_swings": initialiser([str(v) for v in shown]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
-        "modes_constants": constant_lines(_of_modes(constants, sizes)),
-        "planner_constants": constant_lines(_of_motion(constants, swings, sizes, slots, plan)),
+        "modes_constants": constant_lines(_of_modes(constants, watched)),
+        "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
     }
     return "\n".join(
         [
@@ -131,8 +130,33 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
     )
 
 
+def _shown(c: PlannerConstants, watched: Sequence[float]) -> list[int]:
+    """Swings that a programme has rows of: the machine as given, the errors' ends, and some between."""
+    ends, watches = (0, 1, len(watched)), np.array(watched)
+    shown = [c.modes * machine + mode for machine in ends for mode in range(c.modes)]
+    frequencies, errors, _ = _middle(c)
+    for mode, turn in enumerate(errors * frequencies / frequencies[0]):
+        between = np.linspace(0.0, 1.0, int(turn / WIDE) + 2)[1:-1]
+        nearest = [int(np.argmin(np.abs(watches - share))) for share in (*-between, *between)]
+        shown += [c.modes * (1 + machine) + mode for machine in nearest]
+    return list(dict.fromkeys(shown))
+
+
 def _stop_share(c: PlannerConstants) -> float:
     return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share) if c.sway_share else 1.0
+
+
+def _middle(c: PlannerConstants) -> tuple[Array, Array, Array]:
+    """Frequencies of the modes, the shares by which errors change them, and sways, amid the live ranges."""
+    modes, lives = c.modes, len(c.live)
+    middles = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
+    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in middles])
+    exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
+    terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
+    squares, _, errors, sways = (c.model @ terms)[: 4 * modes].reshape(4, modes)
+    if modes == 2:  # from their sum and product
+        squares = np.sort(np.roots([1.0, -squares[0], squares[1]]).real)
+    return np.sqrt(squares), errors, sways
 
 
 def _shares(c: PlannerConstants) -> Array:
@@ -140,22 +164,17 @@ def _shares(c: PlannerConstants) -> Array:
 
     By what they change itself, a mode that counts little would be bound as much as if it were to be at rest.
     """
-    modes, lives = c.modes, len(c.live)
-    middles = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
-    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in middles])
-    exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
-    terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
-    errors, sways = (c.model @ terms)[2 * modes : 4 * modes].reshape(2, modes)
+    _, errors, sways = _middle(c)
     roots = np.sqrt(np.maximum(errors * sways, 0.0))
-    return np.asarray(roots / roots.sum()) if roots.any() else np.full(modes, 1.0 / modes)
+    return np.asarray(roots / roots.sum()) if roots.any() else np.full(c.modes, 1.0 / c.modes)
 
 
-def _of_modes(c: PlannerConstants, sizes: Sizes) -> dict[str, object]:
+def _of_modes(c: PlannerConstants, watched: Sequence[float]) -> dict[str, object]:
     lives = c.live or {"": (0.0, 1.0)}
     exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
     return {
         "cModes": c.modes,
-        "cSwings": c.modes * (1 + len(sizes.watched)),
+        "cSwings": c.modes * (1 + len(watched)),
         "cLives": len(c.live),
         "cDegrees": c.degrees,
         "cTerms": c.model.shape[1],
@@ -163,7 +182,7 @@ def _of_modes(c: PlannerConstants, sizes: Sizes) -> dict[str, object]:
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cCycle": c.cycle,
         "cLeastDecay": c.least_decay,
-        "cWatched": [float(e) for e in sizes.watched],
+        "cWatched": list(watched),
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveBend": [float(v) for v in c.curvatures or (0.0, 0.0)],
@@ -172,11 +191,11 @@ def _of_modes(c: PlannerConstants, sizes: Sizes) -> dict[str, object]:
     }
 
 
-def _of_motion(c: PlannerConstants, swings: int, sizes: Sizes, slots: int, plan: int) -> dict[str, object]:
-    rows = sizes.rows(c.modes)
+def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: int) -> dict[str, object]:
+    rows = 2 * shown + 1
     return {
         "cModes": c.modes,
-        "cShown": sizes.shown(c.modes),
+        "cShown": shown,
         "cSlots": slots,
         "cPlan": plan,
         "cFuture": plan + 4,
@@ -186,6 +205,8 @@ def _of_motion(c: PlannerConstants, swings: int, sizes: Sizes, slots: int, plan:
         + 15 * swings,  # operations where a programme is found, and the next begins
         "cReserve": 150 + 11 * plan + 30 * swings,  # operations where a plan was found
         "cSlotWork": 650 + rows * (rows + 10),  # operations of an iteration, for each slot
+        "cStepWork": 2_200 * (shown - c.modes)
+        + 2 * rows * (20 + rows * (rows + 14)),  # and for each iteration
         "cVelocity": [axis.velocity for axis in c.axes],
         "cAcceleration": [axis.acceleration for axis in c.axes],
         "cJerk": [axis.jerk for axis in c.axes],
