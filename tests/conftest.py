@@ -33,6 +33,7 @@ if sys.platform != "win32":
 
 
 TURN = pytest.StashKey[str]()
+NAMED = 8  # rooms, in the line that tells what ran
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -90,7 +91,9 @@ def take_turns(config: pytest.Config, items: list[pytest.Item]) -> None:
     rooms = {item for item, file in slow.items() if file in why}
     due = {item for item, file in slow.items() if turn_of[file] == turn} - rooms
     keep(config, items, {*items} - slow.keys() | rooms | due)
-    named = ", ".join(sorted({*why.values()})) or "none"
+    names = sorted({*why.values()}) or ["none"]
+    more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
+    named = ", ".join(names[:NAMED] + more)
     left = len(slow) - len(rooms) - len(due)
     config.stash[TURN] = (
         f"Turn {turn + 1} of {TURNS}: of {len(slow)} slow tests {len(rooms)} of changed rooms ({named}), "
