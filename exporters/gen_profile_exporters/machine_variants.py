@@ -30,7 +30,7 @@ from gen_profile.spec.model import Spec
 STATES = 4
 SWING = 0.1  # rad (or m), of the loads in these states
 TOLERANCE = 1e-6  # relative
-STEP = 1e-5  # of differences
+DIFFERENCE_STEP = 1e-5  # of differences
 MOST_SIGNS = 8  # coordinates whose signs are tried one by one; of more, all together
 
 
@@ -173,9 +173,9 @@ def _coupling(law: Law, states: States) -> Array:
     count, loads = states[0].shape
     ends = [np.tile(values, (4 * loads, 1)) for values in states]
     for column, (which, number, sign) in enumerate(product((0, 1), range(loads), (-1.0, 1.0))):
-        ends[which][column * count : (column + 1) * count, number] += sign * STEP
+        ends[which][column * count : (column + 1) * count, number] += sign * DIFFERENCE_STEP
     below, above = law(*ends)[0].reshape(2 * loads, 2, count, loads).swapaxes(0, 1)
-    return np.moveaxis((above - below) / (2.0 * STEP), 0, -1)
+    return np.moveaxis((above - below) / (2.0 * DIFFERENCE_STEP), 0, -1)
 
 
 def _reached(push: Array, coupling: Array) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from gen_profile.support.errors import ExportError
 from gen_profile.support.units import AxisScale
 
 ALL_BITS = 2**32  # counts
-MOST = 2**31  # counts, of any other turn
+MOST_COUNTS = 2**31  # counts, of any other turn
 WHOLE = 1e-4  # of a count
 
 
@@ -28,9 +28,9 @@ def turn_counts(axis: AxisScale) -> int | None:
         return None
     exact = axis.modulo / abs(axis.factor) * abs(axis.counts_per_si)
     turn, shown = round(exact), f"axis {axis.name}: a turn of axis.modulo = {axis.modulo:.15g} {axis.unit}"
-    if turn != ALL_BITS and not 2 <= turn <= MOST:
+    if turn != ALL_BITS and not 2 <= turn <= MOST_COUNTS:
         raise ExportError(
-            f"{shown} has {turn} counts; drives count 2 to {MOST} of them, or all {ALL_BITS} of 32 bits."
+            f"{shown} has {turn} counts; drives count 2 to {MOST_COUNTS}, or all {ALL_BITS} of 32 bits."
         )
     if abs(exact - turn) > WHOLE:
         metres = axis.modulo / abs(axis.factor)

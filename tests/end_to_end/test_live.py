@@ -73,7 +73,7 @@ def test_what_is_drawn():
 
 def test_curves_go_where_they_belong():
     rising, nothing = np.linspace(-1.0, 1.0, 8), np.full(8, np.nan)
-    lines = [line.plain[live_terminal.MARGIN :] for line in live_terminal.curves(rising, nothing, 4, 2)]
+    lines = [line.plain[live_terminal.SCALE :] for line in live_terminal.curves(rising, nothing, 4, 2)]
     assert lines == ["\u2800\u2800⡠⠊", "⡠⠊\u2800\u2800"]
     assert [line.plain.split()[0] for line in live_terminal.curves(rising, nothing, 4, 2)] == ["1", "-1"]
     above = live_terminal.curves(rising, np.where(rising < 0, rising, np.nan), 4, 2)

@@ -233,7 +233,7 @@ def test_one_client_at_a_time_writes():
     assert other.ask(READ, 1.0, count=1)[16] == values[0]
     one.ask(RELEASE)
     assert other.ask(WRITE, 1.0, 0, [7.0])[1] == 0.0
-    for _ in range(int(buffers.PATIENCE / CYCLE) + 1):
+    for _ in range(int(buffers.CLIENT_TIMEOUT / CYCLE) + 1):
         fb.call()
     assert one.ask(WRITE, 1.0, 0, values[:1])[1] == 0.0  # the other one is silent
 

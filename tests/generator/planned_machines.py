@@ -9,7 +9,7 @@ from gen_profile.assurance.proof.habits import Change
 from gen_profile.assurance.proof.histories import Histories, History
 from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.planner.commands import Command
-from gen_profile.planner.stated import STEADY
+from gen_profile.planner.stated import LEAST_RATE
 
 G = 9.81
 CYCLE = 0.004
@@ -181,7 +181,7 @@ SELDOM = {
     "tight": [  # the load is another by little more than what counts
         {
             "commands": (_positions(8.0), _positions(20.0, time=30.0)),
-            "changes": (Change(time=5.0, lasts=inf, inputs={"fm2": (1.0 - 1.5 * STEADY) * 2000.0}),),
+            "changes": (Change(time=5.0, lasts=inf, inputs={"fm2": (1.0 - 1.5 * LEAST_RATE) * 2000.0}),),
         }
     ],
 }

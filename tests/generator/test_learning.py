@@ -18,7 +18,7 @@ from gen_profile.motion.profile import Profile, SampledProfile, sample
 from gen_profile.spec.reading import HERE, parse_spec, preset_spec, preset_text, read_spec
 from gen_profile.spec.text import changed_text
 from gen_profile.studies.identification import learning
-from gen_profile.studies.identification.learning import LEAST, Machines, learn
+from gen_profile.studies.identification.learning import LEAST_HALF_RANGE, Machines, learn
 from gen_profile.studies.identification.measurements import DirectReading, SwingLog, parse_reading
 from gen_profile.support.errors import InfeasibleProblem, SpecError
 from gen_profile_exporters.exporter import target_of
@@ -74,15 +74,15 @@ def test_a_log_narrows_the_range_to_the_true_rope():
     learned = learn(SPEC, PLAYED, [log_of()])
     (low, high) = learned.spec.checked_ranges()["L0"]
     assert low <= ROPE - 1.0 <= high and high - low < 0.05
-    assert learned.spec.plant.parameters["L0"] == pytest.approx(ROPE - 1.0, rel=2 * LEAST)
+    assert learned.spec.plant.parameters["L0"] == pytest.approx(ROPE - 1.0, rel=2 * LEAST_HALF_RANGE)
     (run,) = learned.to_dict()["runs"]
     assert run["begins_s"] == pytest.approx(BEGIN + LAG, abs=0.02)  # what a drive lags is part of it
     assert run["gain"] == pytest.approx(-0.95, abs=0.02)
     assert not learned.warnings()
-    least = learned.spec.changed({"robustness.uncertain": {"L0": LEAST}})
+    least = learned.spec.changed({"robustness.uncertain": {"L0": LEAST_HALF_RANGE}})
     assert learn(least, PLAYED, [log_of(seed=3)]).spec.checked_ranges() == least.checked_ranges()
     again = learn(learned.spec, PLAYED, [log_of(seed=1)]).spec
-    assert again.checked_ranges()["L0"] == pytest.approx((low, high), abs=3e-3)  # `LEAST` is left
+    assert again.checked_ranges()["L0"] == pytest.approx((low, high), abs=3e-3)  # `LEAST_HALF_RANGE` is left
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from gen_profile_exporters.can.scaling import Demand, magnitude_counts
 from gen_profile_exporters.exporter import Target
 
 NOISE = 0.001  # m (or rad), of what drives tell, and of how they keep a place
-MARGIN = 1.5  # over the lag at the motion's greatest velocity
+WINDOW_FACTOR = 1.5  # over the lag at the motion's greatest velocity
 CYCLES_LATE = 2
 USEFUL = 4.0  # windows as wide as this many derived ones
 LEAST_USEFUL = 0.05  # m (or rad), however slow a motion is
@@ -46,6 +46,6 @@ def useful(demand: Demand, target: Target) -> tuple[int, ...]:
 def _derived(demand: Demand, target: Target) -> tuple[int, ...]:
     lag = target.lag + CYCLES_LATE * target.can.sync_period
     return tuple(
-        round(MARGIN * velocity * lag) + magnitude_counts(NOISE, axis)
+        round(WINDOW_FACTOR * velocity * lag) + magnitude_counts(NOISE, axis)
         for velocity, axis in zip(demand.velocity, target.axes, strict=True)
     )

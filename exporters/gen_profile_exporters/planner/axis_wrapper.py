@@ -24,7 +24,7 @@ COMMENTS = {
 }
 SETPOINTS = ("fPosition", "fVelocity", "fAcceleration")  # outputs of the block that go to the axes
 MEASURED = ("fActPosition", "fActVelocity")  # inputs that come from them
-PATIENCE = 10.0  # s, for power, and for the vendor's block
+POWER_TIMEOUT = 10.0  # s, for power, and for the vendor's block
 LIBRARIES = {"twincat": TWINCAT, "codesys": CODESYS, "siemens-scl": SIEMENS}
 
 
@@ -83,8 +83,8 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: str
         copied=[v for v in outputs if v.name not in setpoints],
         has_lists=any(v.array for v in (*inputs, *outputs)),
         units={n: literal(factor) for n, factor in units.items()},
-        patience=f"{PATIENCE:g}",
-        patience_cycles=round(PATIENCE / cycle),
+        patience=f"{POWER_TIMEOUT:g}",
+        patience_cycles=round(POWER_TIMEOUT / cycle),
     )
     wrapper = parse_function_block(text)
     counted = Counter(v.name.lower() for v in wrapper.variables)  # the language has one case only

@@ -126,7 +126,7 @@ def _own(
         _MEMBERS,
         cKind=_kind(source, numbers),
         cLayout=buffers.LAYOUT_NAMES.index(buffers.PLANNER),
-        cPatience=ceil(buffers.PATIENCE / cycle),
+        cPatience=ceil(buffers.CLIENT_TIMEOUT / cycle),
     )
     taken = {one.name.lower() for one in source.variables}
     renamed = {one.name: f"{one.name}{OURS}" for one in own if one.name.lower() in taken}

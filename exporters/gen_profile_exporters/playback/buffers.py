@@ -35,7 +35,7 @@ from gen_profile_exporters.templates import filled
 INTERFACE = 2  # version of the requests
 LENGTH, FIRST, WINDOW = 256, 16, 239  # of requests and replies; where their data begin, and how many at most
 LEAST_CAPACITY, MOST_CAPACITY = 2048, 1 << 17
-PATIENCE = 30.0  # s that a client may be silent before another one may write
+CLIENT_TIMEOUT = 30.0  # s that a client may be silent before another one may write
 REQUEST, REPLY, STATE, TABLE = "aRequest", "aReply", "aState", "aTable"
 
 OF_HEADER = (  # values of a block of constants that only comments tell
@@ -147,7 +147,7 @@ def _buffered(
         VARIABLES,
         cKind=kind_of(target, layout, library=library),
         cLayout=LAYOUT_NAMES.index(layout),
-        cPatience=ceil(PATIENCE / cycle),
+        cPatience=ceil(CLIENT_TIMEOUT / cycle),
         cOwn=len(SCALARS) + axes * len(PER_AXIS),
     )
     of_constants = {*(f"c{name}" for name in (*COLUMNS[layout], *OF_BUFFER)), *DROPPED}

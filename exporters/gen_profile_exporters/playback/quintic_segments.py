@@ -16,7 +16,7 @@ from gen_profile.motion.profile import Array, read_only
 
 POSITION_ERROR = 1e-9  # m (or rad), of a segment at the cycles inside it
 ACCELERATION_ERROR = 1e-6  # m/s²
-LEAST = 0.01  # of the length that would fit, below which it is not said how much longer it could be
+LEAST_SHARE = 0.01  # of the length that would fit, below which it is not said how much longer it could be
 POINTS = 16, 4096  # where peaks are looked for: per segment, and of all, at least
 
 
@@ -162,7 +162,7 @@ def _reach(ends: Array, inside: Array, cycle_time: float) -> float:
     """
     error = _interpolation(inside.shape[1] + 1, cycle_time) @ ends - inside
     far, bent = np.maximum.reduce(np.abs(error, out=error), axis=(1, 2)).tolist()
-    return float(1.0 / max(far ** (1 / 6), bent**0.25, LEAST))
+    return float(1.0 / max(far ** (1 / 6), bent**0.25, LEAST_SHARE))
 
 
 @lru_cache(maxsize=1024)

@@ -37,7 +37,7 @@ from gen_profile_exporters.setpoints import plausible_cycle_time
 START_TOLERANCE = 1e-3  # m (or rad), the default
 SEGMENT_COLUMNS = tuple(f"power{power}" for power in range(6))
 SAMPLE_COLUMNS = ("position", "velocity", "acceleration")
-ROUNDING = 1e-12  # relative, of an evaluated quintic
+QUINTIC_TOLERANCE = 1e-12  # relative, of an evaluated quintic
 MOST_CYCLES = 10_000_000  # of a motion that is read
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
@@ -316,7 +316,7 @@ def _verify(tokens: Mapping[str, Token], table: PlaybackTable) -> None:
             raise _altered(token, f"{token.text[:40]} stands where the table asks for {due[name][:40]}")
     end_error = np.abs(table.arrival() - table.target)
     factor = np.abs([axis.factor for axis in table.axes])
-    if (end_error > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
+    if (end_error > POSITION_ERROR * factor + QUINTIC_TOLERANCE * np.abs(table.target)).any():
         wrong = f"cTarget = {tokens['target'].text[:40]} is not where the table ends"
         raise _altered(tokens["target"], wrong)
 

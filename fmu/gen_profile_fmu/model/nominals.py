@@ -11,8 +11,8 @@ from gen_profile.plants.plant import Plant
 from gen_profile_fmu.model.variables import variable_name
 
 _SAMPLES = 401
-_SHARE = 0.1  # of a peak on the way: what remains of a swing at the target, which matters most, is smaller
-_LEAST = 0.1  # share of the largest of its kind that a state has which the motion leaves alone
+_RESIDUAL_SHARE = 0.1  # of a peak on the way, as which what remains at the target counts
+_LEAST_NOMINAL = 0.1  # share of the largest of its kind that a state has which the motion leaves alone
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -73,8 +73,8 @@ def state_nominals(
 
 
 def _sizes(names: Sequence[str], columns: Array) -> dict[str, float]:
-    peaks = _SHARE * np.abs(columns).max(axis=0)
-    least = _LEAST * float(peaks.max())
+    peaks = _RESIDUAL_SHARE * np.abs(columns).max(axis=0)
+    least = _LEAST_NOMINAL * float(peaks.max())
     return {name: rounded_up(max(float(peak), least)) for name, peak in zip(names, peaks, strict=True)}
 
 

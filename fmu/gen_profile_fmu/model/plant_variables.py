@@ -24,7 +24,7 @@ from gen_profile_fmu.model.variables import (
 TAU = "tau"
 MAX_STEP = "max_step"
 PERIOD = "interpolation_period"
-_STANDING = 1e-9  # m or rad, less than which a motion leads nowhere
+_STANDING_TOLERANCE = 1e-9  # m or rad, less than which a motion leads nowhere
 _VARIABLES = tomllib.loads(Path(__file__).with_name("variables.toml").read_text("utf-8"))
 Blocks = dict[str, tuple[FmuVariable, ...]]
 
@@ -180,7 +180,7 @@ def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
         "START": _each(axes, "{}.start", "where the motion begins", 0, Kind.FIXED_PARAMETER, start=start),
         "DISTANCE": tuple(
             attrs.evolve(variable, start=float(distance))
-            if abs(distance) > _STANDING
+            if abs(distance) > _STANDING_TOLERANCE
             else attrs.evolve(variable, lower=0.0, upper=0.0)
             for variable, distance in zip(distances, motion.target - start, strict=True)
         ),

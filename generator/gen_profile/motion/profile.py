@@ -22,7 +22,7 @@ from gen_profile.support.summary import Drawable, Sampled, Summarised, Tabled
 Array = NDArray[np.float64]
 
 MOST_SAMPLES = 1e8  # of a profile
-NOTHING = 1e-3  # of the motion that another axis makes, in which one hardly moves
+STANDING_SHARE = 1e-3  # of the motion that another axis makes, in which one hardly moves
 
 
 def read_only(values: object) -> Array:
@@ -161,7 +161,7 @@ class Profile(Drawable):
     def leading(self) -> int:
         """Number of the first axis that moves, but for ways that are nothing beside another's."""
         moves = np.abs(self.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0)
-        return int(np.argmax(moves >= NOTHING * moves.max()))
+        return int(np.argmax(moves >= STANDING_SHARE * moves.max()))
 
     @property
     def start(self) -> Array:

@@ -19,9 +19,9 @@ COMMANDS = ("position", "velocity", "stop", "quick-stop")
 FIRST = ("time_s", "command")
 WHOLE = ("b", "n")  # first letters of outputs that are whole numbers
 CHUNK = 10_000  # cycles between looks at whether the axis stands
-LONGEST = 3600.0  # s, of what follows the last command
+LONGEST_TAIL = 3600.0  # s, of what follows the last command
 MOST_CYCLES = 10_000_000  # before the last command
-STILL = 0.5  # s of standing after which nothing more is expected
+STANDSTILL_TIME = 0.5  # s of standing after which nothing more is expected
 
 
 @attrs.frozen(kw_only=True)
@@ -290,8 +290,8 @@ def _issued(
 
 def _until_still(block: BlockInstance, row: Array, cycle: float) -> Iterator[Array]:
     telling = [block.outputs.index(name) for name in ("bBusy", *(a.of("fVelocity") for a in block.axes))]
-    still = math.ceil(STILL / cycle)
-    most = math.ceil(LONGEST / cycle)
+    still = math.ceil(STANDSTILL_TIME / cycle)
+    most = math.ceil(LONGEST_TAIL / cycle)
     done = 0
     while done < most:
         issued = block.call(np.tile(row, (min(CHUNK, most - done), 1)))

@@ -22,7 +22,7 @@ from gen_profile.planner.machine import (
     sway_model,
 )
 from gen_profile.planner.sensor import between, sensor_constants
-from gen_profile.planner.stated import STEADY, quick_limits, target_range, unstated_limits
+from gen_profile.planner.stated import LEAST_RATE, quick_limits, target_range, unstated_limits
 from gen_profile.spec.model import Spec
 from gen_profile.spec.stack_rules import refuse_stacks
 from gen_profile.support.errors import SpecError
@@ -46,7 +46,7 @@ TOLERATED_FRACTION = 0.2  # of the allowed sway, which the block leaves at rest;
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
 TOLERANT = 3.0  # times that, where plans may spend a share of the allowed sway
 LEAST_ERROR = 1e-3  # of a frequency, that is watched to second order
-USUAL = 20.0  # slots in half a motion
+SLOTS_PER_MOTION = 20.0  # slots in half a motion
 LITTLE = 0.3  # weight that does not count
 
 
@@ -126,7 +126,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         units=tuple(spec.machine().units[name] for name in modes_of_live.live),
         nominal=tuple(_nominal(spec, name) for name in modes_of_live.live),
         drift=tuple(
-            STEADY * high + 2.0 * spec.planner.live_noise.get(name, 0.0)
+            LEAST_RATE * high + 2.0 * spec.planner.live_noise.get(name, 0.0)
             for name, (_, high) in modes_of_live.live.items()
         ),
         rates=spec.planner.live_rate,
@@ -187,7 +187,7 @@ def _second_order(spec: Spec, live_modes: LiveModes) -> Array:
     velocity = max(spec.limits.of(number).velocity or 0.0 for number in planned_axes(spec))
     slot_angle = 2.0 * np.pi / SLOTS_PER_PERIOD
     usual = [
-        velocity * weights * slot_angle / rates[0] * (USUAL * slot_angle * rates / rates[0]) ** 2
+        velocity * weights * slot_angle / rates[0] * (SLOTS_PER_MOTION * slot_angle * rates / rates[0]) ** 2
         for rates, _ in (_rates(live_modes, point) for point in corners(live_modes.live))
     ]
     return np.where(np.max(usual, axis=0) > LITTLE, weights, 0.0)

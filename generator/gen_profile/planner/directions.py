@@ -12,13 +12,13 @@ from gen_profile.spec.model import Spec
 from gen_profile.support.errors import SpecError
 
 ALONE = 1e-6  # of what a sensor shows, by other axes
-STILL = 1e-9  # acceleration of a coordinate, relative to an axis's, that counts as none
+NO_ACCELERATION = 1e-9  # acceleration of a coordinate, relative to an axis's, that counts as none
 
 
 def planned_axes(spec: Spec) -> dict[int, BlockAxis]:
     """Find the axes that make a load sway by their numbers: these the block plans, and no others."""
     middle, axes = linearized(spec, [0.0] * len(spec.planner.live)), spec.machine().actuated
-    numbers = np.flatnonzero(np.abs(middle.input).max(axis=0) > STILL).tolist()
+    numbers = np.flatnonzero(np.abs(middle.input).max(axis=0) > NO_ACCELERATION).tolist()
     several = len(numbers) > 1
     return {k: BlockAxis(name=axes[k].name if several else "", unit=axes[k].unit) for k in numbers}
 

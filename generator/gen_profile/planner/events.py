@@ -11,8 +11,8 @@ from gen_profile.planner.sensor_log import read_rows
 from gen_profile.support.errors import SpecError
 from gen_profile.support.suggestion import number_meant
 
-KEPT = 16
-MOST = 1e9  # s, and of a code: no block's counts so far
+KEPT_EVENTS = 16
+GREATEST_VALUE = 1e9  # s, and of a code: no block's counts so far
 NO_ERROR = 50  # the code of nErrorId 0; those of the others follow
 COLUMNS = ("time_s", "code", "value")
 _LINES = (Path(__file__).parents[1] / "lists" / "events.txt").read_text("utf-8").splitlines()
@@ -57,14 +57,14 @@ def events_of(outputs: Sequence[str], issued: Array) -> Iterator[Event]:
 
     """
     places = {
-        name: [outputs.index(f"{name}[{k}]") for k in range(KEPT)]
+        name: [outputs.index(f"{name}[{k}]") for k in range(KEPT_EVENTS)]
         for name in ("aEventTime", "aEventCode", "aEventValue")
     }
     known = 0
     for row in issued:
         count = int(row[outputs.index("nEvents")])
-        for number in range(max(known, count - KEPT), count):
-            time, code, value = (float(row[where[number % KEPT]]) for where in places.values())
+        for number in range(max(known, count - KEPT_EVENTS), count):
+            time, code, value = (float(row[where[number % KEPT_EVENTS]]) for where in places.values())
             yield Event(time, int(code), value)
         known = count
 
@@ -91,7 +91,7 @@ def read_events(text: str) -> list[Event]:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
         except ValueError:
             time, code, value = math.nan, math.nan, math.nan
-        sound = max(abs(time), abs(code)) < MOST and code.is_integer() and math.isfinite(value)
+        sound = max(abs(time), abs(code)) < GREATEST_VALUE and code.is_integer() and math.isfinite(value)
         if None in row or not sound:
             hint = next((hint for text in cells if "point" in (hint := number_meant(text))), "")
             raise SpecError(

@@ -12,10 +12,10 @@ from gen_profile.planner.planner import Planner
 from gen_profile.spec.model import AxisLimitsSpec, Spec
 from gen_profile_exporters.planner.block import FUTURE, RESERVE, SLOTS_PER_PERIOD
 
-QUICK = 1.5  # slow periods in which an axis at its limits is at a speed that it can be left from
+RUN_UP = 1.5  # slow periods in which an axis at its limits is at a speed that it can be left from
 ROOM = 1e5  # m: travel that no axis comes to the end of
-SETTLED = 10.0  # periods after which a held stick's velocity no longer changes
-NEARLY = 0.99
+SETTLING = 10.0  # periods after which a held stick's velocity no longer changes
+REACHED = 0.99
 AHEAD = FUTURE / SLOTS_PER_PERIOD
 
 
@@ -40,7 +40,7 @@ def slow_axes(spec: Spec, block: PlannerBlock) -> tuple[str, ...]:
     limits = {number: spec.limits.of(number) for number in planned_axes(spec)}
     quick = [
         (own.velocity or 0.0)
-        <= QUICK * period * min(own.acceleration or 0.0, 0.5 * period * (own.jerk or 0.0))
+        <= RUN_UP * period * min(own.acceleration or 0.0, 0.5 * period * (own.jerk or 0.0))
         for own in limits.values()
     ]
     return () if all(quick) else tuple(_sentences(spec, period))
@@ -56,7 +56,7 @@ def _sentences(spec: Spec, period: float) -> Iterator[str]:
     for (number, axis), speeds in zip(axes.items(), np.transpose(reached), strict=True):
         own, at = limits.of(number), int(np.argmin(speeds))
         assert own.velocity and own.acceleration and own.jerk
-        if speeds[at] < NEARLY * (1.0 - (RESERVE if spec.planner.live_rate else 0.0)) * own.velocity:
+        if speeds[at] < REACHED * (1.0 - (RESERVE if spec.planner.live_rate else 0.0)) * own.velocity:
             scarce = "acceleration" if 3.0 * own.acceleration < period * own.jerk else "jerk"
             where = ", ".join(f"{name} = {value:g}" for name, value in corners[at].items())
             yield (
@@ -74,5 +74,5 @@ def _reached(
     full = [own.velocity or 0.0 for own in limits]
     rise = max((own.velocity or 0.0) / (own.acceleration or 1.0) for own in limits)
     planner.restart(np.zeros(len(full)) if len(full) > 1 else 0.0)
-    issued = planner.hold(rise + SETTLED * period, velocity=full if len(full) > 1 else full[0], live=live)
+    issued = planner.hold(rise + SETTLING * period, velocity=full if len(full) > 1 else full[0], live=live)
     return np.asarray(np.abs(issued.velocity).reshape(-1, len(full)).max(axis=0))

@@ -10,7 +10,7 @@ import numpy as np
 from gen_profile.dynamics.problem.linearization import Linearization
 from gen_profile.motion.profile import Array
 from gen_profile.planner.chebyshev import Interpolant, bend, interpolate
-from gen_profile.planner.directions import STILL, linearized, planned_axes
+from gen_profile.planner.directions import NO_ACCELERATION, linearized, planned_axes
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import SpecError
 
@@ -19,11 +19,11 @@ SYMMETRIC = 2  # modes whose frequencies come from sum and product of their squa
 MOST_RATIO = 9.0  # of the fastest mode to the slowest, whose period makes the slots
 MOST_LIVE = 2
 DEGREES = (3, 6, 9, 12)
-ACCURACY = 1e-5  # relative, of the frequencies over the live ranges
+FREQUENCY_ACCURACY = 1e-5  # relative, of the frequencies over the live ranges
 OVERSTATED = 0.08  # of what stated errors leave: by so much more it may be stated
 MOST_TERMS = 60
 SAME = 1e-9  # relative difference
-NEGLIGIBLE = 1e-7  # coefficient, relative to the largest of its function
+NEGLIGIBLE_COEFFICIENT = 1e-7  # coefficient, relative to the largest of its function
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -81,13 +81,13 @@ def live_modes(spec: Spec) -> LiveModes:
     tried = (_curvatures(invariants, len(live)), [0.0] * len(live))
     least = np.inf
     for degree, curvatures in product(DEGREES if live else (0,), tried):
-        interpolant = interpolate(invariants, curvatures, degree).without(NEGLIGIBLE)
+        interpolant = interpolate(invariants, curvatures, degree).without(NEGLIGIBLE_COEFFICIENT)
         interpolated = [frequencies(interpolant(point)[:modes]) for point in between]
         error = float(np.abs(np.array(interpolated) / exact - 1.0).max())
-        if error > ACCURACY or interpolant.exponents.shape[1] > MOST_TERMS:
+        if error > FREQUENCY_ACCURACY or interpolant.exponents.shape[1] > MOST_TERMS:
             continue
         if spec.planner.live_rate:
-            second, over = interpolate(others, curvatures, degree).without(NEGLIGIBLE), 0.0
+            second, over = interpolate(others, curvatures, degree).without(NEGLIGIBLE_COEFFICIENT), 0.0
         else:
             second = _raised(interpolate(others, _curvatures(others, len(live)), degree), others, between)
             over = _overstated(second, others, between, modes)
@@ -281,7 +281,7 @@ def _sway_matrix(linear: Linearization) -> Array:
     if gain.shape[0] != gain.shape[1]:
         raise ValueError("fewer loads than coordinates")
     whole, pushed = gain @ linear.stiffness @ np.linalg.inv(gain), gain @ linear.input
-    driven = pushed.T[np.abs(pushed).max(axis=0) > STILL]
+    driven = pushed.T[np.abs(pushed).max(axis=0) > NO_ACCELERATION]
     along = [np.flatnonzero(np.abs(column - 1.0) <= SAME) for column in driven]
     if len({len(loads) for loads in along}) > 1:
         raise ValueError("axes that push other numbers of loads")
@@ -313,7 +313,9 @@ def sway_model(spec: Spec, known: Interpolant) -> Interpolant | None:
             return None
     except ValueError:
         return None
-    return interpolate(rows, known.curvatures, int(known.exponents.max(initial=0))).without(NEGLIGIBLE)
+    return interpolate(rows, known.curvatures, int(known.exponents.max(initial=0))).without(
+        NEGLIGIBLE_COEFFICIENT
+    )
 
 
 def _refuse_rates(spec: Spec) -> None:

@@ -5,9 +5,9 @@ from gen_profile.spec.model import Spec
 from gen_profile.support.phrase import Phrase, placed
 from gen_profile.support.units import RATES
 
-STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
+LEAST_RATE = 1e-3  # change of a live parameter on the way, relative to its range's end; less is none
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
-QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
+QUICK_STOP_FACTOR = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
 QUICK_JERK = 4.0
 ROOM = 1.25  # of the stated swing: how far damping may lead
 
@@ -17,7 +17,7 @@ def quick_limits(spec: Spec, axis: int) -> tuple[float, float]:
     own = spec.limits.of(axis)
     assert own.acceleration and own.jerk
     return (
-        spec.planner.quick_stop or QUICK * own.acceleration,
+        spec.planner.quick_stop or QUICK_STOP_FACTOR * own.acceleration,
         spec.planner.quick_stop_jerk or QUICK_JERK * own.jerk,
     )
 

@@ -13,7 +13,7 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 TYPE = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]*")
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 RESERVED = ("type", "file", "file_sha256")  # keys of a spec's [plant] that are no parameters
-STILL = 1e-9  # of the terms' size: what may push the machine at rest
+RESIDUAL_FORCE = 1e-9  # of the terms' size: what may push the machine at rest
 
 
 def faults_of(plant: Plant) -> tuple[str, ...]:
@@ -90,9 +90,9 @@ def _values(plant: Plant) -> Iterator[str]:
     mass, pushing = arrays["M_uu"][0], np.abs(arrays["K_u"][0] + arrays["G_u"][0]).max()
     if np.linalg.matrix_rank(mass) < n_u:
         yield "M_uu is singular at rest: an unactuated coordinate has no inertia"
-    elif pushing > STILL * max(1.0, np.abs(mass).max()):
+    elif pushing > RESIDUAL_FORCE * max(1.0, np.abs(mass).max()):
         yield "it does not rest at q_u = 0: count the unactuated coordinates from the place at rest"
-    elif np.abs(arrays["sway"][0]).max() > STILL:
+    elif np.abs(arrays["sway"][0]).max() > RESIDUAL_FORCE:
         yield "its sway at rest is not zero: count it from the loads' places at rest"
     elif plant.bodies:
         try:

@@ -7,11 +7,11 @@ from os import fstat
 from pathlib import Path
 
 DOCUMENT = 1 << 24  # bytes of what is read as a whole before it is understood: a manifest, a machine's file
-MOST = 1 << 29  # bytes of anything else: a CAN log of an hour at 1 ms
+MOST_BYTES = 1 << 29  # bytes of anything else: a CAN log of an hour at 1 ms
 BLOCK = 1 << 20
 
 
-def read_bounded(path: Path, most: int = MOST) -> bytes:
+def read_bounded(path: Path, most: int = MOST_BYTES) -> bytes:
     """Read a file, or a pipe to its end.
 
     Raises

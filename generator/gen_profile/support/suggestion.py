@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gen_profile.support.phrase import Phrase
 
-MOST = 3  # names to suggest
+MOST_NAMES = 3  # names to suggest
 DASHES = re.compile("[\N{HYPHEN}-\N{EM DASH}\N{MINUS SIGN}\N{FULLWIDTH HYPHEN-MINUS}]")  # for a minus
 MIN_SIMILARITY = 0.65  # difflib's ratio from which on a word is a misspelling of another
 
@@ -37,7 +37,7 @@ def listed(names: Iterable[str]) -> str:
 
 
 def meant(word: str, known: Iterable[str]) -> list[str]:
-    """Find the names, `MOST` at most, that a person may mean: by meaning, by a part, or misspelt."""
+    """Find the names, `MOST_NAMES` at most, that a person may mean: by meaning, by a part, or misspelt."""
     names, word = list(known), str(word).strip().lower()  # from Python, it may be no text
     same = [name for name in names if name.lower() == word]
     by_meaning = [name for name in names if word in _synonyms().get(name, ())]
@@ -49,7 +49,7 @@ def meant(word: str, known: Iterable[str]) -> list[str]:
         or _abbreviates(word.split("-"), name.lower().split("-"))
     ]
     candidates = same or by_meaning or by_part if word else []
-    return candidates[:MOST] or _misspelt(word, names)
+    return candidates[:MOST_NAMES] or _misspelt(word, names)
 
 
 def _abbreviates(word: list[str], name: list[str]) -> bool:

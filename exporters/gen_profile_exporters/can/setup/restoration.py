@@ -17,7 +17,7 @@ from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
 MAPPING = 0x200  # from a PDO's parameters to its mapping
 MOST_MAPPED = 64  # entries of a mapping (CiA 301); greater counts are of another kind of PDO
 HEARTBEAT_WATCHED, SYNC_PERIOD, SYNC_COUNTER = (0x1016, 1), (0x1006, 0), (0x1019, 0)
-PATIENCE = 2 * NANOSECONDS  # for a drive to come to rest
+STANDSTILL_TIMEOUT = 2 * NANOSECONDS  # for a drive to come to rest
 SILENCE = (StreamAborted, SdoError, struct.error)  # no answer, or none that means anything
 
 Place = tuple[int, int]  # index and subindex
@@ -74,7 +74,7 @@ class Restoration:
 
 def _at_rest(link: Link, measured: Mapping[int, Standing]) -> set[int]:
     """Wait until drives are not powered to move and their axes stand; asked by SDO, not believed."""
-    waiting, at_rest, deadline = set(measured), set[int](), link.clock.now() + PATIENCE
+    waiting, at_rest, deadline = set(measured), set[int](), link.clock.now() + STANDSTILL_TIMEOUT
     while waiting and link.clock.now() < deadline:
         for node in sorted(waiting):
             try:
@@ -84,7 +84,7 @@ def _at_rest(link: Link, measured: Mapping[int, Standing]) -> set[int]:
             except SILENCE:
                 waiting.discard(node)
         waiting -= at_rest
-        link.wait_until(link.clock.now() + PATIENCE // 100)
+        link.wait_until(link.clock.now() + STANDSTILL_TIMEOUT // 100)
     return at_rest
 
 

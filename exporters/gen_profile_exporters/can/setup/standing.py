@@ -6,9 +6,9 @@ from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import magnitude_counts
 
-STILL = NANOSECONDS // 10  # for which an axis must stay in its place
+STANDSTILL_TIME = NANOSECONDS // 10  # for which an axis must stay in its place
 TREMBLING = 0.0001  # m (or rad), of an axis that stands
-LEAST = 2  # counts, likewise
+LEAST_COUNTS = 2  # counts, likewise
 
 
 @attrs.define
@@ -34,9 +34,9 @@ class Standing:
 
     def proved(self, after: int = 0) -> bool:
         """Tell whether it has stood for long enough since an instant in ns."""
-        return self._place is not None and self._told - max(self._since, after) >= STILL
+        return self._place is not None and self._told - max(self._since, after) >= STANDSTILL_TIME
 
 
 def trembling(axis: AxisScale) -> int:
     """Tell by how many counts an axis that stands may tremble."""
-    return max(LEAST, magnitude_counts(TREMBLING, axis))
+    return max(LEAST_COUNTS, magnitude_counts(TREMBLING, axis))

@@ -16,8 +16,8 @@ from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.host.link import Link
 
 LISTEN = NANOSECONDS // 2  # before anything is asked; several heartbeats of ours, and of most drives
-APART = NANOSECONDS // 500  # from one question to the next, so that no queue fills
-PATIENCE = NANOSECONDS // 2  # for the last answer
+QUESTION_INTERVAL = NANOSECONDS // 500  # from one question to the next, so that no queue fills
+ANSWER_TIMEOUT = NANOSECONDS // 2  # for the last answer
 NODES = range(1, frames.MASTER + 1)
 READ_DEVICE_TYPE = struct.pack("<BHBxxxx", 0x40, 0x1000, 0)  # SDO upload (CiA 301)
 CONTROLLERS = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER}
@@ -79,9 +79,9 @@ def discover(link: Link) -> tuple[IdentifiedNode, ...]:
     link.subscribe(take)
     for number in NODES:
         link.send(frames.message(frames.SDO_REQUEST + number, READ_DEVICE_TYPE))
-        _wait(link, APART)
+        _wait(link, QUESTION_INTERVAL)
         heard.require_undisturbed()
-    _wait(link, PATIENCE)
+    _wait(link, ANSWER_TIMEOUT)
     heard.require_undisturbed()
     return tuple(_identified(link, number) for number in sorted(answered.intersection(NODES)))
 
@@ -163,4 +163,4 @@ def _wait(link: Link, duration: int) -> None:
     """Take in what comes for so long, in ns."""
     end = link.clock.now() + duration
     while link.clock.now() < end:
-        link.wait_until(min(end, link.clock.now() + APART))
+        link.wait_until(min(end, link.clock.now() + QUESTION_INTERVAL))

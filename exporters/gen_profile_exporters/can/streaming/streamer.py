@@ -22,7 +22,7 @@ from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.scaling import magnitude_counts
 from gen_profile_exporters.can.setup import configuration
 from gen_profile_exporters.can.setup.restoration import Restoration
-from gen_profile_exporters.can.setup.standing import STILL
+from gen_profile_exporters.can.setup.standing import STANDSTILL_TIME
 from gen_profile_exporters.can.streaming.approach import approach
 from gen_profile_exporters.can.streaming.following import Following
 from gen_profile_exporters.can.streaming.pacer import Pacer
@@ -259,7 +259,7 @@ class Streamer:
         """Time in ns in which every axis comes to rest on its ramp from its greatest velocity."""
         demand = self._source.demand
         ramps = [v / braking for v, braking in zip(demand.velocity, demand.quick_stop, strict=True)]
-        return STOP_MARGIN + STILL + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
+        return STOP_MARGIN + STANDSTILL_TIME + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
 
     def _command(self, word: int, state: State, setpoints: Cycle, *, bits: int = 0) -> None:
         """Send a controlword every cycle until all drives are in a state."""

@@ -51,7 +51,7 @@ MORE_NODES, FEW_MORE_NODES, FEW_TERMS = 4, 2, 5
 ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
 PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
 HOPELESS = 0.02  # error of a motion as a share of its size, without its growth: no proof is tried
-STILL = 1e-6  # of each coordinate, m or rad and their rates: the size of a motion that is smaller, or none
+SMALLEST_STATE = 1e-6  # m or rad and their rates: the size of a motion that is smaller, or none
 FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
 
 
@@ -140,7 +140,7 @@ class Enclosure:
         scaling = self.approximation.scaling
         source = norm(matmul_most(scaling.most, defect))
         size = norm(matmul_most(scaling.most, self._around.most))
-        least = norm(matmul_most(scaling.most, np.full((1, 1, self._around.shape[-1]), STILL)))
+        least = norm(matmul_most(scaling.most, np.full((1, 1, self._around.shape[-1]), SMALLEST_STATE)))
         most = np.maximum(size, least).max(axis=1, keepdims=True)
         off, still = (
             np.full((*size.shape, n), np.nan) for n in (self.equations.sway.rows, self._around.shape[-1])

@@ -31,7 +31,7 @@ from gen_profile.assurance.proof.orders import (
     TimedOrder,
 )
 from gen_profile.motion.profile import Array
-from gen_profile.planner.events import KEPT
+from gen_profile.planner.events import KEPT_EVENTS
 
 BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
@@ -170,7 +170,7 @@ def events(run: Followed) -> Iterator[Allowance]:
         count = int(issued["nEvents"][cycle])
         for k in range(int(issued["nEvents"][cycle - 1]) if cycle else 0, count):
             time, code, value = (
-                float(issued[f"aEvent{of}[{k % KEPT}]"][cycle]) for of in ("Time", "Code", "Value")
+                float(issued[f"aEvent{of}[{k % KEPT_EVENTS}]"][cycle]) for of in ("Time", "Code", "Value")
             )
             yield Allowance("event", cycle, abs(time - (cycle + 1) * run.cycle), 1e-6 * run.cycle * cycle)
             if code in PLANNED:

@@ -14,7 +14,7 @@ import numpy as np
 from gen_profile.assurance.proof.habits import HELD, Change, Manner, Surroundings, between
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
-from gen_profile.planner.stated import STEADY
+from gen_profile.planner.stated import LEAST_RATE
 
 BEGUN = 0.6  # s, and as many of the periods below, after which a command has led to a motion
 PART = 0.3  # periods
@@ -80,7 +80,7 @@ def _exchanged(how: float, around: Surroundings) -> Iterator[Change]:
 
 def _noise(how: float, around: Surroundings) -> Iterator[Change]:
     """Let live parameters be off by less than counts as a change."""
-    noise = {f"f{name}": 0.3 * STEADY * high for name, (_, high) in around.live.items()}
+    noise = {f"f{name}": 0.3 * LEAST_RATE * high for name, (_, high) in around.live.items()}
     yield attrs.evolve(_given(), lasts=MANY * around.cycle, noise=noise)
 
 

@@ -41,7 +41,7 @@ from gen_profile.assurance.proof.promptness import obeyed
 from gen_profile.assurance.proof.statements import ADDED_UP, LEFT, OVERSTATED
 from gen_profile.motion.profile import Array
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.stated import STEADY, quick_limits, target_range
+from gen_profile.planner.stated import LEAST_RATE, quick_limits, target_range
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 
@@ -284,7 +284,7 @@ class BlockWatch:
             if name in self.spec.planner.live_rate:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")][now]
-            apart = (np.abs(value - value[0]) > share * STEADY * high) & (value >= low) & (value <= high)
+            apart = (np.abs(value - value[0]) > share * LEAST_RATE * high) & (value >= low) & (value <= high)
             for begin, end in runs_of(apart):
                 drifts[begin + cycles : end] |= end - begin > cycles
         return drifts
@@ -306,7 +306,7 @@ class BlockWatch:
             rows = (np.flatnonzero(value[1:] != value[:-1]) + 1).tolist()  # which may be infinite
             ends = [*first[rows[1:]].tolist(), cycles]
             for row, begin, end in zip(rows, first[rows].tolist(), ends, strict=False):
-                good = low <= value[row] <= high and abs(value[row] - value[0]) > CLEARLY * STEADY * high
+                good = low <= value[row] <= high and abs(value[row] - value[0]) > CLEARLY * LEAST_RATE * high
                 if good and value[row - 1] == value[0] and begin + sure < min(end, cycles):
                     yield begin, begin + sure
 

@@ -30,7 +30,7 @@ from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 LONGEST_STEP = 1e-3  # s, of the FMU's integrator; a quarter changes residuals of four machines by 3e-12 m
 STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
-ROUNDING = 1e-12  # of times, relative
+TIME_TOLERANCE = 1e-12  # of times, relative
 ERROR_FLOOR = 1e-8  # m; covers what both integrations leave
 
 
@@ -154,7 +154,7 @@ def beyond_equations(
 
 def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
     """Time in s from which sway counts."""
-    return 0.0 if _whole_way(spec) else (1.0 - ROUNDING) * arrival(spec, setpoints)
+    return 0.0 if _whole_way(spec) else (1.0 - TIME_TOLERANCE) * arrival(spec, setpoints)
 
 
 def _whole_way(spec: Spec) -> bool:
@@ -165,7 +165,7 @@ def _whole_way(spec: Spec) -> bool:
 def _greatest_distance(responses: Sequence[Sway], expected: Sequence[Sway], since: float) -> float:
     """Greatest difference of sways in m from a time on, at the expected times, which the others have, too."""
     times = expected[0].times
-    compared = times >= since * (1.0 - ROUNDING)
+    compared = times >= since * (1.0 - TIME_TOLERANCE)
     own = responses[0].times
     rows = np.searchsorted(0.5 * (own[:-1] + own[1:]), times[compared])
     apart = (one.sway[rows] - other.sway[compared] for one, other in zip(responses, expected, strict=True))
@@ -201,7 +201,7 @@ def longest_step(spec: Spec, machine: Scenario) -> float:
 
 def _from(response: Response, since: float) -> Response:
     """Cut what comes before."""
-    kept = slice(int(np.searchsorted(response.times, since * (1.0 - ROUNDING))), None)
+    kept = slice(int(np.searchsorted(response.times, since * (1.0 - TIME_TOLERANCE))), None)
     columns = attrs.asdict(response, recurse=False)
     return Response(**{name: values[kept] for name, values in columns.items()})
 

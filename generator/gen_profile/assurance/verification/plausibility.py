@@ -10,8 +10,8 @@ from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
 
 TARGET_TOLERANCE = 1e-6  # of the axis' move, beside the artefact's own resolution
-STANDING = 1e-7  # of the longest move, within which an axis stands, beside half the artefact's resolution
-ROUNDING = 1e-9  # of the duration
+STANDING_TOLERANCE = 1e-7  # of the longest move, beside half the artefact's resolution
+DURATION_TOLERANCE = 1e-9  # of the duration
 VELOCITY_TOLERANCE = 0.01  # of the greatest velocity, between a velocity column and the positions beside it
 # Beyond the command's limits: where an acceleration leaps from -a to a, a cam's cubic spline reaches 1.37 a.
 OVERSHOOT = {"velocity": 0.02, "acceleration": 0.4}
@@ -83,11 +83,11 @@ def _missed_time(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
         return
     times, asked = setpoints.times, spec.move.duration
     onward = setpoints.position[-1] + np.outer(times - times[-1], spec.move.final_velocity)
-    standstill = STANDING * _sizes(spec).max() + 0.5 * setpoints.resolution
+    standstill = STANDING_TOLERANCE * _sizes(spec).max() + 0.5 * setpoints.resolution
     moving = np.flatnonzero((np.abs(setpoints.position - onward) > standstill).any(axis=1))
     last = int(moving[-1]) if len(moving) else 0
-    late = times[last] >= asked * (1.0 - ROUNDING)
-    early = times[-1] + setpoints.cycle_time <= asked * (1.0 + ROUNDING)
+    late = times[last] >= asked * (1.0 - DURATION_TOLERANCE)
+    early = times[-1] + setpoints.cycle_time <= asked * (1.0 + DURATION_TOLERANCE)
     if late or early:
         arrival = times[last + 1] if late else times[-1]
         yield f"The motion arrives at {arrival:.6g} s, and the spec asks for {asked:.6g} s (move.duration)."
@@ -157,7 +157,7 @@ def _off_their_places(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     if len(setpoints.position) < FEWEST_SETPOINTS:
         return
     curvatures = np.abs(_differences(spec, setpoints, 2))
-    noise = 4.0 * setpoints.resolution + STANDING * _sizes(spec).max()
+    noise = 4.0 * setpoints.resolution + STANDING_TOLERANCE * _sizes(spec).max()
     for axis, bend, unsure in zip(spec.machine().actuated, curvatures.T, noise, strict=True):
         worst = int(bend.argmax())
         usual = max(

@@ -22,7 +22,7 @@ from gen_profile_fmu.running.many_runs import ManyRuns
 
 # rad of the fastest mode between setpoints, and per step, in the search alone; 0.6 leads to the same machines
 COARSE = 0.3
-KEPT = 3  # of the worst machines for each limit; of 1 and 6 the worst is the same on four machines
+KEPT_PER_LIMIT = 3  # of the worst machines for each limit; of 1 and 6 the worst is the same on four machines
 SAME = 1e-3  # of its range, by which two machines must differ in some parameter to be two
 
 
@@ -151,7 +151,7 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
             figures.append(-peaks[:, -1])
         return np.column_stack(figures)
 
-    return worst_places(shares, begun, KEPT)
+    return worst_places(shares, begun, KEPT_PER_LIMIT)
 
 
 def _coarse(way: _Way, setpoints: SampledProfile, step: float) -> Feed:

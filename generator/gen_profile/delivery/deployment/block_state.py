@@ -13,7 +13,7 @@ IDLE, WAITING, MOVING, DONE, ABORTED, FAILED = range(6)  # phases of a playback 
 DISABLED, STANDING, GUIDED, BRAKING = range(4)  # and of a planner block: nState
 NO_COMMAND, TO_POSITION, AT_VELOCITY = range(3)  # nCommand
 WHOLE = 10  # values that are whole numbers, ahead of the others
-MOST = 2.0**52  # of whatever is counted
+GREATEST_COUNT = 2.0**52  # of whatever is counted
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -172,7 +172,7 @@ def read_state(values: Array, axes: int, kind: type[State]) -> State | None:
     if values[0] != values[-1] or values[0] == 0.0:
         return None
     whole = values[:WHOLE]
-    in_range = (whole >= 0.0).all() and (whole <= MOST).all() and whole[1] < len(kind.PHASES)
+    in_range = (whole >= 0.0).all() and (whole <= GREATEST_COUNT).all() and whole[1] < len(kind.PHASES)
     if not np.isfinite(values).all() or (whole != np.floor(whole)).any() or not in_range:
         raise DeploymentError(
             "aState holds no state of a block; let the controller show it as an array of LREAL, "

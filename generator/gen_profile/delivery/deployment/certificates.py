@@ -17,7 +17,7 @@ from gen_profile.support.artefacts.reading import read_artefact
 from gen_profile.support.errors import DeploymentError, OutputError
 
 YEARS = 5  # that a certificate is good for
-MOST = 1 << 16  # bytes of such a file
+MOST_BYTES = 1 << 16  # bytes of such a file
 _PARTS = re.compile(rb"-----BEGIN ([A-Z ]+)-----.*?-----END \1-----\n?", re.DOTALL)
 
 
@@ -66,7 +66,7 @@ def own_certificate(path: Path) -> ApplicationCertificate:
     """
     if not path.exists():
         _write_private(path, _made())
-    parts = {found[1]: found[0] for found in _PARTS.finditer(read_artefact(path, MOST))}
+    parts = {found[1]: found[0] for found in _PARTS.finditer(read_artefact(path, MOST_BYTES))}
     try:
         certificate = x509.load_pem_x509_certificate(parts[b"CERTIFICATE"])
         (key,) = (part for name, part in parts.items() if name.endswith(b"PRIVATE KEY"))

@@ -28,7 +28,7 @@ SHOWN = "let the controller show aRequest and aReply as arrays of LREAL"
 KEPT = "look whether it was started anew, or another client writes to it"
 UNSECURED = {"security": "none", "policy": "None", "certificate_sha256": "", "user": ""}
 REOPENED, SENT, LOOKS = 3, 4, 200  # times that a connection, a request, and a reply to it are tried
-PAUSE = 0.005  # s between two looks for a reply
+POLL_INTERVAL = 0.005  # s between two looks for a reply
 
 
 class LinkLostError(Exception):
@@ -137,7 +137,7 @@ class Mailbox:
             status = self.status()
             if status.trial != TRIED and status.checked != UNCHECKED:
                 return status
-            self._pause(PAUSE)
+            self._pause(POLL_INTERVAL)
         raise DeploymentError("The block does not work out its table's checksum; look after its task.")
 
     def read(self, buffer: int, length: int) -> Array:
@@ -209,7 +209,7 @@ class Mailbox:
                     lost += 1
                     if lost > REOPENED:
                         raise
-                    self._pause(PAUSE)
+                    self._pause(POLL_INTERVAL)
                     self._link.reopen()
         raise DeploymentError(
             "The block does not answer, as if it were not called in any task, or another client wrote to it "
@@ -227,7 +227,7 @@ class Mailbox:
                 )
             if reply[0] == reply[-1] == request[0]:
                 return reply
-            self._pause(PAUSE)
+            self._pause(POLL_INTERVAL)
         return None
 
     def _understood(self, reply: Array, count: int) -> tuple[BlockStatus, Array]:

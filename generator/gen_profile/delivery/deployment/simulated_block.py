@@ -13,7 +13,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.execution import BlockInstance
 
 LOOPBACK = "127.0.0.1"  # of the servers that it runs behind
-LONGEST = 0.02  # s between two looks at what their clients wrote
+POLL_INTERVAL = 0.02  # s between two looks at what their clients wrote
 FOLLOWED = ("fActPosition", "fActVelocity")  # inputs that tell where an axis is
 GUIDING = ("bBusy", "bDone", "bAborted", "bEnabled")  # while one of them is set, the axes follow
 
@@ -106,7 +106,7 @@ class SimulatedController(ABC):
         with self._served() as address:
             ready(address)
             begun, called = time.monotonic(), 0
-            while not self.ended.wait(min(self.cycle_time, LONGEST)):
+            while not self.ended.wait(min(self.cycle_time, POLL_INTERVAL)):
                 due = int((time.monotonic() - begun) / self.cycle_time)
                 if due > called:
                     self.turn(due - called)

@@ -29,7 +29,7 @@ from gen_profile_fmu.model.nominals import smooth_move, state_nominals
 from gen_profile_fmu.model.planner import planned_system_model, planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
-PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
+START_PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
 LEADERS = {"ssp": "profile", "planned-ssp": "planner"}  # of systems of two FMUs: what the plant follows
 
 
@@ -165,7 +165,7 @@ def _rough_nominals(spec: Spec) -> dict[str, float]:
     try:
         if move.shortest:
             slowest = linearize(spec.machine(), spec.plant.parameters, move.target).frequencies[0]
-            duration = PERIODS * 2.0 * np.pi / slowest
+            duration = START_PERIODS * 2.0 * np.pi / slowest
         return _nominals(spec, smooth_move(move.start, move.target, duration))
     except (CosimulationError, InfeasibleProblem):
         return {}

@@ -21,7 +21,7 @@ from gen_profile.delivery.streaming.priority import lower_priority
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.can.streaming.record import Book, Phase
 
-PAUSE = 0.1  # s between two looks
+LOOK_INTERVAL = 0.1  # s between two looks
 LAST_LOOK = 1.0  # s, for the viewer to show the end
 OVER = (Phase.DONE, Phase.ABORTED)
 
@@ -125,7 +125,7 @@ def _look(memory: Any, view: View, show: Show) -> None:
     parent = multiprocessing.parent_process()
 
     def over() -> bool:
-        time.sleep(PAUSE)
+        time.sleep(LOOK_INTERVAL)
         return book.state in OVER or parent is None or not parent.is_alive()
 
     with suppress(OSError):  # a terminal that is gone

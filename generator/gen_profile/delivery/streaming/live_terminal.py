@@ -8,11 +8,11 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from gen_profile.delivery.streaming.live import PAUSE, Glance, View
+from gen_profile.delivery.streaming.live import LOOK_INTERVAL, Glance, View
 from gen_profile.motion.profile import Array
 
 HEIGHT = 8  # lines of a picture
-MARGIN = 12  # columns beside it, for the scale
+SCALE = 12  # columns beside it, for the scale
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # of a Braille character, by row
 BLANK = 0x2800
 PLANNED, ACTUAL = "bright_black", "bold green"
@@ -21,7 +21,7 @@ PLANNED, ACTUAL = "bright_black", "bold green"
 def show(view: View, look: Callable[[], Glance], over: Callable[[], bool]) -> None:
     """Draw planned and actual positions on stderr until the stream is over."""
     console = Console(stderr=True)
-    with Live(console=console, auto_refresh=False, refresh_per_second=1 / PAUSE) as live:
+    with Live(console=console, auto_refresh=False, refresh_per_second=1 / LOOK_INTERVAL) as live:
         while True:
             live.update(picture(view, look(), console.width), refresh=True)
             if over():
@@ -43,7 +43,7 @@ def picture(view: View, glance: Glance, width: int) -> Group:
         answered = actual[~np.isnan(actual)]
         place = f"{answered[-1]:.4g} {unit}, " if answered.size else ""
         parts.append(Text(f"{axis}: {place}at most {1e3 * glance.apart[column]:.3g} m{unit} off the motion"))
-        parts += curves(planned, actual, max(10, width - MARGIN), HEIGHT)
+        parts += curves(planned, actual, max(10, width - SCALE), HEIGHT)
     return Group(*parts)
 
 
@@ -63,9 +63,9 @@ def curves(planned: Array, actual: Array, width: int, height: int) -> list[Text]
     lines = []
     for row in range(height):
         label = {0: high, height - 1: low}.get(row)
-        line = Text("" if label is None else f"{label:.4g}".rjust(MARGIN - 2), style="default")
-        line.pad_left(MARGIN - 1 - len(line))
-        line.pad_right(MARGIN - len(line))
+        line = Text("" if label is None else f"{label:.4g}".rjust(SCALE - 2), style="default")
+        line.pad_left(SCALE - 1 - len(line))
+        line.pad_right(SCALE - len(line))
         for below, above in zip(under[row], over[row], strict=True):
             line.append(chr(BLANK + int(below | above)), style=ACTUAL if above else PLANNED)
         lines.append(line)

@@ -12,7 +12,7 @@ import numpy as np
 from gen_profile.delivery.streaming.keyboard import Keyboard
 from gen_profile.delivery.streaming.status import StatusLine
 from gen_profile.motion.profile import SampledProfile
-from gen_profile.planner.commands import STILL, Command, inputs_of, start_cycles_of
+from gen_profile.planner.commands import STANDSTILL_TIME, Command, inputs_of, start_cycles_of
 from gen_profile.planner.directions import planned_axes, sensed_directions
 from gen_profile.planner.events import error_words
 from gen_profile.planner.execution import BlockInstance
@@ -31,9 +31,9 @@ from gen_profile_exporters.can.streaming.plan import Step, cycle_of
 from gen_profile_exporters.exporter import Target, target_of
 from gen_profile_exporters.setpoints import INT32, TOO_FAR, require_within
 
-LONGEST = 900_000  # cycles after which the axis is stopped without sway: an hour at 4 ms
-MARGIN = 100_000  # cycles for that stop
-ROUNDING = 1e-9  # relative, of a period counted in the block's cycles
+MOST_CYCLES = 900_000  # cycles after which the axis is stopped without sway: an hour at 4 ms
+STOP_CYCLES = 100_000  # cycles for that stop
+PERIOD_TOLERANCE = 1e-9  # relative, of a period counted in the block's cycles
 
 
 class CommandList:
@@ -112,14 +112,14 @@ class PlannedMotion:
         frames.require_load(self.target)
         self.demand = _demand(spec, self.target, tuple(numbers))
         self.planned: int | None = None
-        self.most = LONGEST + MARGIN
+        self.most = MOST_CYCLES + STOP_CYCLES
         self._block, self._axes, self._operator = block, block.axes, operator
         self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live, spec.planner.live)
         self._calls = _calls(spec, self._values["fCycleTime"])
         self._sensor, self._heard = spec.can.sensor, -math.inf  # which of the block's cycles had news of it
         self._shown, self._fresh = _sensor_inputs(spec, block.axes, self._values["fCycleTime"])
         self._status = StatusLine(self._axes, self._values["fCycleTime"]) if watched else None
-        self._still_enough = round(STILL / spec.can.sync_period)
+        self._still_enough = round(STANDSTILL_TIME / spec.can.sync_period)
         self._frames = frames.setpoint_frames(self.target)
         self._outputs = {name: place for place, name in enumerate(block.outputs)}
         self._rows: list[Any] = []  # outputs at the start, one cycle ago, and now
@@ -207,8 +207,8 @@ class PlannedMotion:
 
     def _advance(self) -> None:
         """Call the block for one period of SYNC; its latest call is that of the next cycle."""
-        if self._cycle + 1 == LONGEST:
-            self._give_up(f"A stream lasts {LONGEST} cycles at most.")
+        if self._cycle + 1 == MOST_CYCLES:
+            self._give_up(f"A stream lasts {MOST_CYCLES} cycles at most.")
         calls = self._calls if self._rows else 1
         rows = self._block.call(np.array([self._inputs() for _ in range(calls)]))
         issued, shown = rows[-1], rows[:, self._outputs["nErrorId"]]
@@ -346,7 +346,7 @@ def _calls(spec: Spec, cycle: float) -> int:
     """Count the block's cycles in one of SYNC."""
     period = spec.can.sync_period
     calls = round(period / cycle)
-    if calls < 1 or abs(calls * cycle - period) > ROUNDING * period:
+    if calls < 1 or abs(calls * cycle - period) > PERIOD_TOLERANCE * period:
         raise SpecError(
             f"can.sync_period: {period:g} s are no whole number of the block's cycles of {cycle:g} s; "
             "adapt export.cycle_time, and write the block again."

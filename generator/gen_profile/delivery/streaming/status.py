@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from gen_profile.planner.interface import BlockAxis
 
-PAUSE = 0.25  # s between two reports
+REPORT_INTERVAL = 0.25  # s between two reports
 PROMISES = {0: "no sway", 3: "not ready", 4: "not ready"}  # by nPromise; "may sway" otherwise
 
 
@@ -19,7 +19,7 @@ class StatusLine:
     """
 
     def __init__(self, axes: Sequence[BlockAxis], cycle: float) -> None:
-        self._axes, self._pause = axes, round(PAUSE / cycle)
+        self._axes, self._pause = axes, round(REPORT_INTERVAL / cycle)
         self._reported, self._told = 0, ""
 
     def words(self, cycle: int, issued: Mapping[str, float], commanded: str) -> str:

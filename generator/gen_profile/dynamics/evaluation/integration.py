@@ -25,8 +25,8 @@ WIDEST, MOST = 64, 2048  # steps that are solved at once, and coordinates of all
 MOST_ITERATIONS = 12  # after which the first step is halved, if not even that one is settled
 SHORTEST = 1e-9  # of the whole time: a step that must be shorter fails
 TAIL = 2  # highest coefficients of a step's polynomial, which tell how well it converges
-BEYOND = 0.1  # of them, that the coefficients which the polynomial lacks come to at most
-SETTLED = 0.03  # of the allowed error, that one more iteration would change at the pace of the last two
+TRUNCATION = 0.1  # of them, that the coefficients which the polynomial lacks come to at most
+CONVERGED = 0.03  # of the allowed error, that one more iteration would change at the pace of the last two
 
 Accelerations = Callable[[Array], Callable[[Array, Array], Array]]
 Linear = Callable[[float], tuple[Array, Array]]
@@ -226,13 +226,13 @@ class _Window:
             a += change
             allowed = self._least + self._accuracy * np.abs(at[0]).max(axis=(0, 2))
             moved = length**2 * np.abs(change).max(axis=(0, 2))
-            done = _leading(moved**2 <= SETTLED * allowed * np.maximum(before, moved))
+            done = _leading(moved**2 <= CONVERGED * allowed * np.maximum(before, moved))
             before = moved
             if done == len(steps):
                 break
         q, v = _states(a, h, start)
         position, velocity = h**2 * _along(_TWICE, a), h * _along(_ONCE, a)
-        fine = BEYOND * np.abs(position[-TAIL:]).max(axis=(0, 2)) <= allowed
+        fine = TRUNCATION * np.abs(position[-TAIL:]).max(axis=(0, 2)) <= allowed
         position[0] += q + 0.5 * h * v
         position[1] += 0.5 * h * v
         velocity[0] += v

@@ -26,7 +26,7 @@ FREE_ACCURACY = 1e-8  # of swings from given states, which are compared with mea
 TRANSIENT_SAMPLES = 4001
 SHORTEST_STRETCH = 1e-9  # of a motion's duration: closer times are one
 GROWTH = 1e-6  # of the fastest rate, beyond which a machine does not return to rest
-LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
+GREATEST_RATE_TIME = 1e6  # of a machine, rate times time: some hundred thousand steps, and minutes
 RATE, POINT = 2e-5, 2e-7  # s of work to evaluate the equations in a step, and more for each point
 AT_REST: Mapping[str, float] = MappingProxyType({})
 
@@ -310,7 +310,7 @@ def _accelerations(plant: Plant, p: Array, motion: Callable[[Array], Array]) -> 
 
 
 def _require_pace(plant: Plant, fastest: float, until: float) -> None:
-    if fastest * until > LONGEST:
+    if fastest * until > GREATEST_RATE_TIME:
         raise InfeasibleProblem(
             f"plant: a motion of the {plant.type} changes within {1.0 / fastest:.1g} s, too fast to be "
             f"followed for {until:.3g} s; look at its stiffness, damping and masses."

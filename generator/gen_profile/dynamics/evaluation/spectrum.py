@@ -10,7 +10,7 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
 
-BEYOND = 1.6  # of the fastest mode's frequency, where a picture of a spectrum ends
+FREQUENCY_RANGE = 1.6  # of the fastest mode's frequency, where a picture of a spectrum ends
 DECADES = 4.0  # of a spectrum that are shown
 
 
@@ -35,7 +35,7 @@ class Natural:
 
     def span(self, points: int) -> Array:
         """List frequencies at which to draw a spectrum, shape (points,)."""
-        return np.linspace(0.0, BEYOND * self.highest.max(), points)
+        return np.linspace(0.0, FREQUENCY_RANGE * self.highest.max(), points)
 
 
 def natural_frequencies(spec: Spec, machines: Sequence[Scenario]) -> Natural:

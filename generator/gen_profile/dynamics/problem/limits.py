@@ -13,7 +13,7 @@ from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
 
 SWAY_TOLERANCE = 1.01  # times limits.sway that machines off nominal may sway: searches find the worst so well
-ROUNDING = 1e-6  # share of a limit, or of travel's width, that counts for nothing: programs are no more exact
+LIMIT_TOLERANCE = 1e-6  # share of a limit, or of travel's width: programs are no more exact
 
 
 @attrs.frozen(kw_only=True)
@@ -72,11 +72,11 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
         for order, name in enumerate(RATES, start=1):
             allowed = getattr(allowed_here, name)
             if allowed is not None:
-                demand = (1.0 - ROUNDING) * greatest(command, order, column)
+                demand = (1.0 - LIMIT_TOLERANCE) * greatest(command, order, column)
                 yield Breach(place=limits.place(column, name), found=demand, allowed=allowed)
         if allowed_here.travel is not None:
             (low, high), travel = allowed_here.travel, limits.place(column, "travel")
-            rounding = ROUNDING * (high - low)
+            rounding = LIMIT_TOLERANCE * (high - low)
             bottom, top = extremes(command, 0, column)
             yield Breach(place=travel, found=top - rounding, allowed=high)
             yield Breach(place=travel, found=-bottom - rounding, allowed=-low)

@@ -33,7 +33,7 @@ from gen_profile.support.phrase import Phrase
 SAMPLES = 800
 FREQUENCIES = 500
 TWINS = 7  # machines beside the nominal one whose sway is drawn
-STILL = 1e-3  # m (or rad) and its derivatives, either way: what changes less is not drawn larger
+LEAST_SPAN = 1e-3  # m (or rad) and its derivatives, either way: what changes less is not drawn larger
 NEAR = 2.5  # times what is shown, up to which a limit is drawn; beyond, it would flatten the curves
 ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
@@ -84,7 +84,7 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
             own, factor = (axis.unit, 1.0) if order else place_unit(spec, column)
             levels = [Level(factor * one.value) for one in near_limits(spec, column, order, extent(lines))]
             lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
-            span = None if levels else _span(lines, factor * STILL)
+            span = None if levels else _span(lines, factor * LEAST_SPAN)
             title = Phrase("{quantity} of {name}", quantity=quantity, name=axis.name)
             label = Phrase("{quantity} ({unit})", quantity=quantity.lower(), unit=unit.format(own))
             panels.append(Panel(title, label, lines, levels=levels, span=span))

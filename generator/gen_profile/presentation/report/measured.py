@@ -23,7 +23,7 @@ MOST_FITTED = 4000  # samples
 LEAST_WAY = 0.1  # of an axis' way, that it goes in a log at least
 UNLIKE = 0.25  # of it, RMS: by which a log is off the plan that is none of this move
 ANYTHING = 0.1  # rad, of what no angle tells
-PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
+LEAST_PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -292,7 +292,7 @@ def _sway(spec: Spec, load: str, signal: Signal, *, arrival: float, from_angles:
     frequencies = linearize(spec.machine(), spec.plant.parameters, spec.move.target).distinct_frequencies
     after = signal.times >= arrival
     residual = None
-    if after.any() and signal.times[-1] - arrival >= PERIODS * 2.0 * np.pi / frequencies[0]:
+    if after.any() and signal.times[-1] - arrival >= LEAST_PERIODS * 2.0 * np.pi / frequencies[0]:
         left = signal.measured[after]
         residual = float(np.abs(left - _zero(signal.times[after], left, frequencies)).max())
     # no swing has such differences; 70 is the sum of their weights' squares

@@ -13,7 +13,7 @@ from gen_profile.delivery.designs.design import Design
 from gen_profile.dynamics.evaluation.demands import axis_demands, demands
 from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.dynamics.evaluation.phrases import bound, machine, mm, number, place_unit
-from gen_profile.dynamics.problem.limits import ROUNDING
+from gen_profile.dynamics.problem.limits import LIMIT_TOLERANCE
 from gen_profile.methods.solvers.solution import Solution
 from gen_profile.motion.metrics import excursion, extremes
 from gen_profile.presentation.charts.comparison import compared_styles, comparison_figure
@@ -153,7 +153,7 @@ def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]
             if one.allowed is None:
                 yield TableRow(cells=(name, f"{number(one.asked)} {one.unit}", "no limit stated", "", ""))
             else:
-                yield _limit(name, one.asked, one.allowed, one.unit, rounding=ROUNDING)
+                yield _limit(name, one.asked, one.allowed, one.unit, rounding=LIMIT_TOLERANCE)
         unit, factor = place_unit(spec, column)
         least, most = (factor * end for end in extremes(evaluation.command, 0, column))
         taken, travel = f"{number(least)} to {number(most)} {unit}", spec.limits.of(column).travel

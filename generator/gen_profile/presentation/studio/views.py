@@ -13,7 +13,7 @@ import numpy as np
 from gen_profile.dynamics.evaluation.demands import axis_demands
 from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.dynamics.evaluation.phrases import machine, move, place_unit
-from gen_profile.dynamics.problem.limits import ROUNDING
+from gen_profile.dynamics.problem.limits import LIMIT_TOLERANCE
 from gen_profile.methods.solvers.draft import Plan
 from gen_profile.methods.solvers.method_selection import ANSWER
 from gen_profile.methods.solvers.plan import draft, judged
@@ -112,7 +112,7 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
             low, high = limits.travel
             beyond = max(low - least, most - high)
             allowed = factor * (high - low)
-            way = high - low + beyond if beyond > ROUNDING * (high - low) else way
+            way = high - low + beyond if beyond > LIMIT_TOLERANCE * (high - low) else way
         taken.append(("travel", unit, factor * way, allowed))
         for quantity, unit, takes, allowed in taken:
             yield {

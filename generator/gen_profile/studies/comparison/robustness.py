@@ -25,7 +25,7 @@ from gen_profile.support.summary import Drawable, Tabled
 
 POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
 USUAL_RANGE = 0.3  # relative, of a parameter that the spec takes for certain
-BEYOND = 1.5  # of a parameter's own range, which the curve covers
+RANGE_FACTOR = 1.5  # of a parameter's own range, which the curve covers
 WIDEST = 0.9
 FEWEST = 3  # points of a curve
 # rad of the fastest mode between setpoints: linear interpolation errs by some 10⁻⁴ of the sway
@@ -222,7 +222,7 @@ def error_grid(
             raise SpecError(f"parameter {name[:60]}: unknown parameter{suggestion(name, list(nominal))}")
         if nominal[name] == 0.0:
             raise SpecError(f"parameter {name}: its value is 0, so a relative error means nothing.")
-        widest = min(BEYOND * ranges[name] if name in ranges else USUAL_RANGE, WIDEST)
+        widest = min(RANGE_FACTOR * ranges[name] if name in ranges else USUAL_RANGE, WIDEST)
         half = int(points or POINTS[len(names)]) // 2
         errors = np.array([(half_range or widest) * k / half for k in range(-half, half + 1)])
         low, high = bounds[name]

@@ -22,7 +22,7 @@ from gen_profile.support.progress import Progress, no_progress
 
 CONFIDENCE = 0.99
 INITIAL_RESIDUAL_RATIO = 2.0  # times farther off at first, from which on the axes may still have moved then
-APART = 2.0  # times as far off a machine as off its own a log may be beside others
+MISFIT_RATIO = 2.0  # times as far off a machine as off its own a log may be beside others
 GRAVITY = "g"  # is known wherever a crane stands
 
 
@@ -162,7 +162,7 @@ def _require_one_machine(fit: Fit, lefts: Sequence[Array]) -> None:
             least = alone.left(alone.solve()[0])[0]
         except InfeasibleProblem:  # one log may tell too little
             continue
-        if np.std(left) > APART * np.std(least):
+        if np.std(left) > MISFIT_RATIO * np.std(least):
             raise InfeasibleProblem(
                 f"The logs are not of one machine: number {number}, of {model.log.load}, is "
                 f"{np.std(left) / np.std(least):.2g} times as far off it as off one of its own. Identify "

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from gen_profile.motion.profile import Array
 from gen_profile.studies.identification.measurements import DirectReading, Period
-from gen_profile.studies.identification.swing_model import STEP, SwingingMachine, SwingModel
+from gen_profile.studies.identification.swing_model import SLOPE_STEP, SwingingMachine, SwingModel
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem
 from gen_profile.support.phrase import AND, joined
 
@@ -156,15 +156,15 @@ class Fit:
         measured = np.array([one.seconds if isinstance(one, Period) else one.value for one in self.readings])
         slopes = np.zeros((len(measured), len(unknowns)))
         predicted = self.predicted(unknowns)
-        for column, step in enumerate(STEP * np.eye(p, len(unknowns))):
-            slopes[:, column] = (self.predicted(unknowns + step) - predicted) / STEP
+        for column, step in enumerate(SLOPE_STEP * np.eye(p, len(unknowns))):
+            slopes[:, column] = (self.predicted(unknowns + step) - predicted) / SLOPE_STEP
         blocks, rows = [(predicted - measured) / spread], [slopes / spread[:, None]]
         first = p
         for model, sigma in zip(self.models, noise, strict=True):
             left, by = model.residuals(
                 self.parameters(unknowns),
                 self.names,
-                STEP * self.scale,
+                SLOPE_STEP * self.scale,
                 unknowns[first : first + model.unknowns],
                 until,
             )

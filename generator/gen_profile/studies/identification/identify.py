@@ -40,7 +40,7 @@ from gen_profile.support.suggestion import finite_number, suggestion
 from gen_profile.support.summary import Drawable
 
 RELATIVE = 3.0  # of a value: what is known no better is stated in its own unit
-NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
+MOST_NOISE = 0.2  # of the swing: noise beyond it is none of a sensor
 
 
 @attrs.frozen(kw_only=True, eq=False, repr=False)
@@ -266,7 +266,7 @@ def _log_warnings(row: Mapping[str, Any]) -> Iterator[str]:
             "{left[widened]:.2g} times wider"
         )
         yield Phrase(template, left=left, unit=unit, name=name)
-    if row["noise"] > NOISY * row["swing"]:
+    if row["noise"] > MOST_NOISE * row["swing"]:
         fraction = row["noise"] / row["swing"]
         template = "the noise in {name} is {share:.0%} of the swing; are unit and signal right?"
         yield Phrase(template, name=name, share=fraction)

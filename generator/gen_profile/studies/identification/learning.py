@@ -30,7 +30,7 @@ from gen_profile.studies.identification.estimation import taken_as_exact
 from gen_profile.studies.identification.fit import Fit, fit_of
 from gen_profile.studies.identification.measurements import DirectReading, SwingLog
 from gen_profile.studies.identification.misfit import GROSS, Explanation, likeliest, misfits, nothing_left
-from gen_profile.studies.identification.swing_model import STILL, SwingingMachine, shortened
+from gen_profile.studies.identification.swing_model import AT_REST, SwingingMachine, shortened
 from gen_profile.studies.identification.uncertainty import uncertainty
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem, SpecError
 from gen_profile.support.one_thread import one_thread
@@ -39,14 +39,14 @@ from gen_profile.support.suggestion import suggestion
 
 CONFIDENCE = 0.999  # of each log, so that the ranges after ten of them hold with 99 %
 DRAWN, BEST = 256, 2  # machines of the ranges that are tried, and of these the ones from which a fit begins
-SAMPLES = 1500  # of a log that are fitted
+FITTED_SAMPLES = 1500  # of a log that are fitted
 LOOSE = 3.0  # half-ranges: the standard deviation of a parameter of which a log tells nothing
 IMPOSSIBLE = 25.0  # by which the squares that a log leaves are more by chance once in a million times
-SHOWN = (0.5, 1.5)  # times a swing that a sensor may show: it may lie askew, by 60° at most
+SENSOR_GAIN = (0.5, 1.5)  # times a swing that a sensor may show: it may lie askew, by 60° at most
 WIDE = np.geomspace(0.25, 4.0, 33)  # times a parameter of the spec, where one is looked for that changed
 SLABS, PER_SLAB = 16, 8  # into which a range is cut, and machines that are looked at in each
-MOST = 2  # ranges for which these multiply: more of them have no more machines
-LEAST = 0.005  # relative half-range that is left in any case: a machine in service is not known any better
+MOST_RANGES = 2  # ranges for which these multiply: more of them have no more machines
+LEAST_HALF_RANGE = 0.005  # relative, left in any case: a machine in service is not known any better
 
 NARROWER = 0.99  # of a range, down to which it stays as it was stated
 
@@ -106,7 +106,7 @@ def narrowed_by_log(
     progress("comparing the run with machines of the ranges")
     drawn, stood = machines.drawn(DRAWN), tuple(map(float, played.position[-1]))
     middle = SwingingMachine(plant=machines.plant, parameters=drawn[0], q_a=stood)
-    model = driven_model(middle, played, shortened(log, middle, SAMPLES))
+    model = driven_model(middle, played, shortened(log, middle, FITTED_SAMPLES))
     starts, residual = model.guesses(drawn)
     model = attrs.evolve(model, lead=max(float(starts[np.argmin(residual), -3]), 0.0) + model.fastest)
     free = _free_fit(machines, model)
@@ -121,7 +121,7 @@ def narrowed_by_log(
     if lines is not None or excess > IMPOSSIBLE:
         _require_unchanged(fit, model, unknowns, certain=excess > IMPOSSIBLE)
     begin, gain, _ = unknowns[-3:].tolist()
-    if not SHOWN[0] < abs(gain) < SHOWN[1]:
+    if not SENSOR_GAIN[0] < abs(gain) < SENSOR_GAIN[1]:
         raise InfeasibleProblem(
             f"The log of {log.load} shows {abs(gain):.2g} times the {log.quantity} that this motion leads "
             "to: look at its unit, and at what it is of (signal)."
@@ -166,7 +166,7 @@ def narrowed_by_sight(
     InfeasibleProblem
         No machine of the ranges leaves it.
     """
-    plant, drawn = machines.plant, machines.drawn(SLABS * PER_SLAB ** min(len(machines.ranges), MOST))
+    plant, drawn = machines.plant, machines.drawn(SLABS * PER_SLAB ** min(len(machines.ranges), MOST_RANGES))
     frequencies = linearize(plant, drawn[0], played.position[-1]).frequencies
     apart = 2.0 * np.pi / COARSE / float(frequencies[-1])
     times = np.concatenate([[0.0], played.times[-1] + np.arange(0.0, watch, apart)])
@@ -206,7 +206,7 @@ def _free_fit(machines: Machines, model: DrivenModel) -> Fit:
 
 def _fitted(fit: Fit, begun: Sequence[Array]) -> tuple[Array, Array]:
     """Find what agrees best with the log, from the best of several places; and the noise."""
-    unknowns = _fitted_from(fit, begun, np.array([max(float(np.std(fit.models[0].log.values)), STILL)]))
+    unknowns = _fitted_from(fit, begun, np.array([max(float(np.std(fit.models[0].log.values)), AT_REST)]))
     try:
         return fit.near(unknowns)
     except InfeasibleProblem:  # at a bound that is far off
@@ -378,9 +378,9 @@ def _learned(spec: Spec, machines: Machines) -> Spec:
 
 
 def _rounded(ends: tuple[float, float], given: tuple[float, float]) -> tuple[float, float]:
-    """Leave `LEAST` at least, in digits worth a hundredth of that, and nothing beyond the given ends."""
+    """Leave `LEAST_HALF_RANGE` at least, in digits worth a hundredth of it, within the given ends."""
     middle = sum(ends) / 2.0
-    half = max((ends[1] - ends[0]) / 2.0, LEAST * abs(middle))
+    half = max((ends[1] - ends[0]) / 2.0, LEAST_HALF_RANGE * abs(middle))
     if 2.0 * half > NARROWER * (given[1] - given[0]):
         return given
     middle = min(max(middle, given[0] + half), given[1] - half)

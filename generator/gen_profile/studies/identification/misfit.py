@@ -28,7 +28,7 @@ FEWEST = 64.0  # ordinates, which tell what noise is
 NEIGHBOURS = 33  # ordinates whose median is the noise around a line
 CHANCE = 1e-4  # how rarely noise may look like a line
 DOUBT = 1.5  # by which a median of so few may be off
-ROUNDING = 0.35  # of a sensor's step: rounding errors repeat with the swing, and are seen to elsewhere
+QUANTISATION_NOISE = 0.35  # of a sensor's step: rounding errors repeat with the swing
 EXACT = 1e-5  # of the swing, which is the integrator's business
 EQUIVALENT = 1.1  # times the least sum of squares, within which parameters may explain the same
 DISTINCT = 12.0  # by which the squares of an explanation are more by chance once in 2000 times
@@ -121,7 +121,7 @@ def misfit(model: SwingModel, parameters: Mapping[str, float], residuals: Array)
     square = float(np.square(residuals - residuals.mean()).mean())
     in_lines = 2.0 / len(residuals) * float((periodogram.power - periodogram.background)[lines].sum())
     rms = math.sqrt(min(in_lines, (1.0 - bin_fraction) * square))
-    if rms < max(ROUNDING * log.resolution, EXACT * float(np.ptp(log.values))):
+    if rms < max(QUANTISATION_NOISE * log.resolution, EXACT * float(np.ptp(log.values))):
         return None
     return Misfit(
         rms=rms,

@@ -17,17 +17,17 @@ from gen_profile.plants.plant import Plant
 from gen_profile.studies.identification.measurements import SwingLog, require_angle
 from gen_profile.support.errors import InfeasibleProblem
 
-STEP = 1e-6  # relative, of numerical slopes
+SLOPE_STEP = 1e-6  # relative, of numerical slopes
 WIDEST_SWING = math.pi / 4.0  # rad, beyond which no load is let swing
-STILL = 1e-9  # SI units, which no sensor tells from rest
-APART = 1e-3  # periods, between angles whose difference is a rate; less than the time between samples
+AT_REST = 1e-9  # SI units, which no sensor tells from rest
+DIFFERENCE_PERIODS = 1e-3  # between angles whose difference is a rate; less than between samples
 DERIVATIVES = {"rate": 1, "acceleration": 2}  # by time; of the angle, or the sway
 OF_SWAY = ("sway", "acceleration")
 MOST_SAMPLES, SWINGS = 6000, 300  # of a log that is fitted: twenty averages of each swing
 SWINGS_A_DRIFT, MOST_DRIFTS = 2.0, 4  # a zero drifts slower than the load swings
 FEWEST_SWINGS, CLEAR = 4, 0.5  # of a log, and share of its power at one frequency, which tell its pace
 PACE = 5.0  # times slower or faster than the machine, of which no rope is so wrong as a clock may be
-SHOWN = 1e-6  # relative size from which on a log shows a part of its start
+OBSERVED_SIZE = 1e-6  # relative size from which on a log shows a part of its start
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -163,7 +163,7 @@ class SwingModel:
         starts : (1 + p + s, 2 n_u) array
         steps : (p + s,) array
         """
-        n, step, plant = len(start), STEP * size, self.machine.plant
+        n, step, plant = len(start), SLOPE_STEP * size, self.machine.plant
         order = [q.name for q in plant.parameters]
         machines = np.tile([parameters[name] for name in order], (1 + len(names) + n, 1))
         for lane, (name, by) in enumerate(zip(names, steps, strict=True), start=1):
@@ -182,7 +182,7 @@ class SwingModel:
             pairs = zip(rows, starts, strict=True)
             return np.stack([self._small_swing(parameters, start, count) for parameters, start in pairs])
         times = self.log.times[:count]
-        apart = min(APART * self.period, 0.4 * float(np.diff(self.log.times).min()))
+        apart = min(DIFFERENCE_PERIODS * self.period, 0.4 * float(np.diff(self.log.times).min()))
         # that time later, and later again: a start is another one then
         times = (times[:, None] + apart * np.arange(slopes + 1)).ravel()
         sway, angle = free_swing(plant, machines, q_a=self.machine.q_a, starts=starts, times=times)
@@ -216,7 +216,7 @@ def swing_model(machine: SwingingMachine, log: SwingLog) -> SwingModel:
         raise InfeasibleProblem(template, lasts=lasts, between=between, period=period)
     _require_swing(machine, log)
     size = np.linalg.norm(_linear_answers(machine, log), axis=0)
-    shown = np.flatnonzero(size > SHOWN * size.max())
+    shown = np.flatnonzero(size > OBSERVED_SIZE * size.max())
     return SwingModel(machine=machine, log=log, shown=shown, period=period)
 
 
@@ -272,7 +272,7 @@ def _require_swing(machine: SwingingMachine, log: SwingLog) -> None:
     gains = gains * linear.frequencies ** DERIVATIVES.get(log.quantity, 0)
     mode = int(np.argmax(np.abs(gains)))
     swing = float(np.ptp(log.values)) / 2.0
-    if swing < STILL:
+    if swing < AT_REST:
         template = "The log's {quantity} does not swing; look at its columns, and at when it begins (after)."
         raise InfeasibleProblem(template, quantity=log.quantity)
     angle = swing * abs(angles[mode] / gains[mode]) if gains[mode] else 0.0
@@ -306,6 +306,6 @@ def _linear_modes(machine: SwingingMachine, log: SwingLog) -> tuple[Array, Array
 def _gain(machine: SwingingMachine, log: SwingLog) -> Array:
     """Slopes of the logged output by q_u, at rest; of a derivative those of what it is of."""
     p, plant = SimpleNamespace(**machine.parameters), machine.plant
-    outputs = [plant.outputs(q_u, machine.q_a, p) for q_u in STEP * np.eye(len(plant.unactuated))]
+    outputs = [plant.outputs(q_u, machine.q_a, p) for q_u in SLOPE_STEP * np.eye(len(plant.unactuated))]
     name = "sway" if log.quantity in OF_SWAY else "angle"
-    return np.array([getattr(output, name)[plant.loads.index(log.load)] for output in outputs]) / STEP
+    return np.array([getattr(output, name)[plant.loads.index(log.load)] for output in outputs]) / SLOPE_STEP

@@ -21,7 +21,7 @@ from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import finite_number, number_meant, suggestion
 
 TRIES = 64
-ROUNDING = 1e-9  # of a step of the grid
+GRID_TOLERANCE = 1e-9  # of a step of the grid
 FINER = "Sweep a finer grid, or a more robust design."
 MACHINE = ("plant.", "actuator.", "check.", "robustness.uncertain.")  # what one has; all else, one may choose
 
@@ -203,7 +203,7 @@ def _near(grid: Grid, table: Table, wanted: Mapping[str, Any]) -> tuple[list[int
             usable = compute.and_(usable, compute.equal(table[axis.key], wanted[axis.key]))
     cases = np.flatnonzero(usable.to_numpy())
     order = cases[np.argsort(squares[cases], kind="stable")]
-    near = order[farthest[order] <= 1.0 + ROUNDING][:TRIES]
+    near = order[farthest[order] <= 1.0 + GRID_TOLERANCE][:TRIES]
     return tuple(table["case"].take(some).to_pylist() for some in (near, order[:1]))
 
 

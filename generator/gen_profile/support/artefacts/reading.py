@@ -11,11 +11,11 @@ from gen_profile.support.artefacts.manifest import (
     parse_manifest,
     sha256,
 )
-from gen_profile.support.bounded_file import DOCUMENT, MOST, is_folder, read_bounded
+from gen_profile.support.bounded_file import DOCUMENT, MOST_BYTES, is_folder, read_bounded
 from gen_profile.support.errors import CheckFailed, GenProfileError, OutputError, SpecError
 
 
-def read_artefact(path: Path, most: int = MOST, what: str = "") -> bytes:
+def read_artefact(path: Path, most: int = MOST_BYTES, what: str = "") -> bytes:
     """Read a file of so many bytes at most; errors say what it is.
 
     Raises

@@ -26,7 +26,7 @@ PURE, PREHASHED = b"Ed", b"ED"  # Ed25519 of a file, and of its hash
 UNENCRYPTED = b"\0\0"  # of what would derive a key from a password
 NUMBER = 8  # bytes of a key's number
 SECRET_AT = 54  # bytes of a secret key's file before its number: algorithms, salt, limits of scrypt
-MOST = 1 << 20  # bytes of a key or signature, by far
+MOST_BYTES = 1 << 20  # bytes of a key or signature, by far
 
 
 @attrs.frozen(kw_only=True)
@@ -137,7 +137,7 @@ def _hash(content: bytes) -> bytes:
 
 
 def _lines(path: Path) -> list[str]:
-    return read_artefact(path, MOST).decode("utf-8", "replace").splitlines()
+    return read_artefact(path, MOST_BYTES).decode("utf-8", "replace").splitlines()
 
 
 def _decoded(path: Path, lines: list[str], what: str) -> bytes:
