@@ -45,7 +45,7 @@ oldest:
 test *arguments:
     pytest {{ arguments }}
 
-# Format and mend what ruff can mend.
+# Format and fix what ruff can fix.
 fix:
     ruff check --fix
     ruff format

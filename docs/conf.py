@@ -24,7 +24,7 @@ NAVIGATION = {
     "Project": "/CHANGELOG /CONTRIBUTING /SECURITY",
 }
 
-MENDED = {
+CORRECTIONS = {
     'class="caption" role="heading"': 'class="caption" role="heading" aria-level="2"',
     '<aside class="sidebar-drawer"': '<aside aria-label="Pages" class="sidebar-drawer"',
     '<aside class="toc-drawer': '<aside aria-label="Sections" class="toc-drawer',
@@ -98,11 +98,11 @@ def leave_out_fields(_: Sphinx, __: str, ___: str, value: object, *____: object)
 
 
 def mend_pages(app: Sphinx, error: Exception | None) -> None:
-    """Mend what axe finds wrong in the theme, and lead from the folder's own address to the README."""
+    """Correct what axe finds wrong in the theme, and lead from the folder's own address to the README."""
     if error is None and app.builder.format == "html":
         for page in Path(app.outdir).rglob("*.html"):
             text = page.read_text("utf-8")
-            for wrong, right in MENDED.items():
+            for wrong, right in CORRECTIONS.items():
                 text = text.replace(wrong, right)
             page.write_text(text, "utf-8")
         options = Path(app.outdir, "_static", "documentation_options.js")

@@ -167,7 +167,7 @@ def test_an_interrupted_run_leaves_all_or_nothing(tmp_path, word, delay, number)
 
 
 def test_a_run_that_is_interrupted_while_it_compiles_can_be_repeated(tmp_path):
-    """With a compiler that takes for ever while there is a gate, so that the signal cannot come too late."""
+    """With a compiler that goes on while there is a gate, so that the signal cannot come too late."""
     folder, gate, compiler = tmp_path / "run", tmp_path / "gate", tmp_path / "compiler"
     folder.mkdir()
     gate.touch()

@@ -40,7 +40,7 @@ def prepared(folder, *axes, overrides=(), formats=("csv",)):
 
 @pytest.mark.slow
 def test_a_process_that_is_given_up_is_started_anew(monkeypatch):
-    """As is one that ends while it starts: no case may wait for it for ever."""
+    """As is one that ends while it starts: no case may wait for it without end."""
     monkeypatch.setattr(cluster, "RENEWAL", 200)
     with (
         dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"}),

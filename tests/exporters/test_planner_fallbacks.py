@@ -146,7 +146,7 @@ def test_a_stick_that_was_let_go_of_leads_nowhere_beyond_the_ends_stated_then(te
 
 
 def test_an_axis_beyond_its_travel_comes_back_though_there_is_no_room_to_damp():
-    """The load was swung by the hand that moved the axis there: it stood for 33 s, or for ever."""
+    """The load was swung by the hand that moved the axis there: it stood for 33 s, or for good."""
     changes = ["planner.live_rate={L1=0.2}", "check.residual_sway=0.02"]
     block = CountedBlock(
         compile_counting(planner_block(preset_spec("bay-crane", changes)).text),

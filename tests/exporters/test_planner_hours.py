@@ -111,7 +111,7 @@ def require_true(out, at, rope, load, decay=0.0):
 
 @pytest.mark.parametrize(("rope", "load", "promised"), [(6.0, 1500.0, 540.0), (3.0, 100.0, 240.0)])
 def test_nothing_is_forgotten_without_damping(text, rope, load, promised):
-    """Eight machines vouched for those between them for minutes: 90 mm were left of 40 after half an hour."""
+    """Eight machines stood for those between them for minutes: 90 mm were left of 40 after half an hour."""
     out = Crane(text, rope, load).works(np.random.default_rng(1), 2000.0, 3.0).outputs
     ends = rests(out)
     for at in ends[:: -(len(ends) // 5)]:

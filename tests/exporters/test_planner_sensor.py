@@ -209,7 +209,7 @@ def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compi
     assert not issued["bDamping"].any()  # so the load does as without a sensor
     assert np.abs(issued["sway"][-500:]).max() < 1e-3
     require_limits(issued)
-    swung.run(0.1, bReset=1.0, bLoadAtRest=1.0)  # mended
+    swung.run(0.1, bReset=1.0, bLoadAtRest=1.0)  # repaired
     reset = len(swung.rows["sway"])
     again = swung.run(9.0, bReset=0.0, bExecute=0.0, noise=0.002, random=np.random.default_rng(3))
     assert not again["bDamping"][reset:].any()  # what the fault had left of the estimate is forgotten

@@ -319,7 +319,7 @@ class TestRockwell:
             assert re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name) and len(name) <= 40, name
 
     def test_profiles_are_calculated_once_after_an_import(self, tmp_path):
-        """Structured Text runs MCCP in every scan that reaches it, and so would begin anew for ever."""
+        """Structured Text runs MCCP in every scan that reaches it, and so would begin anew without end."""
         (file,) = rockwell_l5x.encode(TWO_MOVES, goal_of(TWO_MOVES))
         (tmp_path / file.filename).write_bytes(file.content)
         tags = l5x.Project(str(tmp_path / file.filename)).controller.tags

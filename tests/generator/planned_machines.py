@@ -82,7 +82,7 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (300, 5, 39),  # fTimeToGo half of what it took pulses to turn round
         (225, 5, 64),  # a rope that came with a command, as that of before was being taken over: 7 mm left
         (225, 5, 125),  # 2.6 s late, as from rest a plan for the target before led away from the new one
-        (200, 0, 104),  # a velocity that rippled for ever, as cut pulses were taken for whole ones
+        (200, 0, 104),  # a velocity that rippled without end, as cut pulses were taken for whole ones
         (225, 8, 4),  # 3.3 s late, as the first target counted as a change of mind
         (1000, 7001, 381),  # a rope that came with a second command, as that of before was known: 8 mm left
         (400, 13, 106),  # it stood as long as its rope changed, as that was taken over again and again

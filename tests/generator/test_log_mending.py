@@ -1,4 +1,4 @@
-"""Logs as loggers leave them: mended and told, or refused with the place; never another machine.
+"""Logs as loggers leave them: repaired and told, or refused with the place; never another machine.
 
 Swings come from a textbook's equation of a pendulum, integrated by scipy; clocks and faults from here.
 """

@@ -156,14 +156,14 @@ def test_what_a_block_tells_of_its_sensor_is_judged(spec):
     assert not faults(dead, nSensorFault=7.0, fSensorScale=0.3, fAcceleration=swings)
     assert "fSensorScale is wrong by 0.99" in faults(dead, nSensorFault=7.0, fAcceleration=swings)[0]
     wrong = attrs.evolve(sound, fault="exchanged", fails=0.0)
-    (vouching,) = [one for one in faults(wrong, fAcceleration=swings) if "vouches" in one]
-    assert float(re.search(r"too long by ([\d.]+) s", vouching)[1]) == pytest.approx(
+    (confirming,) = [one for one in faults(wrong, fAcceleration=swings) if "confirms" in one]
+    assert float(re.search(r"too long by ([\d.]+) s", confirming)[1]) == pytest.approx(
         20.0 - (1 + 1 + 2) * 3.0,
         abs=0.5,  # first used, until the swing has built up, allowed
     )
     for shown in ({"nSensorFault": 8.0}, {"bSensorUsed": 0.0}):
-        assert not any("vouches" in one for one in faults(wrong, fAcceleration=swings, **shown))
-    assert not any("vouches" in one for one in faults(wrong, fAcceleration=0.1 * swings))
+        assert not any("confirms" in one for one in faults(wrong, fAcceleration=swings, **shown))
+    assert not any("confirms" in one for one in faults(wrong, fAcceleration=0.1 * swings))
     stronger = np.where(np.arange(5000) * CYCLE < dead.fails, 30.0, 1.0) * swings  # which is still remembered
     assert not faults(dead, nSensorFault=7.0, fSensorScale=0.6, fAcceleration=stronger)
     assert faults(dead, nSensorFault=7.0, fSensorScale=0.6, fAcceleration=swings)

@@ -117,7 +117,7 @@ def _run_child(run: ForeignRun, folder: Path) -> None:
         ) from error
     if code < 0:
         raise CosimulationError(
-            f"{run.archive.name}: the FMU crashed ({signal.Signals(-code).name}). Its maker must mend it."
+            f"{run.archive.name}: the FMU crashed ({signal.Signals(-code).name}). Its maker must correct it."
         )
 
 

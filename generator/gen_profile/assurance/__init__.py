@@ -1,1 +1,1 @@
-"""What vouches for an artefact: verdicts, certificates, and proofs of planner blocks."""
+"""The evidence for an artefact: verdicts, certificates, and proofs of planner blocks."""

@@ -48,7 +48,7 @@ def sign(folder: Path, key: Key | None) -> None:
 
 
 def require_signature(artefact: Path, public_path: Path | None) -> None:
-    """Refuse an artefact that no manifest vouches for which the key has signed."""
+    """Refuse an artefact that no manifest covers which the key has signed."""
     if public_path is not None:
         require_installed("Signatures need the package cryptography", "sign", "cryptography")
         from gen_profile.support.artefacts.signature import public_key, require_signed

@@ -267,7 +267,7 @@ class SampledProfile(Summarised, Tabled):
     cycle_time : float
         s.
     position : (samples, axes) array
-        m (or rad); the last sample is held for ever.
+        m (or rad); the last sample is held from then on.
     velocity, acceleration, jerk : (samples, axes) array or None
         What the artefact carries beside positions.
     resolution : (axes,) array

@@ -2,7 +2,7 @@
 
 θ1 is the first rope's angle from the vertical, θ2 the second's relative to the first; both are positive when
 the load trails a cart that accelerates in +y. Lagrange's equations with massless, taut ropes, the first row
-divided by L1 and the second by m2 L2, are the paper's eq. (20)–(22), its misprints mended:
+divided by L1 and the second by m2 L2, are the paper's eq. (20)–(22), its misprints corrected:
 
     M_uu = [ (m1+m2) L1 + m2 L2 cos θ2    m2 L2 cos θ2 ]
            [ L1 cos θ2 + L2               L2           ]

@@ -166,7 +166,7 @@ class TestVelocities:
         assert stops[0] <= bench.fault_at + cycles * PERIOD
 
     def test_a_drive_that_is_fed_no_more_stops_by_itself(self):
-        """It would go on at its last velocity for ever."""
+        """It would go on at its last velocity without end."""
         with Bench(profile=quintic((0.0, 0.3)), make=DriveVariant(miss="hold"), **VELOCITY) as bench:
             bench.at_cycle(120, lambda: setattr(bench.streamer_end, "sending", lambda _: False))
             bench.streamer.run()

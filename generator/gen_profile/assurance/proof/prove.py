@@ -94,7 +94,7 @@ def replay(
     Parameters
     ----------
     numbering : Numbering
-        With the rounds that a search has come to.
+        With the rounds that a search has made.
     number : int
         Of the history, below `numbering.count`.
 

@@ -433,18 +433,18 @@ def _misread(
 def _unnoticed(
     axis: BlockAxis, issued: Mapping[str, Array], moved: OwnMotion, *, fault: str, swing: float
 ) -> Iterator[str]:
-    """Say whether a faulty sensor vouches for more of the axis's own motion than is stated.
+    """Say whether a faulty sensor confirms more of the axis's own motion than is stated.
 
     Swings below `swing` in m do no harm.
     """
-    vouches = (issued[axis.of("bSensorUsed")] != 0.0) & (issued[axis.of("nSensorFault")] == 0.0)
+    confirms = (issued[axis.of("bSensorUsed")] != 0.0) & (issued[axis.of("nSensorFault")] == 0.0)
     others = max(moved.others, (2.0 * np.pi / moved.period) ** 2 * swing)
-    strong = vouches & (moved.own[:, 0] > others**2)
+    strong = confirms & (moved.own[:, 0] > others**2)
     seconds = moved.cycle * np.cumsum(strong)
     allowed = TO_NOTICE * moved.period
     if seconds[-1] > allowed:
         yield (
-            f"a faulty sensor ({fault}) vouches for strong motions of its axis for too long by "
+            f"a faulty sensor ({fault}) confirms strong motions of its axis for too long by "
             f"{seconds[-1] - allowed:.3g} s, at {np.argmax(seconds > allowed) * moved.cycle:.2f} s"
         )
 

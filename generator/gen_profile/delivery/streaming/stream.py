@@ -61,7 +61,7 @@ def require_rest(spec: Spec) -> None:
 
 
 def verified(path: Path, *, accept_unverified: bool = False) -> Source:
-    """Read an artefact, and require that its manifest vouches for it.
+    """Read an artefact, and require that its manifest covers it.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
 
 
 def verified_block(path: Path, *, accept_unverified: bool = False) -> tuple[Spec, BlockInstance]:
-    """Read a planner block, and require that its manifest vouches for it.
+    """Read a planner block, and require that its manifest covers it.
 
     Raises
     ------
@@ -104,10 +104,10 @@ def verified_block(path: Path, *, accept_unverified: bool = False) -> tuple[Spec
 
 
 def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: bool) -> Spec:
-    """Take the spec of an artefact that its manifest vouches for."""
+    """Take the spec of an artefact that its manifest covers."""
     manifest, beside = manifest_beside(path, content, planner=format_ == PLANNER), path.parent / FILENAME
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == format_}:
-        raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
+        raise SpecError(f"{path} is not the file that {beside} covers; export and check it again.")
     require_companions(manifest, path, content)
     if manifest.check is None and not accept_unverified:
         raise SpecError(

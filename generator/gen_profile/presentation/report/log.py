@@ -63,7 +63,7 @@ class MeasuredLog:
     ignored : tuple of str
         Columns of other names.
     notes : tuple of str
-        What was mended as it was read.
+        What was repaired as it was read.
     """
 
     source: str

@@ -1,4 +1,4 @@
-"""Columns of numbers out of a logger's table: its clock read, and small faults mended and told.
+"""Columns of numbers out of a logger's table: its clock read, and small faults repaired and told.
 
 What is harmless is done whatever its share: rows without a value are left out, clocks go on that pass
 midnight, what was logged twice counts once, and of several runs in one file the longest is taken. Of rows
@@ -46,7 +46,7 @@ class LogColumns:
     values : (samples, columns) array
         As they were logged.
     notes : tuple of str
-        What was mended, or taken to be meant; a clause each.
+        What was repaired, or taken to be meant; a clause each.
     """
 
     times: Array

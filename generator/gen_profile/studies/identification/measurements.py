@@ -79,7 +79,7 @@ class SwingLog(Sampled):
         angle, as a gyroscope on the load measures it, or ``"acceleration"`` of the sway, without gravity.
     load : str
     notes : tuple of str
-        What was mended as it was read, or taken to be meant.
+        What was repaired as it was read, or taken to be meant.
     resolution : float
         Least step between different values as they were read, as of an encoder that counts.
     logged : int
@@ -185,7 +185,7 @@ def parse_swing(
 ) -> SwingLog:
     """Read a log: two columns of a table, below their names and whatever else stands there.
 
-    Rows in which the logger left one of the two empty are left out; what is mended stands in the log's notes.
+    Rows in which the logger left one of the two empty are left out; what is repaired stands in the log's notes.
     Of a sensor with axes x, y and z on a load that swings in one direction all are taken: it may lie askew.
 
     Parameters
@@ -281,7 +281,7 @@ def cut_swing(
     quantity, load : str
         What the value is; see `SwingLog`.
     notes : tuple of str
-        What was mended before.
+        What was repaired before.
 
     Raises
     ------

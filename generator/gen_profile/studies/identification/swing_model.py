@@ -211,7 +211,7 @@ def swing_model(machine: SwingingMachine, log: SwingLog) -> SwingModel:
         template = (
             "The log lasts {lasts:.3g} s with a sample every {between:.3g} s, and this machine "
             "swings once in {period:.3g} s: look at the unit of the log's times, log more of it, "
-            "or mend the spec."
+            "or correct the spec."
         )
         raise InfeasibleProblem(template, lasts=lasts, between=between, period=period)
     _require_swing(machine, log)
@@ -246,7 +246,7 @@ def require_pace(model: SwingModel) -> None:
     near = natural[0] if seen < natural[0] else natural[-1]
     template = (
         "By its clock, the log swings once in {seen:.3g} s, and this machine in {period:.3g} s: look at the "
-        "column and the unit of the log's times, or mend the spec."
+        "column and the unit of the log's times, or correct the spec."
     )
     raise InfeasibleProblem(template, seen=2.0 * np.pi / seen, period=2.0 * np.pi / float(near))
 

@@ -175,7 +175,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
     if seal != computed:
         raise OutputError(
             f"{source} was altered after it was written, or comes from an earlier version ({SEAL} does not "
-            "fit), so it vouches for nothing; export again."
+            "fit), so it proves nothing; export again."
         )
     return manifest
 

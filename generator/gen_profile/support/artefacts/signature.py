@@ -3,7 +3,7 @@
 A key file holds a comment and a line in Base64: what the algorithm is, the key's number, the key. A
 signature is of the file's BLAKE2b hash; a second one is of the first and of the trusted comment, which
 `minisign` shows. Whatever this writes `minisign` verifies, and the other way round. A manifest holds the
-spec, its machine's hash, and the hash of every file, so that a signed one vouches for all of them.
+spec, its machine's hash, and the hash of every file, so that a signed one covers all of them.
 """
 
 import base64
@@ -109,7 +109,7 @@ def require_signed(artefact: Path, key: Key) -> None:
     Raises
     ------
     CheckFailed
-        Nothing vouches for the file.
+        Nothing covers the file.
     OutputError
         The manifest or the signature cannot be read.
     """

@@ -211,7 +211,7 @@ class ConicProgram:
         settings.max_iter = MAX_ITERATIONS
         settings.max_threads = 1  # the same bits whatever the machine
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-        # refinement takes a third of the time, mostly in vain; equations alone need no more than it
+        # refinement takes a third of the time, mostly without effect; equations alone need no more than it
         settings.iterative_refinement_enable = {kind for kind, _ in self._cones} == {"ZeroConeT"}
         settings.presolve_enable = False  # which would forbid to take over its structure
         solution = self._solved(quadratic, linear, settings, self._workspace)

@@ -98,7 +98,7 @@ def solve(problem: Problem) -> Solution:
 def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
     """Allow some axes little more acceleration than they take in the motion that is exact and insensitive.
 
-    Without such a limit, ever less sway would ask for ever more acceleration.
+    Without such a limit, less and less sway would ask for more and more acceleration.
     """
     names = tuple(problem.worst_case.uncertain) if problem.worst_case is not None else ()
     unweighted = attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0)
