@@ -25,7 +25,7 @@ def text(spec, period):
     given = "\n".join(f"{name} : {types[name[0]]};" for name in GIVEN)
     shown = "\n".join(f"{name} : {types[name[0]]};" for name in SHOWN)
     handed = ", ".join(f"{name} := {name}" for name in GIVEN)
-    told = "\n".join(f"{name} := observer.{name};" for name in SHOWN)
+    copied = "\n".join(f"{name} := observer.{name};" for name in SHOWN)
     return f"""{observer(constants, constants.sensor)}
 FUNCTION_BLOCK Called
 VAR_INPUT {given} END_VAR
@@ -38,7 +38,7 @@ aLive[0] := {ROPE!r};
 aLive[1] := {LOAD!r};
 observer({handed}, nPeriod := {period}, bKept := TRUE, bGrows := FALSE,
     aLive := aLive, aSwing := aSwing, aSwingRate := aSwingRate);
-{told}
+{copied}
 END_FUNCTION_BLOCK
 """
 

@@ -121,7 +121,7 @@ def test_a_command_that_no_motion_obeys_is_given_up_in_the_stated_time(refusing)
 
 @pytest.mark.parametrize(("way_out", "promise"), [("bLoadAtRest", 0), ("bEnable", 2)])
 def test_a_command_that_was_given_up_is_obeyed_after(refusing, way_out, promise):
-    """Where the load hangs still, or where nothing is promised, also once another command waits without success."""
+    """Where the load hangs still, or where nothing is promised, also once another command fails."""
     block, patience = copied(refusing[0]), refusing[1]
     assert block.hold(patience + 10, bExecute=1.0, fTarget=5.0)["bError"][-1]
     block.hold(1, bReset=1.0)

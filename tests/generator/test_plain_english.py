@@ -65,6 +65,8 @@ def test_names_say_what_they_hold():
     assert found == set()
 
 
-@pytest.mark.parametrize("text", ["lest it moves", "as the block is\n    # told", "Whoever", "Say it.", "it is mended"])
+@pytest.mark.parametrize(
+    "text", ["lest it moves", "as the block is\n    # told", "Whoever", "Say it.", "it is mended"]
+)
 def test_that_test_sees_words(text):
     assert PROSE.search(text)

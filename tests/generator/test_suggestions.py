@@ -153,7 +153,7 @@ def test_no_limits_are_named_that_no_machine_has():
 
 @pytest.mark.slow
 def test_a_limit_is_kept_by_machines_whose_sway_hardly_follows_the_nominal_one_s():
-    """Supposing that the worst one's sway falls as the nominal one's does took ever less of it, without success."""
+    """Supposing that the worst one's sway falls as the nominal one's does took less and less of it."""
     ways = ["move.distance=[-2.5, 3.53]", "move.duration=7.41", 'cost={effort="snap", sway_weight=0.0}']
     machine = ["plant.m=32.0", "plant.L=8.52", "plant.c=0.0"]
     unsure = "robustness={method='none', uncertain={L=0.204}}"

@@ -185,7 +185,7 @@ def parse_swing(
 ) -> SwingLog:
     """Read a log: two columns of a table, below their names and whatever else stands there.
 
-    Rows in which the logger left one of the two empty are left out; what is repaired stands in the log's notes.
+    Rows in which the logger left one of the two empty are left out; repairs stand in the log's notes.
     Of a sensor with axes x, y and z on a load that swings in one direction all are taken: it may lie askew.
 
     Parameters

@@ -292,7 +292,7 @@ class Program:
         for outputs, limit, give in held:
             if np.isinf(limit).all():
                 continue
-            shown = np.concatenate([outputs @ turned for turned in turns])
+            shown = np.concatenate([outputs @ turn for turn in turns])
             wide = np.zeros((1, len(shown), self.width))
             wide[0, :, self._columns(machine)[TROLLEY:-1]] = shown.T
             for sign in (1.0, -1.0):
