@@ -10,7 +10,7 @@ VAR_IN_OUT aLive : ARRAY [0..@last_live] OF LREAL; END_VAR
 VAR_OUTPUT
     fPosition : LREAL; fVelocity : LREAL; fAcceleration : LREAL; bReady : BOOL; bMoving : BOOL; bLeads : BOOL;
     bSteady : BOOL; fTimeToGo : LREAL; fSwayLeft : LREAL; bPromise : BOOL; fStopLow : LREAL;
-    fStopHigh : LREAL; bVoid : BOOL; nSpent : DINT;
+    fStopHigh : LREAL; bVoid : BOOL; fFastest : LREAL; nSpent : DINT;
 END_VAR
 VAR nWait : DINT; fMost : LREAL; fWay : LREAL; fSpeed : LREAL; fStop : LREAL; END_VAR
 VAR CONSTANT cCycle : LREAL := @cycle; cSlowing : LREAL := @slowing; cFull : LREAL := @full; END_VAR
@@ -50,6 +50,7 @@ bMoving := fVelocity <> 0.0;
 bLeads := nWait = 0;
 bPromise := TRUE;
 fSwayLeft := 0.001;
+fFastest := ABS(fVelocity) / cFull;
 fStop := 0.25 * fVelocity * fVelocity / cSlowing;
 fTimeToGo := 0.5 * ABS(fVelocity) / cSlowing;
 fStopLow := fPosition;
