@@ -15,7 +15,7 @@ from gen_profile.studies.identification.measurements import SwingLog
 from gen_profile.studies.identification.swing_model import (
     MOST_SAMPLES,
     SwingingMachine,
-    require_pace,
+    require_likely,
     shortened,
     swing_model,
 )
@@ -77,7 +77,7 @@ def test_a_clock_is_not_blamed_for_what_may_be_so(beside):
     log = log_of(times * (4.0 if beside == "another rope" else 1.0), values)  # sixteen times as long
     spec = preset_spec(PRESET)
     machine = SwingingMachine(plant=spec.machine(), parameters=spec.plant.parameters, q_a=spec.move.target)
-    require_pace(swing_model(machine, shortened(log, machine)))
+    require_likely(swing_model(machine, shortened(log, machine)))
 
 
 @pytest.mark.slow

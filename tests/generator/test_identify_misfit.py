@@ -13,7 +13,12 @@ from gen_profile.studies.identification.fit import fit_of
 from gen_profile.studies.identification.identify import identify
 from gen_profile.studies.identification.measurements import Period, SwingLog, parse_reading
 from gen_profile.studies.identification.misfit import Explanation, elsewhere, likeliest, spectrum
-from gen_profile.studies.identification.swing_model import SwingingMachine, SwingModel, swing_model
+from gen_profile.studies.identification.swing_model import (
+    SwingingMachine,
+    SwingModel,
+    require_likely,
+    swing_model,
+)
 from gen_profile.studies.identification.uncertainty import uncertainty
 from gen_profile.support.errors import InfeasibleProblem, SpecError
 
@@ -24,6 +29,41 @@ NOISE = np.random.default_rng(4).normal(0.0, 1e-3, len(TIMES))
 
 def log_of(values, quantity="angle", load="payload"):
     return SwingLog(times=TIMES, values=values, quantity=quantity, load=load)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("read", [(), ("L1=6.0±0.1",)])
+def test_noise_alone_tells_no_rope(seed, read):
+    """The least of its noise at some frequency gave a rope of 4.5 ± 1.4 m where it was 6.05 m."""
+    times = np.arange(0.0, 60.0, 0.1)
+    noise = np.random.default_rng(seed).normal(0.0, 1e-3, len(times))
+    log = SwingLog(times=times, values=noise, quantity="rate", load="hook")
+    with pytest.raises(InfeasibleProblem, match=r"shows no swing of this machine|does not come to rest"):
+        identify(preset_spec("bay-crane"), [log, *map(parse_reading, read)], ["L1"])
+
+
+def test_a_swing_of_the_size_of_its_noise_tells_the_rope():
+    spec, times = preset_spec("bay-crane"), np.arange(0.0, 60.0, 0.1)
+    true = {**spec.plant.parameters, "L1": 6.05}
+    exact = swing(true, times, [0.0015, 0.0015, 0.0, 0.0], (8.0,), "double-pendulum-crane")
+    noisy = exact + np.random.default_rng(0).normal(0.0, 1e-3, len(times))
+    log = SwingLog(times=times, values=noisy, quantity="angle", load="hook")
+    found = identify(spec, [log], ["L1"]).estimate
+    assert inside(found, true) and found.half_range["L1"] < 0.1
+
+
+@pytest.mark.parametrize(("per_rad", "refused"), [(1.0, False), (180.0 / np.pi, True)])
+def test_degrees_under_the_name_of_rad_are_named_before_anything_is_searched(per_rad, refused):
+    """The slow mode swings by 2 rad then; the fast one, for which it was taken, by less than 45°."""
+    spec, times = preset_spec("bay-crane"), np.arange(0.0, 60.0, 0.1)
+    exact = swing(spec.plant.parameters, times, [0.03, 0.03, 0.0, 0.0], (8.0,), "double-pendulum-crane")
+    log = SwingLog(times=times, values=per_rad * np.gradient(exact, times), quantity="rate", load="hook")
+    machine = SwingingMachine(plant=CRANE, parameters=spec.plant.parameters, q_a=(8.0,))
+    if not refused:
+        require_likely(swing_model(machine, log))
+        return
+    with pytest.raises(InfeasibleProblem, match=r"rad/s to either side, a swing of \d+°: look at its unit"):
+        identify(spec, [log], ["L1"])
 
 
 def hoist(**changed):

@@ -14,7 +14,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.studies.identification.fit import Fit, fit_of
 from gen_profile.studies.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.studies.identification.misfit import Misfit, elsewhere, explanations, misfits
-from gen_profile.studies.identification.swing_model import SwingingMachine, require_pace, swing_model
+from gen_profile.studies.identification.swing_model import SwingingMachine, require_likely, swing_model
 from gen_profile.studies.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.support.errors import InfeasibleProblem
 from gen_profile.support.phrase import AND, OR_WITH, Phrase, joined
@@ -23,6 +23,7 @@ from gen_profile.support.progress import Progress, no_progress
 CONFIDENCE = 0.99
 INITIAL_RESIDUAL_RATIO = 2.0  # times farther off at first, from which on the axes may still have moved then
 MISFIT_RATIO = 2.0  # times as far off a machine as off its own a log may be beside others
+SEEN = 100.0  # variances of its noise by which a swing of the machine makes up for a log
 GRAVITY = "g"  # is known wherever a crane stands
 
 
@@ -96,7 +97,7 @@ def estimate(
     """
     models = [swing_model(machine, log) for log in logs]
     for model in models:
-        require_pace(model)
+        require_likely(model)
     fit = fit_of(machine, names, readings, models)
     progress("fitting")
     try:
@@ -133,6 +134,7 @@ def _estimate(
     factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     progress("finding the ranges")
     half_ranges, lefts = around.half_ranges(factor), fit.left(unknowns)
+    _require_swings(fit, lefts, noise, misfit_of_logs)
     if len(lefts) > 1:
         _require_one_machine(fit, lefts)
 
@@ -152,6 +154,21 @@ def _estimate(
         rests_on=_rests_on(around),
         swings=tuple(one.log.values + left for one, left in zip(fit.models, lefts, strict=True)),
     )
+
+
+def _require_swings(
+    fit: Fit, lefts: Sequence[Array], noise: Array, misfit_of_logs: Sequence[Misfit | None]
+) -> None:
+    """Refuse a log that shows noise alone: some frequency always explains a little of that."""
+    for model, left, sigma, misfit in zip(fit.models, lefts, noise.tolist(), misfit_of_logs, strict=True):
+        zeros, values = model.zeros(), model.log.values
+        still = values - zeros @ np.linalg.lstsq(zeros, values)[0]
+        if misfit is None and still @ still - left @ left < SEEN * sigma**2:
+            template = (
+                "The log of {log.load} shows no swing of this machine, but noise of {noise:.2g} {log.unit} "
+                "RMS; look at its columns, signal and unit, and let the load swing wider."
+            )
+            raise InfeasibleProblem(template, log=model.log, noise=float(np.std(left)))
 
 
 def _require_one_machine(fit: Fit, lefts: Sequence[Array]) -> None:

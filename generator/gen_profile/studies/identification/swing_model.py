@@ -220,8 +220,8 @@ def swing_model(machine: SwingingMachine, log: SwingLog) -> SwingModel:
     return SwingModel(machine=machine, log=log, shown=shown, period=period)
 
 
-def require_pace(model: SwingModel) -> None:
-    """Refuse a log that swings many times slower or faster than its machine: its clock is wrong.
+def require_likely(model: SwingModel) -> None:
+    """Refuse a log that swings many times slower or faster than its machine, or too wide: a unit is wrong.
 
     A search from so far away takes minutes and finds nothing. Logs of few swings, or of many frequencies,
     are left to the fit.
@@ -235,13 +235,15 @@ def require_pace(model: SwingModel) -> None:
     values = np.interp(times, log.times, log.values)
     places = 2.0 * times / times[-1] - 1.0
     drift = np.polynomial.legendre.legfit(places, values, MOST_DRIFTS)
-    swinging = (values - np.polynomial.legendre.legval(places, drift)) * np.hanning(len(times))
-    power = np.square(np.abs(np.fft.rfft(swinging)))
+    swinging = values - np.polynomial.legendre.legval(places, drift)
+    power = np.square(np.abs(np.fft.rfft(swinging * np.hanning(len(times)))))
     peak = int(np.argmax(power))
     seen = 2.0 * np.pi * peak / float(times[-1])
     if peak < FEWEST_SWINGS or power[peak - 2 : peak + 3].sum() < CLEAR * power.sum():
         return
     if natural[0] / PACE <= seen <= PACE * natural[-1]:
+        mode = int(np.argmin(np.abs(np.log(natural / seen))))
+        _require_narrow(model.machine, log, float(np.sqrt(2.0) * np.std(swinging)), mode)
         return
     near = natural[0] if seen < natural[0] else natural[-1]
     template = (
@@ -266,15 +268,20 @@ def _require_swing(machine: SwingingMachine, log: SwingLog) -> None:
     """Refuse a log of swings that no machine makes: it is in another unit."""
     if log.quantity == "angle":
         require_angle(log.values)
-    linear = machine.linear
-    gains = _gain(machine, log) @ linear.modes
-    angles = _gain(machine, attrs.evolve(log, quantity="angle")) @ linear.modes
-    gains = gains * linear.frequencies ** DERIVATIVES.get(log.quantity, 0)
-    mode = int(np.argmax(np.abs(gains)))
     swing = float(np.ptp(log.values)) / 2.0
     if swing < AT_REST:
         template = "The log's {quantity} does not swing; look at its columns, and at when it begins (after)."
         raise InfeasibleProblem(template, quantity=log.quantity)
+    gains = _gain(machine, log) @ machine.linear.modes
+    shown = np.abs(gains * machine.linear.frequencies ** DERIVATIVES.get(log.quantity, 0))
+    _require_narrow(machine, log, swing, int(np.argmax(shown)))
+
+
+def _require_narrow(machine: SwingingMachine, log: SwingLog, swing: float, mode: int) -> None:
+    """Refuse a log of which a mode would swing wider than any load is let swing."""
+    linear = machine.linear
+    gains = _gain(machine, log) @ linear.modes * linear.frequencies ** DERIVATIVES.get(log.quantity, 0)
+    angles = _gain(machine, attrs.evolve(log, quantity="angle")) @ linear.modes
     angle = swing * abs(angles[mode] / gains[mode]) if gains[mode] else 0.0
     if angle > WIDEST_SWING:
         template = (
