@@ -1,6 +1,7 @@
 """The planner of the folder of blocks, within one that is called as today's planner block is."""
 
 from gen_profile.planner.design import planner_constants
+from gen_profile_exporters.planner.blocks.followed import motion
 from gen_profile_exporters.planner.blocks.texts import Sizes, operations, planner
 
 ISSUED = {
@@ -27,7 +28,8 @@ def played_text(spec, sizes=None):
     outputs = "\n".join(f"{name} : {type_};" for name, type_ in ISSUED.items())
     given = "\n".join(f"{name} := planner.{name};" for name in ISSUED)
     name = f"{constants.name.replace('-', '_')}_planner"
-    return f"""{planner(constants, sizes)}
+    text = motion(constants) if constants.rates else planner(constants, sizes)
+    return f"""{text}
 FUNCTION_BLOCK Played
 VAR_INPUT
     bEnable : BOOL; bExecute : BOOL; fTarget : LREAL; bStop : BOOL;
@@ -44,10 +46,10 @@ VAR
 END_VAR
 bBegin := bEnable AND NOT bOn;
 bOn := bEnable;
-IF bBegin THEN
+IF bBegin OR {str(bool(constants.rates)).upper()} THEN
     {taken}
-    nCommand := 0;
 END_IF;
+IF bBegin THEN nCommand := 0; END_IF;
 nBefore := nCommand;
 bNew := FALSE;
 IF bStop THEN

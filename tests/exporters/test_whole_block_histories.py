@@ -16,6 +16,7 @@ MACHINES = {
     "bay": lambda: preset_spec("bay-crane", []),
     "zones": lambda: preset_spec("bay-crane", ZONED),
     "gantry": lambda: parse_spec(GANTRY, [*ZONED, "export.cycle_time=0.004"]),
+    "hoisting": lambda: preset_spec("bay-crane", ["planner.live_rate={L1=0.3}", "check.uncertain={L1=0.01}"]),
 }
 
 

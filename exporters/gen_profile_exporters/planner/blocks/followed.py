@@ -3,19 +3,44 @@
 from itertools import product
 from math import factorial
 
+import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, SwayConstants
-from gen_profile_exporters.planner.blocks.texts import SIDES, constant_lines, filled, longest
+from gen_profile_exporters.planner.blocks.texts import (
+    SIDES,
+    Sizes,
+    constant_lines,
+    filled,
+    longest,
+    planner,
+)
 from gen_profile_exporters.playback.structured_text import literal
 
 SHARE = 0.5  # of the allowed sway, that motions may leave by stated errors
 FAST = 0.25  # of what a mode may leave, the next faster one may
 ENDS = (-1.0, 1.0)  # shares of the errors, of the machines that are watched
 LEFT_OUT = 1e-7  # of a mode, by the series of a slot or a cycle
+
+
+def motion(c: PlannerConstants) -> str:
+    """Write a planner of one axis whose rope changes on the way, behind the blocks that it has within it."""
+    return planner(_of_modes(c), Sizes(watched=ENDS), account_texts(c))
+
+
+def _of_modes(c: PlannerConstants) -> PlannerConstants:
+    """Give the constants that a planner of a rope that stays would have: all frequencies are wrong alike.
+
+    Of sways by modes it asks the shares only, of what may be left.
+    """
+    constant = 1.0 * ~c.exponents.any(axis=0)
+    errors = c.modes * [c.stated_error * constant]
+    sways = [FAST ** (2 * mode) * constant for mode in range(c.modes)]
+    model = np.vstack([c.model[: 2 * c.modes], *errors, *(len(c.axes) * sways)])
+    return attrs.evolve(c, model=model, sway_share=SHARE * c.sway_limit)
 
 
 def account_texts(c: PlannerConstants) -> str:
@@ -29,7 +54,9 @@ def account_texts(c: PlannerConstants) -> str:
         "sum": 2 * swings, "model_row": modes + modes**2, "step": max(3, 2 * modes), "machine": machines,
         "part": 6 * terms(c, _longest_slot(c)),
     }  # fmt: skip
+    of_account = _of_account(c)
     values: dict[str, str | int] = {
+        "follow_work": str(of_account.pop("cFollowWork")),
         "account": f"{name}_account",
         "rope_model": f"{name}_rope_model",
         **{f"last_{array}": length - 1 for array, length in lengths.items()},
@@ -40,7 +67,7 @@ def account_texts(c: PlannerConstants) -> str:
         "polygon": literal(float(np.cos(np.pi / SIDES))),
         "bounds": initialiser([literal(float(v)) for v in np.tile(_bounds(c), machines)]),
         "rope_constants": constant_lines(_of_rope(c)),
-        "live_constants": constant_lines(_of_account(c)),
+        "live_constants": constant_lines(of_account),
     }
     return "\n".join(filled(part, **values) for part in ("rope_model", "live_account"))
 

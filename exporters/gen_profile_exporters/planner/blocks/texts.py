@@ -9,7 +9,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE, PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent
@@ -88,8 +88,11 @@ def longest(constants: PlannerConstants) -> int:
     return max(FEWEST, min(LONGEST, operations(constants) * cycles // SLOT_WORK))
 
 
-def planner(constants: PlannerConstants, sizes: Sizes) -> str:
-    """Write a planner of one axis, behind the blocks that it has within it."""
+def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = None) -> str:
+    """Write a planner of one axis, behind the blocks that it has within it.
+
+    Its account may be another one: the text of that and all that it has within it.
+    """
     watched = sizes.of(constants)
     modes, swings = constants.modes, constants.modes * (1 + len(watched))
     name = constants.name.replace("-", "_")
@@ -125,7 +128,8 @@ def planner(constants: PlannerConstants, sizes: Sizes) -> str:
     return "\n".join(
         [
             linear_programme(names["linear_programme"], slots=slots, rows=rows),
-            *(filled(part, **values) for part in ("modes", "account", "planner")),
+            *([account] if account else (filled(part, **values) for part in ("modes", "account"))),
+            filled("planner", follows=int(account is not None), **values),
         ]
     )
 
@@ -143,7 +147,9 @@ def _shown(c: PlannerConstants, watched: Sequence[float]) -> list[int]:
 
 
 def _stop_share(c: PlannerConstants) -> float:
-    return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share) if c.sway_share else 1.0
+    if not c.sway_share or c.rates:
+        return 1.0
+    return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share)
 
 
 def _middle(c: PlannerConstants) -> tuple[Array, Array, Array]:
@@ -212,6 +218,7 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cJerk": [axis.jerk for axis in c.axes],
         "cStopShare": _stop_share(c),
         "cSwayLimit": c.sway_limit / len(c.axes),
+        "cCalmRoom": 2.0 * c.sway_limit if c.rates else 0.0,  # about a stop, to calm
     }
 
 
@@ -232,6 +239,14 @@ def _constant(value: object) -> str:
 
 
 def filled(part: str, **values: str | int) -> str:
-    """Read a block's text and put in what it leaves open, as ``@name``."""
-    text = (FOLDER / f"{part}.st").read_text("ascii")
+    """Read a block's text and put in what it leaves open, as ``@name``.
+
+    What stands between ``@where_follows`` and ``@end`` is for a rope that changes on the way, where
+    ``follows`` is given and not 0; between ``@where_stays`` and ``@end`` for one that does not.
+    """
+    follows = bool(values.get("follows"))
+    stated = {"follows": follows, "stays": not follows}
+    text = WHERE.sub(
+        lambda some: some[2] if stated.get(some[1], True) else "", (FOLDER / f"{part}.st").read_text("ascii")
+    )
     return re.sub(r"@([a-z_]+)", lambda hole: str(values[hole[1]]), text)

@@ -7,6 +7,7 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants
 from gen_profile_exporters.planner.block import (
     HOLD,
+    ROUNDING,
     STILL,
     WHERE,
     PlannerConstants,
@@ -14,6 +15,7 @@ from gen_profile_exporters.planner.block import (
     narrow,
     with_while_loops,
 )
+from gen_profile_exporters.planner.blocks import followed
 from gen_profile_exporters.planner.blocks.texts import (
     FOLDER,
     Sizes,
@@ -38,9 +40,10 @@ def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
     ExportError
         It asks for what these blocks do not do yet.
     """
-    if constants.rates or constants.sensor is not None:
-        raise ExportError("The blocks within blocks take neither live_rate nor a sensor, as yet.")
-    motion = _renamed(planner(constants, sizes or Sizes()), constants.name, block_name(constants.name))
+    if constants.sensor is not None:
+        raise ExportError("The blocks within blocks take no sensor, as yet.")
+    within = followed.motion(constants) if constants.rates else planner(constants, sizes or Sizes())
+    motion = _renamed(within, constants.name, block_name(constants.name))
     return around(motion, constants)
 
 
@@ -59,11 +62,12 @@ def _renamed(text: str, name: str, own: str) -> str:
     """Begin the names of the blocks of a motion as the own block's name, as vendors' formats ask."""
     before = name.replace("-", "_")
     text = re.sub(rf"\b{before}_planner\b", f"{own}_motion", text)
-    return re.sub(rf"\b{before}_(linear_programme|account|modes)\b", rf"{own}_\1", text)
+    return re.sub(rf"\b{before}_(linear_programme|account|modes|rope_model)\b", rf"{own}_\1", text)
 
 
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
-    stated = {"zones": c.zones, "events": c.events, "varied": c.stated_error > 0.0}
+    varied = c.stated_error > 0.0 and not c.rates
+    stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
     head = interface(c).replace(*TOLERANCE)
     head = re.sub(r"(?m)^(\s*bStop : BOOL;.*\n)", rf"\1{PROMPT}\n", head, count=1)
     body = WHERE.sub(
@@ -102,6 +106,8 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": list(c.drift) or [0.0],
     }
+    if c.rates:
+        common["cLiveStep"] = [(1.0 + ROUNDING) * c.rates.get(name, 0.0) * c.cycle for name in c.live]
     for axis in c.axes:
         own = {
             "cVelocity": axis.velocity,
