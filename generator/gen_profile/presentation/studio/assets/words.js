@@ -14,7 +14,7 @@ const words = (() => {
   function phrase(key, otherwise = key) {
     if (typeof key === "object") return numbers.sentence(told(key));
     const column = LANGUAGES.indexOf(language());
-    if (table.texts[key]) return table.texts[key][column];
+    if (table.texts[key]) return table.texts[key][column] ?? table.texts[key][0];
     if (column === 0) return otherwise;
     return numbers.sentence(table.messages[key] ?? otherwise);
   }
