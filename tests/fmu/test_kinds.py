@@ -22,6 +22,15 @@ CRANE = find_plant("double-pendulum-crane")
 OTHER = {"m1": 0.5, "m2": 0.1, "L1": 0.6, "L2": 0.25, "g": 9.7, "c1": 0.01, "c2": 0.02}
 TIMES = np.arange(0.0, 2.0001, 0.01)
 OUTPUTS = ("angle.hook", "angle.payload", "cart.position", "cart.velocity")
+STEPS = np.arange(101) * 0.02
+POSITIONS = 0.3 * np.sin(STEPS) ** 2  # setpoints in m, one a step
+
+
+def assert_swung(rows, tau, angles, carts):
+    """Hold angles and the cart's place after each setpoint to the oracle's."""
+    states, places = oracle.swing_in_steps(POSITIONS, 0.02, tau, OTHER)
+    np.testing.assert_allclose(rows[:, :2], states[:, :2], rtol=0.0, atol=angles)
+    np.testing.assert_allclose(rows[:, 2], places, rtol=0.0, atol=carts)
 
 
 def wave(time, order=0):
@@ -85,34 +94,26 @@ class TestModelExchange:
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_setpoints_takes_one_each_period(self, open_instance, tau):
         instance = open_instance("plant-setpoint", exchange=True)
-        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
         instance.begin({**OTHER, "tau": tau, "interpolation_period": 0.02})
 
         def next_setpoint(time):
             k = int(time / 0.02 + 1e-9)
-            instance.write({"cart.setpoint": positions[min(k + 1, 100)]})
+            instance.write({"cart.setpoint": POSITIONS[min(k + 1, 100)]})
 
-        times = np.arange(101) * 0.02
-        rows_out = exchange(instance, times, next_setpoint, OUTPUTS, 1e-3)
-        states, carts = oracle.swing_in_steps(positions, 0.02, tau, OTHER)
-        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
-        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-8)
+        rows_out = exchange(instance, STEPS, next_setpoint, OUTPUTS, 1e-3)
+        assert_swung(rows_out, tau, 1e-8, 1e-8)
 
     @pytest.mark.slow
     def test_of_velocities_holds_one_each_period_where_drives_are_ideal(self, open_instance):
         instance = open_instance("plant-velocity", exchange=True)
-        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
         instance.begin({**OTHER, "tau": 0.0, "interpolation_period": 0.02})
-        velocities = [*np.diff(positions) / 0.02, 0.0]
+        velocities = [*np.diff(POSITIONS) / 0.02, 0.0]
 
         def next_velocity(time):
             instance.write({"cart.setpoint_velocity": velocities[int(time / 0.02 + 1e-9)]})
 
-        times = np.arange(101) * 0.02
-        rows_out = exchange(instance, times, next_velocity, OUTPUTS, 1e-3)
-        states, carts = oracle.swing_in_steps(positions, 0.02, 0.0, OTHER)
-        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
-        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-8)
+        rows_out = exchange(instance, STEPS, next_velocity, OUTPUTS, 1e-3)
+        assert_swung(rows_out, 0.0, 1e-8, 1e-8)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_a_system(self, open_instance, tau):
@@ -235,34 +236,27 @@ class TestCosimulation:
     def test_of_velocities_that_ideal_drives_have_at_once(self, open_instance):
         """As interpolated setpoints: a velocity held over a step strikes the loads as its impulse."""
         instance = open_instance("plant-velocity", exchange=False)
-        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
         instance.begin({**OTHER, "tau": 0.0})
-        times, velocities = np.arange(101) * 0.02, np.diff(positions) / 0.02
+        velocities = np.diff(POSITIONS) / 0.02
         rows_out = cosimulate(
             instance,
-            times,
+            STEPS,
             lambda time, _: instance.write({"cart.setpoint_velocity": velocities[round(time / 0.02)]}),
             OUTPUTS,
         )
-        states, carts = oracle.swing_in_steps(positions, 0.02, 0.0, OTHER)
-        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-12)
+        assert_swung(rows_out, 0.0, 1e-9, 1e-12)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_setpoints(self, open_instance, tau):
         instance = open_instance("plant-setpoint", exchange=False)
-        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
         instance.begin({**OTHER, "tau": tau})
-        times = np.arange(101) * 0.02
         rows_out = cosimulate(
             instance,
-            times,
-            lambda _, end: instance.write({"cart.setpoint": positions[round(end / 0.02)]}),
+            STEPS,
+            lambda _, end: instance.write({"cart.setpoint": POSITIONS[round(end / 0.02)]}),
             OUTPUTS,
         )
-        states, carts = oracle.swing_in_steps(positions, 0.02, tau, OTHER)
-        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-12)
+        assert_swung(rows_out, tau, 1e-9, 1e-12)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     @pytest.mark.parametrize("step", [0.01, 0.07])
