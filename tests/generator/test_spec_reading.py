@@ -133,6 +133,12 @@ def test_an_artefact_in_place_of_a_spec_is_told_where_it_belongs(text):
         ("L1 = 6.0;", "; a comment begins with #."),
         ("L1 = 6.0 // rope", "; a comment begins with #."),
         ("type = tower-crane", "; a text stands in quotes."),
+        ("type = “tower-crane”", '; write the straight quotes of the keyboard, ".'),
+        ("type = „tower-crane“  # Turm", '; write the straight quotes of the keyboard, ".'),
+        ('axes = ["x", ‘y’]', '; write the straight quotes of the keyboard, ".'),
+        ("L1 =\u00a06.0", "; a space there is none of the keyboard's, type it again."),
+        ("L1\u2003= 6.0", "; a space there is none of the keyboard's, type it again."),
+        ("travel = [0, 1  #\u00a0m", "."),
         ("travel = [0, 1", "."),
     ],
 )

@@ -34,7 +34,9 @@ SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
     r"=\s*[A-Za-z_]": "; a text stands in quotes",
-}
+    "[=\\[,]\\s*[\u2018-\u201f\u00ab\u00bb]": '; write the straight quotes of the keyboard, "',
+    "^[^#]*[\u00a0\u2000-\u200b\u202f\u3000]": "; a space there is none of the keyboard's, type it again",
+}  # the last two are what word processors write
 
 # a move is stated one way, and so is what stands under it: the new way replaces the old one
 REPLACED: dict[tuple[str, str], Sequence[str]] = {
