@@ -48,13 +48,20 @@ class Token:
 
 
 def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
-    """Write a block: a value for every hole, by its name."""
-    return filled(
-        f"playback/text/layout_{layout}.st",
-        **_frame(layout, axes),
-        constants=_constants(layout, axes, {}),
-        **values,
-    )
+    """Write a block: a value for every hole, by its name.
+
+    Raises
+    ------
+    KeyError
+        One is missing, as where the values are of a file that was altered.
+    """
+    from jinja2 import UndefinedError  # noqa: PLC0415  # slow to import
+
+    frame = _frame(layout, axes) | {"constants": _constants(layout, axes, {})}
+    try:
+        return filled(f"playback/text/layout_{layout}.st", **frame, **values)
+    except UndefinedError as error:
+        raise KeyError(str(error)) from error
 
 
 def match(text: str, layout: str, axes: int) -> dict[str, Token]:
