@@ -44,6 +44,16 @@ def test_agrees_with_the_indirect_method(effort, tau, beta):
         assert one.costates[node] / size == pytest.approx(other.costates[node] / size, abs=1e-3)
 
 
+def test_programs_end_where_the_next_step_can_be_foreseen():
+    problem = crane_problem()
+    usual, exact = (
+        direct.solve(problem, options=options)
+        for options in (None, set_up.DirectOptions(step_tolerance=1e-10))
+    )
+    assert usual.residual > set_up.USUAL.step_tolerance > exact.residual
+    assert usual.raise_for_status().cost == pytest.approx(exact.raise_for_status().cost, rel=1e-11)
+
+
 def test_agrees_with_automatic_weights():
     problem = crane_problem(sway_scale=None)
     one, other = direct.solve(problem).raise_for_status(), indirect.solve(problem).raise_for_status()
