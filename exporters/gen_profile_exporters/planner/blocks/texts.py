@@ -125,11 +125,12 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "modes_constants": constant_lines(_of_modes(constants, watched)),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
     }
+    measured = "bMeasured := nQuiet < cQuiet," if account else ""
     return "\n".join(
         [
             linear_programme(names["linear_programme"], slots=slots, rows=rows),
             *([account] if account else (filled(part, **values) for part in ("modes", "account"))),
-            filled("planner", follows=int(account is not None), **values),
+            filled("planner", follows=int(account is not None), measured=measured, **values),
         ]
     )
 
@@ -218,8 +219,15 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cJerk": [axis.jerk for axis in c.axes],
         "cStopShare": _stop_share(c),
         "cSwayLimit": c.sway_limit / len(c.axes),
-        "cCalmRoom": 2.0 * c.sway_limit if c.rates else 0.0,  # about a stop, to calm
+        "cCalmRoom": _calm_room(c),
     }
+
+
+def _calm_room(c: PlannerConstants) -> float:
+    """Find in m how far from where a stop leads it may lead to calm a load."""
+    if c.sensor is not None:
+        return c.sensor.room
+    return 2.0 * c.sway_limit if c.rates else 0.0
 
 
 def constant_lines(constants: Mapping[str, object]) -> str:
