@@ -138,8 +138,88 @@ def _joint(q: Values, a: Values, k: SimpleNamespace) -> Posture:
     return Posture(inputs, drift, lambda: [k.L * (sx * cy), k.L * sy])
 
 
-# The same below a trolley at radius r of a jib that turns by α. In the jib's frame the load lies at (X, Y, Z)
-# and feels (r̈ − α̈ Y − 2 α̇ Ẏ − α̇² X, α̈ X + 2 α̇ Ẋ − α̇² Y) besides, here along both angles.
+# A hook block on a rope of length l = L0 + hoist, and a payload L2 below it, by Newton's law and the ropes'
+# pulls p, q of the hook's and the payload's mass: with the ropes' directions u and n, and s = m2/m1,
+#   hook: P̈ = −g e_z − p u + s q n − c u̇/(m1 l),   payload: R̈ = −g e_z − q n,
+# where u · (P̈ − T̈) = l̈ − l u̇² and n · (R̈ − P̈) = −L2 ṅ² give p = r + s κ q with κ = u · n, r = l u̇² − l̈ −
+# u · (T̈ + g e_z), and q (1 + s (u × n)²) = κ r + L2 ṅ² + c n · u̇/(m1 l). The angles follow along ∂u/∂θ.
+
+
+def _two_joints(q: Values, a: Values, k: SimpleNamespace) -> Posture:
+    upper, lower, length, s = _direction(q[:2]), _direction(q[2:]), k.L0 + a[2], k.m2 / k.m1
+    (u, ux, uy), (n, nx, ny), across = (
+        upper.vectors,
+        lower.vectors,
+        _cross(upper.vectors[0], lower.vectors[0]),
+    )
+    share = 1 / (1 + s * inner(across, across))
+
+    def bent(whirled: Scalar, swung: Scalar, carry: Values, drag: Values) -> list[Scalar]:
+        """Give angles' accelerations but for their own whirling: `carry` is T̈ + g e_z, `drag` c u̇/(m1 l)."""
+        r = whirled - inner(u, carry)
+        pull = share * (inner(u, n) * r + swung + inner(n, drag))
+        hook = [s * pull * one - other - third for one, other, third in zip(n, carry, drag, strict=True)]
+        below = [(r + s * inner(u, n) * pull) * one + other for one, other in zip(u, drag, strict=True)]
+        ways = (
+            (ux, hook, length, upper.cy),
+            (uy, hook, length, 1),
+            (nx, below, k.L2, lower.cy),
+            (ny, below, k.L2, 1),
+        )
+        return [inner(way, force) / (size * cosine * cosine) for way, force, size, cosine in ways]
+
+    def drift(dq: Values, v: Values) -> list[Scalar]:
+        rate, rate_below = (
+            [dq[i] * one + dq[i + 1] * other for one, other in zip(*of.vectors[1:], strict=True)]
+            for i, of in ((0, upper), (2, lower))
+        )
+        drag = [k.c / (k.m1 * length) * one for one in rate]
+        whirled, swung = length * inner(rate, rate), k.L2 * inner(rate_below, rate_below)
+        rows = bent(whirled, swung, [0, 0, k.g], drag)
+        own = [
+            *(
+                2 * v[2] / length * one - other
+                for one, other in zip(dq[:2], upper.whirl(dq[:2]), strict=True)
+            ),
+            *(-one for one in lower.whirl(dq[2:])),
+        ]
+        return [one - other for one, other in zip(rows, own, strict=True)]
+
+    pushes = [
+        bent(0, 0, [1, 0, 0], [0, 0, 0]),
+        bent(0, 0, [0, 1, 0], [0, 0, 0]),
+        bent(-1, 0, [0, 0, 0], [0, 0, 0]),
+    ]
+    hook = [-(length * u[0]), -(length * u[1])]
+    return Posture(
+        [list(row) for row in zip(*pushes, strict=True)],
+        drift,
+        lambda: [*hook, hook[0] - k.L2 * n[0], hook[1] - k.L2 * n[1]],
+    )
+
+
+@dataclass(frozen=True)
+class _Direction:
+    """Direction of a rope and its derivatives by two angles, the cosine of the second, and whirling."""
+
+    vectors: tuple[Values, Values, Values]
+    cy: Scalar
+    whirl: Callable[[Values], list[Scalar]]
+
+
+def _direction(angles: Values) -> _Direction:
+    (sx, cx), (sy, cy) = map(sine_cosine, angles)
+    vectors = ([-(sx * cy), -sy, -(cx * cy)], [-(cx * cy), 0, sx * cy], [sx * sy, -cy, cx * sy])
+    return _Direction(vectors, cy, lambda dq: [2 * (sy / cy * dq[0] * dq[1]), -(sy * cy * dq[0] * dq[0])])
+
+
+def _cross(one: Values, other: Values) -> list[Scalar]:
+    (a, b, c), (d, e, f) = one, other
+    return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+# One rope on a joint below a trolley at radius r of a jib that turns by α. In the jib's frame the load lies
+# at (X, Y, Z) and feels (r̈ − α̈ Y − 2 α̇ Ẏ − α̇² X, α̈ X + 2 α̇ Ẋ − α̇² Y) besides, here along both angles.
 
 
 def _jib(q: Values, a: Values, k: SimpleNamespace) -> Posture:
@@ -230,6 +310,11 @@ MACHINES: Mapping[str, Machine] = {
     "double-pendulum-crane": _machine("cart, theta1 theta2, hook payload, payload", 1, _two_ropes),
     "single-pendulum-crane": _machine("cart hoist, phi, payload, payload", 1, _one_rope),
     "gantry-crane": _machine(f"x y, {_JOINT}", 2, _joint),
+    "hall-crane": _machine(
+        "x y hoist, theta1_x theta1_y theta2_x theta2_y, hook-x hook-y payload-x payload-y, load",
+        2,
+        _two_joints,
+    ),
     "tower-crane": _machine(f"slew trolley, {_JIB}", 2, _jib),
     "flexible-joint": _machine("hub, alpha, tip, tip", 1, _arm),
     "slosh-tank": _machine("tank, theta1 theta2, surface, surface", 1, _liquid, _tank),

@@ -32,6 +32,18 @@ def gantry(q, p):
     return [(p.m, place)], 0.0
 
 
+def hall(q, p):
+    ax, ay, bx, by, x, y, hoist = q
+    rope = p.L0 + hoist
+    hook = [x - rope * np.sin(ax) * np.cos(ay), y - rope * np.sin(ay), -rope * np.cos(ax) * np.cos(ay)]
+    payload = [
+        hook[0] - p.L2 * np.sin(bx) * np.cos(by),
+        hook[1] - p.L2 * np.sin(by),
+        hook[2] - p.L2 * np.cos(bx) * np.cos(by),
+    ]
+    return [(p.m1, hook), (p.m2, payload)], 0.0
+
+
 def tower(q, p):
     a, b, slew, radius = q
     along, across = radius - p.L * np.sin(a) * np.cos(b), -p.L * np.sin(b)
@@ -93,6 +105,7 @@ MACHINES = {
     ),
     "single-pendulum-crane": (single_pendulum, lambda q, dq, p: 0.5 * p.c * dq[0] ** 2, ("c",)),
     "gantry-crane": (gantry, rope_dissipation, ("c",)),
+    "hall-crane": (hall, rope_dissipation, ("c",)),
     "tower-crane": (tower, rope_dissipation, ("c",)),
     "flexible-joint": (flexible_joint, lambda q, dq, p: 0.5 * p.c * dq[0] ** 2, ("c",)),
     "mass-spring-chain-1": (chain, chain_dissipation, ("c1",)),

@@ -14,6 +14,7 @@ LENGTHS = {
     "double-pendulum-crane": {"L1", "L2"},
     "flexible-joint": {"R"},
     "gantry-crane": {"L"},
+    "hall-crane": {"L0 + hoist", "L2"},
     "mass-spring-chain-2": set(),
     "single-pendulum-crane": {"L0 + hoist"},
     "slosh-tank": {"a"},

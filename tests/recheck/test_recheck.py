@@ -33,6 +33,7 @@ KINDS = [
     "double-pendulum-crane",
     "single-pendulum-crane",
     "gantry-crane",
+    "hall-crane",
     "tower-crane",
     "flexible-joint",
     "slosh-tank",

@@ -55,14 +55,21 @@ def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     )
 
 
-def picture(pose: Pose) -> tuple[Drawing, ...]:
-    """Draw trolley and load from the side, along x, and with the bridge from above."""
-    x, y = pose.q_a.T
+def picture(pose: Pose, side: slice = slice(0, 1)) -> tuple[Drawing, ...]:
+    """Draw trolley and loads from the side, along x, and the end load with the bridge from above.
+
+    Parameters
+    ----------
+    pose : Pose
+    side : slice
+        Which of the outputs are seen from the side.
+    """
+    x, y = pose.q_a.T[:2]
     size = pose.size
     (left, right), (near, far) = travel(x, 3.0 * size), travel(y, 3.0 * size)
 
     def above(pose: Pose) -> Array:
-        (x, y), (sway_x, sway_y) = pose.q_a.T, pose.loads()[0]
+        (x, y), (sway_x, sway_y) = pose.q_a.T[:2], pose.loads()[0][-2:]
         return stacked(
             (left, near),
             (right, near),
@@ -76,7 +83,7 @@ def picture(pose: Pose) -> tuple[Drawing, ...]:
         )
 
     return (
-        hanging("from the side", pose, trolley=level, columns=slice(0, 1)),
+        hanging("from the side", pose, trolley=level, columns=side),
         drawn(
             "from above",
             pose,

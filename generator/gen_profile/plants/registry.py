@@ -15,7 +15,7 @@ from gen_profile.support.plugins import CURE, load_plugin
 
 # a machine's module is named after its type, and loads only when it is asked for
 BUILT_IN = (
-    *("double-pendulum-crane", "flexible-joint", "gantry-crane"),
+    *("double-pendulum-crane", "flexible-joint", "gantry-crane", "hall-crane"),
     *("single-pendulum-crane", "slosh-tank", "tower-crane"),
 )
 FAMILIES = {"mass-spring-chain": 2}  # whose module has a `member` of each number; one of them to show
