@@ -83,7 +83,7 @@ def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNam
     aslant, inline = _cross(u, n), _dot(u, n)
     share = 1.0 / (1.0 + ratio * _dot(aslant, aslant))
 
-    def turned(
+    def swung(
         carry: Vector, tight: Scalar = 0.0, tight_below: Scalar = 0.0, drag: Vector = NOTHING
     ) -> list[Scalar]:
         """Give e_i · (P̈ − T̈) and f_i · (R̈ − P̈) for T̈ + g e_z, u · (P̈ − T̈), n · (R̈ − P̈) and F."""
@@ -94,18 +94,18 @@ def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNam
         return [*(_dot(e, hook) for e in upper.along), *(_dot(f, below) for f in lower.along)]
 
     drag = [p.c / (p.m1 * length) * one for one in upper.rate]
-    forced = turned(NOTHING, length * _dot(upper.rate, upper.rate), p.L2 * _dot(lower.rate, lower.rate), drag)
+    forced = swung(NOTHING, length * _dot(upper.rate, upper.rate), p.L2 * _dot(lower.rate, lower.rate), drag)
     coriolis = [2.0 * paid_out * size * rate for size, rate in zip(upper.inertia, dq_u[:2], strict=True)]
     own = [
         *(length * one + two for one, two in zip(upper.whirl, coriolis, strict=True)),
         *(p.L2 * one for one in lower.whirl),
     ]
     sizes = [*(length * one for one in upper.inertia), *(p.L2 * one for one in lower.inertia)]
-    pushes = (turned((1.0, 0.0, 0.0)), turned((0.0, 1.0, 0.0)), turned(NOTHING, -1.0))
+    pushes = (swung((1.0, 0.0, 0.0)), swung((0.0, 1.0, 0.0)), swung(NOTHING, -1.0))
     return Equations(
         M_uu=[[size if row == column else 0.0 for column in range(4)] for row, size in enumerate(sizes)],
         M_au=[[-one for one in push] for push in pushes],
-        K_u=turned((0.0, 0.0, p.g)),
+        K_u=swung((0.0, 0.0, p.g)),
         G_u=[one - other for one, other in zip(forced, own, strict=True)],
     )
 
