@@ -97,10 +97,10 @@ def test_a_swing_that_nobody_computed_is_damped(spec, compiled, rope, delay, pha
     swung = crane(compiled, rope, swing=(0.5, phase))
     run = {"noise": 0.002, "offset": 0.005, "delay": delay, "random": np.random.default_rng(1)}
     issued = swung.run(30.0, **run)
-    begins = int(np.argmax(issued["fVelocity"] != 0.0))
-    assert 0 < begins * CYCLE < 4.0
+    start = int(np.argmax(issued["fVelocity"] != 0.0))
+    assert 0 < start * CYCLE < 4.0
     above = np.flatnonzero(np.abs(issued["sway"]) > 0.05)[-1]
-    assert (above - begins) * CYCLE <= 6.5
+    assert (above - start) * CYCLE <= 6.5
     assert np.abs(issued["sway"][-2500:]).max() <= 0.015
     assert np.abs(issued["fPosition"] - STANDS).max() <= 1.25 * 0.5
     assert not issued["fVelocity"][-1500:].any()
@@ -116,9 +116,9 @@ def test_a_swing_is_damped_on_the_way_to_a_target_which_is_reached(spec, compile
     run = {"noise": 0.002, "offset": 0.005, "random": np.random.default_rng(2)}
     swung.run(2.6, **run)
     issued = swung.run(40.0, bExecute=1.0, fTarget=28.0, **run)
-    begins = round(2.6 / CYCLE)
+    start = round(2.6 / CYCLE)
     rests = np.flatnonzero(issued["bMoving"])[-1]
-    assert (rests - begins) * CYCLE <= 20.0
+    assert (rests - start) * CYCLE <= 20.0
     assert issued["fPosition"][-1] == pytest.approx(28.0, abs=1e-9)
     assert np.abs(issued["sway"][-2500:]).max() <= 0.02
 
@@ -157,8 +157,8 @@ def test_a_swing_is_damped_while_the_rope_changes(spec, rate, phase):
         before = out["fAcceleration"]
         rows.append((out["fVelocity"], swung.sway))
     velocity, sway = np.array(rows).T
-    begins = int(np.argmax(velocity != 0.0))
+    start = int(np.argmax(velocity != 0.0))
     above = np.flatnonzero(np.abs(sway) > 0.05)[-1]
-    assert (above - begins) * CYCLE <= 7.0
+    assert (above - start) * CYCLE <= 7.0
     assert np.abs(sway[-2500:]).max() <= 0.02
     assert not velocity[-1000:].any()

@@ -1,7 +1,7 @@
 """The whole block of the folder of blocks under the histories of today's proof, judged by its verdicts."""
 
 import pytest
-from generator.planned_machines import GANTRY
+from generator.planned_machines import GANTRY, HOIST
 from test_whole_block import whole_text
 
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
@@ -12,11 +12,19 @@ from gen_profile.spec.reading import parse_spec, preset_spec
 pytestmark = pytest.mark.slow
 KNOWN = ("the stated ends of a stop are wider",)  # of a stick that led to the end of the gantry's travel
 ZONED = ["planner.zones=true", "planner.events=true"]
+PAPER = [
+    "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
+    *("planner.live={L1=[0.3, 0.6]}", "planner.live_rate={L1=0.05}", "plant.c1=0.0", "plant.c2=0.0"),
+    *("check.residual_sway=0.01", "check.uncertain={L1=0.01}"),
+]
 MACHINES = {
     "bay": lambda: preset_spec("bay-crane", []),
     "zones": lambda: preset_spec("bay-crane", ZONED),
     "gantry": lambda: parse_spec(GANTRY, [*ZONED, "export.cycle_time=0.004"]),
     "hoisting": lambda: preset_spec("bay-crane", ["planner.live_rate={L1=0.3}", "check.uncertain={L1=0.01}"]),
+    "hoisting gantry": lambda: parse_spec(GANTRY, ["planner.live_rate={L=0.1}", "export.cycle_time=0.004"]),
+    "hoist of its own": lambda: parse_spec(HOIST, ["planner.live_rate={hoist=0.1}"]),
+    "quick hoisting": lambda: preset_spec("paper", PAPER),
 }
 
 
