@@ -24,7 +24,6 @@ BETWEEN = 1.2  # times that, of machines between both ends of the errors, which 
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 MACHINES = 16  # that are watched, where there are operations for them:
 SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
-WIDE = 0.06  # of a slow swing's turn: as errors turn a swing so much, one machine more on each side has rows
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
 
@@ -97,7 +96,7 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
     modes, swings = constants.modes, constants.modes * (1 + len(watched))
     name = constants.name.replace("-", "_")
     names = {part: f"{name}_{part}" for part in ("linear_programme", "account", "modes", "planner")}
-    shown = _shown(constants, watched)
+    shown = [*range(2 * modes), *range(swings - modes, swings)]  # as given, and both ends of the errors
     rows, slots = 2 * len(shown) + 1, longest(constants)  # those of the swings, and a target's way
     plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
     share = (constants.sway_share or LEAST_SHARE * constants.sway_limit) / len(constants.axes)
@@ -135,35 +134,10 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
     )
 
 
-def _shown(c: PlannerConstants, watched: Sequence[float]) -> list[int]:
-    """Swings that a programme has rows of: the machine as given, the errors' ends, and some between."""
-    ends, watches = (0, 1, len(watched)), np.array(watched)
-    shown = [c.modes * machine + mode for machine in ends for mode in range(c.modes)]
-    frequencies, errors, _ = _middle(c)
-    for mode, turn in enumerate(errors * frequencies / frequencies[0]):
-        between = np.linspace(0.0, 1.0, int(turn / WIDE) + 2)[1:-1]
-        nearest = [int(np.argmin(np.abs(watches - share))) for share in (*-between, *between)]
-        shown += [c.modes * (1 + machine) + mode for machine in nearest]
-    return list(dict.fromkeys(shown))
-
-
 def _stop_share(c: PlannerConstants) -> float:
     if not c.sway_share or c.rates:
         return 1.0
     return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share)
-
-
-def _middle(c: PlannerConstants) -> tuple[Array, Array, Array]:
-    """Frequencies of the modes, the shares by which errors change them, and sways, amid the live ranges."""
-    modes, lives = c.modes, len(c.live)
-    middles = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
-    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in middles])
-    exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
-    terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
-    squares, _, errors, sways = (c.model @ terms)[: 4 * modes].reshape(4, modes)
-    if modes == 2:  # from their sum and product
-        squares = np.sort(np.roots([1.0, -squares[0], squares[1]]).real)
-    return np.sqrt(squares), errors, sways
 
 
 def _shares(c: PlannerConstants) -> Array:
@@ -171,9 +145,14 @@ def _shares(c: PlannerConstants) -> Array:
 
     By what they change itself, a mode that counts little would be bound as much as if it were to be at rest.
     """
-    _, errors, sways = _middle(c)
+    modes, lives = c.modes, len(c.live)
+    middles = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
+    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in middles])
+    exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
+    terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
+    errors, sways = (c.model @ terms)[2 * modes : 4 * modes].reshape(2, modes)
     roots = np.sqrt(np.maximum(errors * sways, 0.0))
-    return np.asarray(roots / roots.sum()) if roots.any() else np.full(c.modes, 1.0 / c.modes)
+    return np.asarray(roots / roots.sum()) if roots.any() else np.full(modes, 1.0 / modes)
 
 
 def _of_modes(c: PlannerConstants, watched: Sequence[float]) -> dict[str, object]:
@@ -208,7 +187,7 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cFuture": plan + 4,
         "cOwnWork": 80,  # operations of every cycle
         "cFoundWork": 250
-        + 5 * slots
+        + 8 * slots
         + 15 * swings,  # operations where a programme is found, and the next begins
         "cReserve": 150 + 11 * plan + 30 * swings,  # operations where a plan was found
         "cSlotWork": 650 + rows * (rows + 10),  # operations of an iteration, for each slot
