@@ -14,7 +14,8 @@ from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.assurance.proof.obedience import WORDS
 from gen_profile.assurance.proof.orders import POSITION
 from gen_profile.assurance.proof.prove import prove
-from gen_profile.assurance.proof.sensing import FAULTS, JUMP, Gust, sensor_faults
+from gen_profile.assurance.proof.sensing import FAULTS, JUMP, Gust
+from gen_profile.assurance.proof.sensor_use import sensor_faults
 from gen_profile.assurance.proof.verdict import kind_of
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block

@@ -20,7 +20,7 @@ from gen_profile.assurance.proof.histories import SHIFT, SLOWEST, Histories, His
 from gen_profile.assurance.proof.judging import WatchedRun, judge_run
 from gen_profile.assurance.proof.left_swinging import GivenModes
 from gen_profile.assurance.proof.numbering import Numbering
-from gen_profile.assurance.proof.sensing import sensor_faults
+from gen_profile.assurance.proof.sensor_use import sensor_faults
 from gen_profile.assurance.proof.verdict import JudgedHistory
 from gen_profile.assurance.proof.watching import BlockWatch
 from gen_profile.dynamics.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL

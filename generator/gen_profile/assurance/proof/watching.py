@@ -227,18 +227,28 @@ class BlockWatch:
             steps=steps,
             speeds=speeds,
         )
-        if run.copies is None:
-            return followed, {}
+        return followed, self._reactions(followed, script, expected, block, run)
+
+    def _reactions(
+        self,
+        followed: Followed,
+        script: Script,
+        expected: Sequence[TimedOrder],
+        block: CalledBlock,
+        run: BlockRun,
+    ) -> dict[int, int | None]:
+        """Tell how many cycles after orders a setpoint came that would not have come without them."""
+        if run.copies is None or run.trace is None:
+            return {}
         ends = {order.begin: order.end for order in followed.orders}
         places = [self.outputs.index(name) for axis in block.axes for name in axis]
-        reactions = {
+        return {
             mark: self._first_difference(
                 script, block, memory, run.trace[:, places], begin=mark, end=ends[mark]
             )
             for mark, memory in zip(self.marks(expected), run.copies, strict=True)
             if mark in ends
         }
-        return followed, reactions
 
     def _facts(self, issued: Mapping[str, Array]) -> Facts:
         position, velocity, acceleration, low, high = (
