@@ -15,7 +15,6 @@ from gen_profile_fmu.running.block_run import BlockRun
 
 NOTICED = ("silent", "away", "no number", "out of range")  # others are noticed where they do harm
 SHOW_NOTHING = ("frozen",)  # from the first value on, and nothing is promised then
-HARM = 3.5  # of the stated swing: what a load may be left with by a sensor that fails
 TAKEN_UP = 5  # cycles, in which the block shows that it has taken up a command
 
 
@@ -125,7 +124,8 @@ def _faults_of_a_faulty_one(
     if not known and not run.promise and one.fault not in SHOW_NOTHING:
         yield f"the sensor's fault is neither noticed nor harmless ({one.fault}, at {one.fails:.2f} s)"
     swings = float(np.abs(sway[round(one.fails / cycle) :]).max(initial=0.0))
-    if swings > HARM * min(disturbance.swing.values()):
+    # what swung as it failed, and an axis once led from one end of its room for damping to the other
+    if swings > min(disturbance.swing.values()) + 2.0 * damping_room(spec):
         yield f"a faulty sensor ({one.fault}) makes the load swing by {swings:.3g} m, at {one.fails:.2f} s"
     if one.fault == "away" and refused[-1]:
         yield f"a sensor that is back is not used again, from {one.fails:.2f} s"
