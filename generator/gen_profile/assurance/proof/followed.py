@@ -241,6 +241,11 @@ class Followed:
             if zone.axis == axis and zone.limit and zone.low < high and zone.high > low
         ]
 
+    @cached_property
+    def damped(self) -> Flags:
+        """Whether what sensors show is damped, of any axis, (cycles,)."""
+        return self.sensed("bDamping")
+
     def sensed(self, name: str) -> Flags:
         """Tell when an output of a block with sensors is set, of any axis; never of one without."""
         outputs = [name, *(axis.of(name) for axis in self.axes)]

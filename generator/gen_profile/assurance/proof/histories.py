@@ -6,6 +6,7 @@ hypercube, corners are choices of 0 and 1, and a search moves through the same c
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from itertools import islice, product
 from math import ceil, inf, isfinite
 from typing import Any, Self
@@ -405,12 +406,11 @@ class Histories:
             yield Change(time=0.0, lasts=inf, inputs=zone)
 
     def _surroundings(self, *, rough: int) -> Surroundings:
-        speeds = tuple(self._velocity(number) for number in self.axes)
         return Surroundings(
             cycle=self.spec.export.cycle_time,
             period=self.period,
-            targets=tuple(target_range(self.spec, number) for number in self.axes),
-            speeds=tuple((-speed, speed) for speed in speeds),
+            targets=self._targets,
+            speeds=tuple((-speed, speed) for speed in self._speeds),
             suffixes=tuple(axis.suffix for axis in self.axes.values()),
             live=self.spec.planner.live,
             hoists=bool(self.spec.planner.live_rate),
@@ -426,24 +426,28 @@ class Histories:
         if choice < 0.75:
             return attrs.evolve(command, override=between((SLOWEST, 1.0), 4.0 * choice - 2.0))
         fraction = between((SLOWEST, 1.0), 4.0 * choice - 3.0)
-        return attrs.evolve(command, velocity_limits=tuple(fraction * self._velocity(k) for k in self.axes))
+        return attrs.evolve(command, velocity_limits=tuple(fraction * speed for speed in self._speeds))
 
     def _command(self, time: float, which: int, values: Sequence[float]) -> Command:
         match which:
             case 0:
-                targets = (target_range(self.spec, number) for number in self.axes)
-                places = (between(ends, widened(v)) for ends, v in zip(targets, values, strict=True))
+                places = (between(ends, widened(v)) for ends, v in zip(self._targets, values, strict=True))
                 return Command(time=time, command="position", values=tuple(places))
             case 1:
-                ends = ((-self._velocity(number), self._velocity(number)) for number in self.axes)
+                ends = ((-speed, speed) for speed in self._speeds)
                 speeds = (between(own, self._stick(v)) for own, v in zip(ends, values, strict=True))
                 return Command(time=time, command="velocity", values=tuple(speeds))
         return Command(time=time, command="stop")
 
-    def _velocity(self, axis: int) -> float:
-        limit = self.spec.limits.of(axis).velocity
-        assert limit
-        return limit
+    @cached_property
+    def _speeds(self) -> tuple[float, ...]:
+        """Of the axes, the greatest in m/s."""
+        return tuple(self.spec.limits.of(number).velocity or 0.0 for number in self.axes)
+
+    @cached_property
+    def _targets(self) -> tuple[tuple[float, float], ...]:
+        """Ranges of each axis's targets in m."""
+        return tuple(target_range(self.spec, number) for number in self.axes)
 
     def _stick(self, choice: float) -> float:
         """Choose a share from end to end; of several axes, each is left alone now and then."""

@@ -113,7 +113,7 @@ def _sticks(run: Followed) -> Iterator[Allowance]:
             continue
         if run.issued["fTimeToGo"][begin - 1] > 0.0:
             continue  # a motion has just begun
-        if before.kind == VELOCITY or run.sensed("bDamping")[begin - 1 : end].any():
+        if before.kind == VELOCITY or run.damped[begin - 1 : end].any():
             continue  # its last tap still counts, or what was measured
         for k, way in enumerate(run.way[:, begin].tolist()):
             velocity = run.velocity[k, begin:end]

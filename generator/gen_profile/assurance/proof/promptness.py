@@ -168,14 +168,20 @@ def lost(run: Followed) -> Iterator[Allowance]:
         if since < 0:
             continue
         since = order.begin if order.kind == POSITION else since
-        allowed = NEVER * in_time(run, axes_alone(run, order, since), 1 + int(_moves(run, since)))
-        if order.kind == POSITION and run.sensed("bDamping")[order.begin : order.end].any():
-            allowed += run.settle
-        lasts = (order.end if first is None else first) - since
-        yield Allowance(order.kind, order.begin, lasts * run.cycle, allowed)
+        lasts = ((order.end if first is None else first) - since) * run.cycle
+        if lasts > NEVER * in_time(run, 0.0):  # else it is not late for any axes
+            yield _held(run, order, since, lasts)
         if order.kind == POSITION and first is not None:
             again = to_speeds(run, np.array([own.velocity for own in run.limits]))
             yield from _left(run, (first, order.end), NEVER * in_time(run, again, 2))
+
+
+def _held(run: Followed, order: TimedOrder, since: int, lasts: float) -> Allowance:
+    """Measure for how many s a command held until it was obeyed, or ended."""
+    allowed = NEVER * in_time(run, axes_alone(run, order, since), 1 + int(_moves(run, since)))
+    if order.kind == POSITION and run.damped[order.begin : order.end].any():
+        allowed += run.settle
+    return Allowance(order.kind, order.begin, lasts, allowed)
 
 
 def _timed(run: Followed, order: TimedOrder, swings: Complex | None) -> Iterator[Obeyed]:
@@ -242,10 +248,10 @@ def _fulfilled(run: Followed, order: TimedOrder) -> tuple[int, int | None]:
         case _:
             there = run.stands[own] | _damped_at_rest(run)[own]
     obeyed_at = begin + int(np.argmax(there)) if there.any() else None
-    if order.kind == POSITION:  # it counts from when the way was last damped
-        latest = begin + run.after(in_time(run, axes_alone(run, order, begin), 2) + run.settle)
-        damped = np.flatnonzero(run.sensed("bDamping")[begin : min(obeyed_at or end, latest)])
-        since += int(damped.max(initial=0))
+    damped = np.flatnonzero(run.damped[begin : obeyed_at or end])
+    if order.kind == POSITION and len(damped):  # it counts from when the way was last damped
+        latest = run.after(in_time(run, axes_alone(run, order, begin), 2) + run.settle)
+        since += int(damped[damped < latest].max(initial=0))
     return min(since, end - 1), obeyed_at
 
 
@@ -266,7 +272,7 @@ def _reached(run: Followed, axis: int, wanted: float, own: slice) -> tuple[int, 
 def _damped_at_rest(run: Followed) -> Flags:
     """Tell when a load is damped since its axes stood."""
     at_rest = np.zeros(run.cycles, dtype=bool)
-    for begin, end in runs_of(run.sensed("bDamping")):
+    for begin, end in runs_of(run.damped):
         at_rest[begin:end] = run.stands[max(0, begin - 1)]
     return at_rest
 
@@ -274,7 +280,7 @@ def _damped_at_rest(run: Followed) -> Flags:
 def _left(run: Followed, cycles: tuple[int, int], arriving_again: float) -> Iterator[Allowance]:
     """Judge that a target is left but to damp what was measured, and then reached again."""
     first, last = cycles
-    damps, away = run.sensed("bDamping"), run.away[first:last]
+    damps, away = run.damped, run.away[first:last]
     for begin, end in runs_of(away > max(EXACT, run.wander)):
         damped = np.flatnonzero(damps[first + begin : first + end])
         if damped.size and damped[0] <= 1:

@@ -70,7 +70,7 @@ def truths(run: Followed) -> Iterator[Allowance]:
     yield from never("vanished", received.holds & run.goes & ~busy & ~done)
     if not run.reserve:  # calming goes on as long as it must
         yield from _lasting(run, "not done", there & ~done)
-        asked = received.holds & run.goes | run.sensed("bDamping")
+        asked = received.holds & run.goes | run.damped
         yield from _lasting(run, "not busy", busy & run.stands & ~asked)
 
 
@@ -100,7 +100,7 @@ def numbers(run: Followed) -> Iterator[Allowance]:
     time, slot = run.issued["fTimeToGo"], 2.0 * run.cycle
     for order in run.orders:
         moving = np.flatnonzero(~run.stands[order.begin : order.end])
-        if not len(moving) or run.sensed("bDamping")[order.begin : order.end].any():
+        if not len(moving) or run.damped[order.begin : order.end].any():
             continue
         rests = order.begin + int(moving[-1]) + 1
         if rests + 1 >= order.end or not _is_end(run, order, rests):  # another may begin in that cycle
@@ -146,7 +146,7 @@ def promises(run: Followed) -> Iterator[Allowance]:
     yield from never("lost", (why == 3.0) & ready)
     stated = run.issued.get("fSwayLeft", np.zeros(run.cycles))
     yield from never("lost", (why == ADDED_UP) & (stated <= run.sway_limit))
-    yield from never("kept", promise & ((stated > run.sway_limit) | run.sensed("bDamping")))
+    yield from never("kept", promise & ((stated > run.sway_limit) | run.damped))
     may_be, must_be = _unknown(run)
     yield from never("lost", (why == 2.0) & ~may_be)
     yield from never("kept", promise & must_be)
@@ -251,7 +251,7 @@ def stops(run: Followed) -> Iterator[Allowance]:
     targets = list[tuple[float, ...]]()
     for order in run.orders:
         if order.kind in (POSITION, VELOCITY) and not run.reserve:  # else it may be calmed beyond
-            yield from _within_travel(run, slice(order.begin, order.end))
+            yield from _within_travel(run, slice(order.begin, order.end), low, high)
         # the ends that an interlock saw as it stopped the axis
         begin = max(0, order.begin - (order.kind in (STOP, VELOCITY)))
         own = slice(begin, order.end)
@@ -309,18 +309,16 @@ def _asked(run: Followed, order: TimedOrder, own: slice) -> Array:
     return asked
 
 
-def _within_travel(run: Followed, own: slice) -> Iterator[Allowance]:
+def _within_travel(run: Followed, own: slice, lows: Array, highs: Array) -> Iterator[Allowance]:
     """Measure how far stated ends of a stop lie beyond the travel, and axes beyond the targets' range."""
     since = slice(max(0, own.start - 1), own.stop)
-    for k, (low, high, limits) in enumerate(
-        zip(run.of("fStopLow"), run.of("fStopHigh"), run.limits, strict=True)
-    ):
+    for k, (low, high, limits) in enumerate(zip(lows, highs, run.limits, strict=True)):
         first, last = limits.targets[0] - limits.margin, limits.targets[1] + limits.margin
-        place, beyond = run.position[k, own], np.maximum(first - low, high - last)[since]
+        place, beyond = run.position[k, own], np.maximum(first - low[since], high[since] - last)
         beyond *= beyond[0] <= EXACT  # else it is on its way back from there
         yield from greatest("loose", beyond, EXACT, own.start)
         first, last = limits.targets
-        damps = run.sensed("bDamping")[max(0, own.start - 1) : own.stop].any()
+        damps = run.damped[since].any()
         if first <= place[0] <= last and run.stands[own.start - 1] and not damps:
             beyond = np.maximum(first - place, place - last)
             yield from greatest("outside", beyond, limits.margin + EXACT, own.start)  # room to damp in
