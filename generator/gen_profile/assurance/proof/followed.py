@@ -241,7 +241,7 @@ class Followed:
             if zone.axis == axis and zone.limit and zone.low < high and zone.high > low
         ]
 
-    @cached_property
+    @property
     def damped(self) -> Flags:
         """Whether what sensors show is damped, of any axis, (cycles,)."""
         return self.sensed("bDamping")
