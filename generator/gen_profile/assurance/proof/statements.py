@@ -43,7 +43,6 @@ TURNING = 0.05  # of the greatest velocity, below which a plan may begin that tu
 NOTHING = 0.01  # of the allowed sway, too little to be seen: errors may leave so much more than is stated
 LEFT, OVERSTATED = "left by errors", "overstated"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
-RESCALED = 0.1  # of what is left, by which it may differ after live parameters have changed
 STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 ACTS = 2.0  # slots, in which what a stick asked for is led to
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
@@ -464,7 +463,11 @@ def _remains_at_last(run: Followed) -> Iterator[Allowance]:
 
 
 def _swings_on(run: Followed) -> Iterator[Allowance]:
-    """Judge that what is left keeps its action where live parameters change at rest: it goes with 1/√ω."""
+    """Judge what is stated where live parameters change at rest.
+
+    A rope that is hoisted slowly keeps the action of each mode, its energy by its frequency, so that its sway
+    goes with 1/√ω; so does that of a load that loses mass, and of one that gains some less is left.
+    """
     stated = run.issued.get("fSwayLeft")
     if stated is None or run.modes is None or run.last_modes is None or run.modes.modes.damped:
         return
@@ -473,12 +476,14 @@ def _swings_on(run: Followed) -> Iterator[Allowance]:
     if not starts or after >= run.cycles or len({*run.live_changes}) > 1:
         return
     own = slice(min(starts) - 1, after + 1)
-    if not (run.stands & run.guided)[own].all() or any(own.start < at <= after for at in run.rest_reports):
+    reported = any(own.start < at <= after for at in run.rest_reports)
+    if not (run.stands & run.guided)[own].all() or reported or own.start >= run.unknown_from:
         return
-    roots = np.sqrt(run.modes.modes.poles[0].imag / run.last_modes.modes.poles[0].imag)
-    before, now = stated[own.start], stated[after]
-    wrong = max(now - roots.max() * before, roots.min() * before - now)
-    yield Allowance("sway left", after, float(wrong), RESCALED * float(before))
+    before, now = ([0, *one.ends] for one in (run.modes, run.last_modes))
+    rates = run.modes.modes.poles[before].imag / run.last_modes.modes.poles[now].imag
+    moved = run.modes.modes.moved(run.acceleration, [own.start], run.cycle) * np.sqrt(rates.min(axis=0))
+    left = float(run.modes.modes.sway(moved).max())
+    yield Allowance("understated", after, left - float(stated[after]), NOTHING * run.sway_limit)
 
 
 JUDGES = (truths, velocities, stops, numbers, promises, remains, events, blocked, slowed, taken_over)
