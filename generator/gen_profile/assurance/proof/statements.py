@@ -36,7 +36,6 @@ from gen_profile.planner.events import KEPT_EVENTS
 BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
-USED_UP = 0.66  # of the allowed sway: from two thirds on a plan may have to wait for a swing that suits it
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
@@ -122,9 +121,9 @@ def numbers(run: Followed) -> Iterator[Allowance]:
 
 
 def _waits(run: Followed, order: TimedOrder) -> bool:
-    """Whether so much may be left by errors that plans wait until it swings otherwise, or are slower."""
+    """Whether errors may leave so much that a plan's share of it is not free: it waits, or is slower."""
     left = run.issued.get("fSwayLeft", np.zeros(1))
-    return bool(left[order.begin : order.end].max(initial=0.0) > USED_UP * run.sway_limit)
+    return bool(left[order.begin : order.end].max(initial=0.0) > run.sway_limit - run.share)
 
 
 def _is_end(run: Followed, order: TimedOrder, at: int) -> bool:
