@@ -178,7 +178,9 @@ FAULTS = {
     "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
     "idle": idle(),
     "given up": idle(error=9.0),
-    "ends": with_output("fStopHigh", STOPPED, obedient().issued["fPosition"][-1] - 0.01),
+    "ends": attrs.evolve(
+        with_output("fStopHigh", STOPPED, obedient().issued["fPosition"][-1] - 0.01), sway_limit=0.05
+    ),
     "loose": with_output("fStopHigh", STOPPED, 100.0),
     "outside": attrs.evolve(obedient(), limits=[attrs.evolve(LIMITS, targets=(-100.0, 4.9))]),
     "fast": with_orders(

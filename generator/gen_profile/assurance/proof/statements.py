@@ -38,14 +38,13 @@ FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis w
 NOTICED = 0.2  # periods, in which the end of a motion is
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
-TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
-NOTHING = 0.01  # of the allowed sway, too little to be seen: errors may leave so much more than is stated
+NOTHING = (
+    0.01  # of the allowed sway, too little to be seen: stated bounds of sway and stops may be left by so much
+)
 LEFT, OVERSTATED = "left by errors", "overstated"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
-STATED = 1e-4  # m, by which the ends of a stop may be left as a plan takes over
 ACTS = 2.0  # slots, in which what a stick asked for is led to
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
-STILL = 1e-9  # m/s2
 TAKEN_UP = 2  # cycles, in which a blocked interval is
 SHOWN = (10, 20, 21, 22, *range(50, 60), *range(60, 67), 70)  # codes of events that other outputs show, too
 COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
@@ -238,11 +237,11 @@ def _moves_as_stated(run: Followed, order: TimedOrder) -> bool:
 def stops(run: Followed) -> Iterator[Allowance]:
     """Judge where a stop leads by the ends that are stated in every cycle."""
     low, high = run.of("fStopLow"), run.of("fStopHigh")
-    applies, turns = run.guided & ~_fenced(run), _turning(run)
+    applies = run.guided & ~_fenced(run)
     up, down = (high - run.position) * applies, (run.position - low) * applies
     apart = np.abs(run.of("fStopDistance") - np.maximum(high - run.position, run.position - low))
     yield from greatest("stop distance", apart, EXACT)
-    yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
+    yield from greatest("ends", -np.minimum(up, down), NOTHING * run.sway_limit)
     widest = max(limits.margin for limits in run.limits) + EXACT
     apart = np.maximum(high - run.position, run.position - low) * ~run.guided
     yield from greatest("loose", apart, widest)
@@ -263,9 +262,11 @@ def stops(run: Followed) -> Iterator[Allowance]:
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
         if not (run.reserve and _just_taken_over(run, order.begin)):  # else what swings then is calmed
-            leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
+            leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own]
             calms = CALMS * max(limits.margin for limits in run.limits)
-            yield from greatest("ends", leaves - _asked(run, order, own), STATED + calms, begin)
+            yield from greatest(
+                "ends", leaves - _asked(run, order, own), NOTHING * run.sway_limit + calms, begin
+            )
         if let_go:
             continue
         if order.kind == QUICK_STOP:
@@ -320,15 +321,6 @@ def _within_travel(run: Followed, own: slice, lows: Array, highs: Array) -> Iter
         if first <= place[0] <= last and run.stands[own.start - 1] and not damps:
             beyond = np.maximum(first - place, place - last)
             yield from greatest("outside", beyond, limits.margin + EXACT, own.start)  # room to damp in
-
-
-def _turning(run: Followed) -> Array:
-    """Tell how far axes go on that turn round where a plan takes over, (axes, cycles)."""
-    slow = np.array([[TURNING * limits.velocity] for limits in run.limits])
-    velocity, acceleration = run.velocity, np.abs(run.acceleration)
-    turns = (velocity * run.acceleration < 0.0) & (np.abs(velocity) < slow)
-    way: Array = np.where(turns, velocity**2 / np.maximum(acceleration, STILL), 0.0)
-    return way
 
 
 def _fenced(run: Followed) -> Flags:
