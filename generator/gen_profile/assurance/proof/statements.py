@@ -279,7 +279,7 @@ def stops(run: Followed) -> Iterator[Allowance]:
             margin = max(limits.margin for limits in run.limits)
             yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
-        takes = in_time(run, to_speeds(run, run.velocity[:, begin]))
+        takes = in_time(run, to_speeds(run, _while_it_reacts(run, begin)))
         rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
         for k, limits in enumerate(run.limits):
             leads = known[k] + limits.velocity * takes  # a stop that is not planned yet may end there
@@ -287,6 +287,13 @@ def stops(run: Followed) -> Iterator[Allowance]:
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
+
+
+def _while_it_reacts(run: Followed, cycle: int) -> Array:
+    """Tell how fast axes may become before a block has taken up a command, (axes,)."""
+    fastest = np.array([own.velocity for own in run.limits])
+    gained = run.reaction * np.array([own.acceleration for own in run.limits])
+    return np.asarray(np.minimum(np.abs(run.velocity[:, cycle]) + gained, fastest))
 
 
 def _just_taken_over(run: Followed, cycle: int) -> bool:
