@@ -25,6 +25,7 @@ from scipy.integrate import solve_ivp
 
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.machine import frequencies as frequencies_of
 from gen_profile.planner.machine import live_modes
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile.support.errors import ExportError, SpecError
@@ -449,6 +450,10 @@ def test_an_error_of_the_block_is_told(text):
             ["planner.live={L1=[3.0, 12.0]}", "plant.m1=450.0", "plant.m2=20000.0", "plant.L2=1.8"],
             "planner.live: at L1 = 12 m the fastest mode has 20 times the frequency .* takes 9 at most",
         ),
+        (  # told first that modes come near each other elsewhere, users mended that in vain
+            ["planner.live={L1=[1.5, 7.0], m2=[0.0, 5000.0]}", "plant.m1=80.0", "plant.L2=1.2"],
+            "at L1 = 7 m and m2 = 5000 kg the fastest mode has 22.5 times the frequency .* narrow the ranges",
+        ),
     ],
 )
 def test_a_fault_in_the_spec_is_told_with_its_place(changes, words):
@@ -481,6 +486,10 @@ def test_a_fault_in_the_spec_is_told_with_its_place(changes, words):
 def test_a_machine_that_it_does_not_take_is_refused(preset, changes, words):
     with pytest.raises(SpecError, match=words):
         planner_block(preset_spec(preset, changes))
+
+
+def test_modes_of_the_same_frequency_are_found_despite_rounding():
+    assert frequencies_of(np.array([2.0, 1.0 + 1e-12])) == pytest.approx([1.0, 1.0])
 
 
 def test_a_live_parameter_named_as_what_the_block_has_is_refused(tmp_path, request):

@@ -78,6 +78,7 @@ def live_modes(spec: Spec) -> LiveModes:
     modes = len(linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
     exact = [linearized(spec, point).distinct_frequencies for point in between]
+    _refuse_fast_modes(spec, between, [rates[-1] / rates[0] for rates in exact])
     tried = (_curvatures(invariants, len(live)), [0.0] * len(live))
     least = np.inf
     for degree, curvatures in product(DEGREES if live else (0,), tried):
@@ -98,16 +99,20 @@ def live_modes(spec: Spec) -> LiveModes:
         raise SpecError(
             _unknown(spec, error, least, between[int(np.argmin([one[1] / one[0] for one in exact]))])
         )
-    ratios = [rates[-1] / rates[0] for rates in exact]
-    if max(ratios) > MOST_RATIO:
-        place = _place(spec, between[int(np.argmax(ratios))])
-        raise SpecError(
-            f"{f'planner.live: at {place}' if live else 'plant:'} the fastest mode has "
-            f"{max(ratios):.3g} times the frequency of the slowest, and the planner block takes "
-            f"{MOST_RATIO:g} at most; {'narrow the ranges, or ' if live else ''}"
-            "state a machine without the fast mode, such as a single pendulum."
-        )
     return LiveModes(modes=modes, live=live, interpolant=interpolant, others=second, error=error)
+
+
+def _refuse_fast_modes(spec: Spec, points: Sequence[Sequence[float]], ratios: Sequence[float]) -> None:
+    """Refuse modes that are too fast for slots of the slowest one, before all that other cures would help."""
+    live = bool(spec.planner.live)
+    if max(ratios) > MOST_RATIO:
+        at = f"planner.live: at {_place(spec, points[int(np.argmax(ratios))])}" if live else "plant:"
+        narrow = "narrow the ranges, or " if live and min(ratios) <= MOST_RATIO else ""
+        raise SpecError(
+            f"{at} the fastest mode has {max(ratios):.3g} times the frequency of the slowest, and the "
+            f"planner block takes {MOST_RATIO:g} at most; {narrow}state a machine without the fast mode, "
+            "such as a single pendulum."
+        )
 
 
 def decays(linear: Linearization) -> Array:
@@ -175,7 +180,7 @@ def frequencies(invariants: Array) -> Array:
     if len(invariants) != SYMMETRIC:
         return np.asarray(np.sqrt(invariants))
     total, product_ = invariants
-    larger = 0.5 * (total + np.sqrt(total * total - 4.0 * product_))
+    larger = 0.5 * (total + np.sqrt(np.maximum(total * total - 4.0 * product_, 0.0)))  # but for rounding
     return np.asarray(np.sqrt([product_ / larger, larger]))
 
 
