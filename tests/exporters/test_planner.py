@@ -450,7 +450,7 @@ def test_an_error_of_the_block_is_told(text):
             ["planner.live={L1=[3.0, 12.0]}", "plant.m1=450.0", "plant.m2=20000.0", "plant.L2=1.8"],
             "planner.live: at L1 = 12 m the fastest mode has 20 times the frequency .* takes 9 at most",
         ),
-        (  # told first that modes come near each other elsewhere, users mended that in vain
+        (  # told first that modes come near each other elsewhere, which did not help
             ["planner.live={L1=[1.5, 7.0], m2=[0.0, 5000.0]}", "plant.m1=80.0", "plant.L2=1.2"],
             "at L1 = 7 m and m2 = 5000 kg the fastest mode has 22.5 times the frequency .* narrow the ranges",
         ),
