@@ -110,6 +110,20 @@ def test_a_swing_that_nobody_computed_is_damped(spec, compiled, rope, delay, pha
     assert np.abs(np.diff(issued["fAcceleration"])).max() / CYCLE <= limits.jerk * (1.0 + 1e-6)
 
 
+@pytest.mark.parametrize("seconds", [2.0, 5.0])
+def test_the_axis_rests_soon_after_a_gust(compiled, seconds):
+    """Today's block needs 8.4 s."""
+    blown = crane(compiled)
+    run = {"noise": 0.002, "offset": 0.005, "random": np.random.default_rng(4)}
+    blown.run(8.0, **run)
+    blown.gust = 0.1
+    blown.run(seconds, **run)
+    blown.gust, number = 0.0, len(blown.rows["fVelocity"])
+    after = {name: values[number:] for name, values in blown.run(30.0, **run).items()}
+    assert 0 < np.flatnonzero(after["fVelocity"])[-1] * CYCLE <= 8.0
+    assert np.abs(after["sway"][-2500:]).max() <= 0.015
+
+
 @pytest.mark.parametrize("phase", [0.4, 3.5])
 def test_a_swing_is_damped_on_the_way_to_a_target_which_is_reached(spec, compiled, phase):
     swung = crane(compiled, swing=(0.5, phase))
