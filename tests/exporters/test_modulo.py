@@ -23,7 +23,7 @@ from gen_profile_exporters.modulo import unwrapped, wrapped
 
 COUNTS = 65536
 RING = {"unit": "rad", "counts_per_si": COUNTS / (2.0 * np.pi), "modulo": 2.0 * np.pi}
-NARROW = {"following_error": 2000}  # counts
+NARROW = {"following_error": 1000}  # counts
 MOVES = [(5.0, 14.0), (-0.1, -30.0), (40.0, 55.5), (6.0, 6.5)]  # rad
 
 
@@ -149,7 +149,7 @@ def test_specs_without_a_turn_are_hashed_as_before():
     "options",
     [{}, {"mode": "csv", "following_error": 0.1}, {"feed_forward": "both", "torque_per_acceleration": 40.0}],
 )
-@pytest.mark.parametrize("move", [(5.0, 14.0), (0.5, -7.0)])
+@pytest.mark.parametrize("move", [(5.0, 14.0), (-0.5, -7.0), (-6.0, -7.2), (20.0, 21.0)])
 def test_a_stream_passes_the_end_of_the_turn(move, options):
     with Bench(
         profile=quintic(move, duration=4.0), make=DriveVariant(**NARROW), start=move[0], **RING, **options

@@ -77,6 +77,7 @@ class SimulatedDrive:
         self._heard: dict[int, int] = {}  # by RPDO, when
         self._master_heard: int | None = None
         self._syncs = 0
+        self._recounts = False
         self._mode_asked: tuple[int, int | None] | None = None  # and since when
         self._last_sent: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
         self.local: Any = _Node(node, make, self.value)
@@ -154,6 +155,9 @@ class SimulatedDrive:
 
     def watch(self, now: int) -> None:
         """Look for a master that fell silent, and change to the mode that was asked for."""
+        if self._recounts:
+            self._recounts = False
+            self._pack_feedback()
         if self._mode_asked is not None:
             mode, since = self._mode_asked
             since = now if since is None else since
@@ -225,6 +229,8 @@ class SimulatedDrive:
         self._values.pop((index, subindex), None)
         if index == 0x1016:
             self._master_heard = None  # the next heartbeat is the first one
+        elif index == 0x607B:
+            self._recounts = True  # within another turn, once this is stored
         elif index == 0x6040:
             self._obey(int.from_bytes(data, "little"))
         elif index == 0x6060:
