@@ -192,6 +192,15 @@ class TestCheck:
                 assert nearest(spec, response.times, bodies).room == pytest.approx(found, abs=1e-6)
 
 
+def test_a_library_gives_no_profile_for_lower_stacks(tmp_path):
+    """A rail that is lower by a metre has all stacks higher by one."""
+    yard = quay([[8.0, 10.5, 20.0]], move={"start": [0.0, 26.0], "target": [20.0, 26.0]})
+    assert gp.run_sweep(yard, {"path.rail": [33.0, 36.0]}, ["csv"], tmp_path).statuses == {"passed": 2}
+    for asked, used in ((33.0, 33.0), (35.0, 33.0), (36.0, 36.0)):
+        assert gp.lookup(tmp_path, {"path.rail": asked}).used == {"path.rail": used}
+    assert "path.clearance" in gp.lookup(tmp_path, {"path.rail": 35.0}).passed_over[1]
+
+
 @pytest.mark.parametrize("end", ["start", "target"])
 def test_a_load_may_begin_and_end_at_the_clearance_itself(end):
     beside = 20.1 - WIDTH / 2.0 - SIDEWAYS

@@ -86,8 +86,8 @@ def lookup(
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
     Distances are counted in steps of the grid, and what is more than one step away is another profile, not an
-    answer. Keys of the machine and its check are taken as asked; in all others, such as the move, what the
-    profile was designed for stands in for what was asked.
+    answer. Keys of the machine, its check and what stands there (``path``) are taken as asked; in all others,
+    such as the move, what the profile was designed for stands in for what was asked.
 
     Parameters
     ----------

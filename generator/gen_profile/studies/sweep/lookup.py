@@ -23,7 +23,8 @@ from gen_profile.support.suggestion import finite_number, number_meant, suggesti
 TRIES = 64
 GRID_TOLERANCE = 1e-9  # of a step of the grid
 FINER = "Sweep a finer grid, or a more robust design."
-MACHINE = ("plant.", "actuator.", "check.", "robustness.uncertain.")  # what one has; all else, one may choose
+# what one has, and what stands there; all else, one may choose
+MACHINE = ("plant.", "actuator.", "check.", "robustness.uncertain.", "path.")
 
 
 @attrs.frozen(kw_only=True)
