@@ -7,7 +7,6 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
 
 from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.motion.profile import Array, Profile
@@ -21,7 +20,7 @@ _WIDTH, _HEIGHT, _SAMPLES = 640.0, 220.0, 321
 _FLAT = 1e-12  # what moves by less is drawn as a line
 _COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b")
 _PAGE = Path(__file__).with_name("page.html")
-_PARTS = ("summary", "equations", "drives", "motion", "words", "sway")  # which some pages have
+_PARTS = ("summary", "equations", "drives", "motion", "words", "sway")  # which some pages have, as HTML
 
 
 def plant_page(name: str, machine: PlantInstance, table: VariableTable, kind: InputKind) -> str:
@@ -56,8 +55,8 @@ def _page(kind: str, title: str, table: VariableTable, plant: Plant | None = Non
     if plant is not None:
         summary = escape(plant.summary[:1].upper() + plant.summary[1:])
         more |= {"summary": summary, "equations": _equations(plant)}
-    ready = {part: Markup(more.get(part, "")) for part in _PARTS}  # escaped by now
-    return filled(_PAGE, kind=kind, title=title, variables=map(_row, table.variables), **ready)
+    parts = dict.fromkeys(_PARTS, "") | more
+    return filled(_PAGE, kind=kind, title=title, variables=map(_row, table.variables), **parts)
 
 
 def _equations(plant: Plant) -> str:
@@ -68,10 +67,11 @@ def _equations(plant: Plant) -> str:
 
 
 def _row(v: FmuVariable) -> tuple[str, ...]:
+    """Give the cells of a variable, as HTML."""
     numbers = (v.start if v.kind.has_start else None, v.lower, v.upper)
     start, low, high = ("" if number is None else f"{number:g}" for number in numbers)
     kind = f"{v.kind.causality}, {v.kind.variability}"
-    return v.name, kind, v.unit, start, low, high, Markup(escape(v.description))
+    return escape(v.name), kind, escape(v.unit), start, low, high, escape(v.description)
 
 
 def _push(machine: PlantInstance) -> Profile:
