@@ -12,7 +12,7 @@ import gen_profile as gp
 BAYS = int(os.environ.get("STACK_BAYS", "2"))
 LOW_STACKS = 36  # a bay over which the load is best lifted no higher than it must be
 NEARER = 5e-4  # m, by which no load may come nearer to a stack than the clearance
-LONGER = 1.03  # times the nonlinear program's duration, which is held off stacks at some instants only
+LONGER = 1.04  # times the nonlinear program's duration, which is held off stacks at some instants only
 FREE = {"sway": None, "axis": {axis: {**limits, "travel": None} for axis, limits in LIMITS["axis"].items()}}
 NODES = 31
 
