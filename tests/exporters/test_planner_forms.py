@@ -6,6 +6,7 @@ import math
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import attrs
 import numpy as np
@@ -19,10 +20,11 @@ from gen_profile.planner.commands import play, read_commands
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.events import read_events
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.forms import block_files, read_block, require_forms
+from gen_profile.planner.forms import block_files, block_in, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile.support.errors import ExportError, SpecError
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.planner.axis_wrapper import LIBRARIES
 from gen_profile_exporters.planner.openplc import openplc_files
@@ -72,6 +74,14 @@ def test_every_container_reads_back_as_the_same_program(block, program, format_,
         (tmp_path / wrapper.filename).write_bytes(wrapper.content)
         with pytest.raises(ExportError, match="holds a planner block's wrapper; name the"):
             read_block(tmp_path / wrapper.filename)
+
+
+@pytest.mark.parametrize("name", containers())
+def test_a_block_of_variables_reads_back_from_every_container(block, name):
+    spec = attrs.evolve(SPEC, export=attrs.evolve(SPEC.export, plc_tables="variables"))
+    written = block_files(block, spec, [name])[0]
+    back = parse_function_block(block_in(Path(written.filename), written.content))
+    assert back.program() == parse_function_block(block.text).program()
 
 
 @pytest.mark.parametrize("tables", ["constants", "variables"])

@@ -123,7 +123,8 @@ def _portable(match: re.Match[str], text: str, target: Target) -> BlockSource:
     )
     tables = [variable for variable in source.variables if _is_table(variable)]
     others = [variable for variable in source.variables if not _is_table(variable)]
-    constants = [attrs.evolve(variable, section="VAR CONSTANT") for variable in tables]
+    section = "VAR" if is_buffered(source) else "VAR CONSTANT"  # of arrays, which SCL has no constants of
+    constants = [attrs.evolve(variable, section=section) for variable in tables]
     back = attrs.evolve(source, variables=(*others, *constants))
     names = variable_names(layout_of(text), len(target.axes))
     plays = {name.lower() for name in names} <= {variable.name.lower() for variable in others + tables}
