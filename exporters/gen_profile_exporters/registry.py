@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 from gen_profile.support.errors import ExportError, SpecError
 from gen_profile.support.plugins import load_plugin
 from gen_profile.support.suggestion import suggestion
-from gen_profile.support.units import require_one_way
 
 if TYPE_CHECKING:
     from gen_profile_exporters import csv_table
@@ -110,6 +109,8 @@ def require_targets(exporters: Mapping[str, Exporter], target: Target) -> None:
     ------
     ExportError
     """
+    from gen_profile.support.units import require_one_way  # noqa: PLC0415  # loads attrs, which lists do without
+
     known = formats()
     able = ", ".join(name for name, form in known.items() if form.begins_anew)
     for name, exporter in exporters.items():
