@@ -28,6 +28,12 @@ def test_the_better_of_two_motions_is_given(rope):
         assert found.other_costs == ()
 
 
+@pytest.mark.slow
+def test_what_rest_does_not_lead_to_begins_at_the_optimum_without_limits():
+    wide, narrow = (solution_of("plant.L=11", f"limits.velocity={limit}") for limit in (5.0, 4.9))
+    assert wide.optimum.cost < narrow.optimum.cost < 1.2 * wide.optimum.cost
+
+
 def test_small_swings_have_one_optimum():
     assert solution_of("plant.L=5").other_costs is None
 

@@ -28,11 +28,12 @@ from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
 ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
-DIRECTLY = 3.0  # likewise for the direct one
+DIRECTLY = 4.5  # likewise for the direct one
 NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
 KEPT = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
 REFINING = 0.4  # of the work that is left, for finer meshes that keep the limits
-SETTLING = 0.9  # likewise, for the least cost, after which the motion of least violation will do
+# likewise, for the least cost from two starts, after which the motion of least violation will do
+SETTLING = 0.6, 0.9
 INEXACT = 1e-3  # share of a limit by which programs may break it for no other reason than their accuracy
 RESERVE, RESERVES = 2.0, 2  # times that share less of the limits is asked for then, and how often
 PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
@@ -121,18 +122,26 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
 
 
 def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Solution:
-    """Begin at the motion of least violation; where that fails, take this motion, if it keeps the limits.
+    """Begin at the motion of least violation, else at the optimum without limits.
 
-    Just above the shortest duration only meshes that are fine where limits begin to bind have a motion.
+    Just above the shortest duration only meshes that are fine where limits begin to bind have a motion. Where
+    both starts fail, the motion of least violation is taken, if it keeps the limits.
     """
     if not coarse:
         with suppress(OutOfWork), budget(REFINING * left()):
             while nearest.wider > KEPT and (finer := _refined(problem, nearest)) is not None:
                 nearest = finer
         spend(0.0)
-    begun = partial(_with_reserve, problem, nearest.start(problem), coarse=coarse)
-    solution = afford(begun, SETTLING * left()) or given_up(problem)
-    return nearest.solution if solution.optimum is None and nearest.wider <= 1.0 else solution
+    for start, share in zip((nearest.start, direct.without_limits), SETTLING, strict=True):
+        begun = partial(_begun, problem, start, coarse=coarse)
+        solution = afford(begun, share * left()) or given_up(problem)
+        if solution.optimum is not None:
+            return solution
+    return nearest.solution if nearest.wider <= 1.0 else solution
+
+
+def _begun(problem: Problem, start: Callable[[Problem], ProgramSequence | None], *, coarse: bool) -> Solution:
+    return _with_reserve(problem, start(problem), coarse=coarse)
 
 
 def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:

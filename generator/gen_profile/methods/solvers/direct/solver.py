@@ -225,6 +225,16 @@ def mirrored(problem: Problem) -> ProgramSequence:
     return attrs.evolve(linear, iterate=linear.iterate.of_flat(-linear.iterate.flat()))
 
 
+def without_limits(problem: Problem) -> ProgramSequence | None:
+    """Find the better of the optima without limits that rest and `mirrored` lead to, if there is one."""
+    cost, _ = resolve_sway_cost(problem)
+    begun = mirrored(problem)
+    goal = attrs.evolve(begun.goal, sway_cost=cost)
+    ends = [sequence(start, goal) for start in (begun.setup.transcription.rest(), begun.iterate)]
+    solved = [end for end in ends if end.verdict is ConicStatus.SOLVED]
+    return min(solved, key=lambda end: end.setup.cost(end.iterate, cost), default=None)
+
+
 def begun_at(setup: Setup, near: ProgramSequence | None) -> tuple[Setup, Iterate]:
     """Take over a motion with its mesh, if it is one of as many machines; else stand still."""
     if near is not None:
