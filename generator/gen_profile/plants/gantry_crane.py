@@ -56,7 +56,7 @@ def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
 
 
 def picture(pose: Pose, side: slice = slice(0, 1)) -> tuple[Drawing, ...]:
-    """Draw trolley and loads from the side, along x, and the end load with the bridge from above.
+    """Draw trolley and loads from the side, along x, and with the bridge from above.
 
     Parameters
     ----------
@@ -69,7 +69,8 @@ def picture(pose: Pose, side: slice = slice(0, 1)) -> tuple[Drawing, ...]:
     (left, right), (near, far) = travel(x, 3.0 * size), travel(y, 3.0 * size)
 
     def above(pose: Pose) -> Array:
-        (x, y), (sway_x, sway_y) = pose.q_a.T[:2], pose.loads()[0][-2:]
+        (x, y), sway = pose.q_a.T[:2], pose.loads()[0]
+        loads = [(x - sway_x, y - sway_y) for sway_x, sway_y in zip(sway[::2], sway[1::2], strict=True)]
         return stacked(
             (left, near),
             (right, near),
@@ -78,10 +79,11 @@ def picture(pose: Pose, side: slice = slice(0, 1)) -> tuple[Drawing, ...]:
             (x, near),
             (x, far),
             (x, y),
-            (x - sway_x, y - sway_y),
+            *loads,
             frames=len(x),
         )
 
+    chain = range(6, 7 + len(pose.loads()[0]) // 2)
     return (
         hanging("from the side", pose, trolley=level, columns=side),
         drawn(
@@ -92,8 +94,9 @@ def picture(pose: Pose, side: slice = slice(0, 1)) -> tuple[Drawing, ...]:
             Shape(kind="rail", points=[2, 3]),
             Shape(kind="frame", points=[4, 5]),
             Shape(kind="body", points=[6], size=(size, size)),
-            Shape(kind="rope", points=[6, 7]),
-            Shape(kind="load", points=[7], size=(0.7 * size, 0.7 * size)),
+            Shape(kind="rope", points=chain),
+            *(Shape(kind="hook", points=[point], size=(0.5 * size, 0.5 * size)) for point in chain[1:-1]),
+            Shape(kind="load", points=[chain[-1]], size=(0.7 * size, 0.7 * size)),
         ),
     )
 

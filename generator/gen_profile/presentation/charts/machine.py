@@ -54,18 +54,22 @@ class MachineView:
         return float(np.ptp(self.drawing.points[0], axis=0).max())
 
     def moved(self) -> Iterator[tuple[str, int, Array]]:
-        """Find which point each axis moves first, and the direction."""
+        """Find which point each axis moves, and the direction: the first, or where it hangs, the last."""
         points = self.drawing.points
         shapes = self.drawing.shapes
         bodies = [shape.points[0] for shape in shapes if shape.size != (0.0, 0.0)]
         bodies += [point for shape in shapes for point in shape.points if shape.kind == "frame"]
         for frame, axis in enumerate(self.plant.actuated, start=1):
             way = points[frame] - points[0]
-            for point in bodies:
-                length = float(np.linalg.norm(way[point]))
-                if length > 0.1 * STEP:
-                    yield axis.name, point, way[point] / length
-                    break
+            moving = [point for point in bodies if np.linalg.norm(way[point]) > 0.1 * STEP]
+            if moving:
+                point = moving[-1] if moving[0] in self.hanging() else moving[0]
+                yield axis.name, point, way[point] / np.linalg.norm(way[point])
+
+    def hanging(self) -> list[int]:
+        """List the points of the machine's bodies, the lowest one last."""
+        loads = [shape.points[0] for shape in self.drawing.shapes if shape.kind in {"hook", "load"}]
+        return loads[-len(self.plant.bodies) :]
 
     def swung(self) -> Iterator[tuple[str, int, Array]]:
         """Find which point each swinging coordinate moves first, and where that is without it."""
@@ -179,10 +183,11 @@ def _draw(axis: Any, view: MachineView) -> None:
         _arrow(axis, begin, end, AXIS)
         _name(axis, end, f"+{name}", AXIS, direction)
     for name, point, without in view.swung():
-        _swing(axis, view, name, point, without)
+        meet = sum(other == point for _, other, _ in view.swung()) > 1
+        _swing(axis, view, name, point, without, meet=meet)
     loads = [shape for shape in view.drawing.shapes if shape.kind in {"hook", "load"}]
     for body, shape in zip(view.plant.bodies[::-1], loads[::-1], strict=False):
-        aside = np.array([0.7, -0.7])
+        aside = np.array([0.7, 0.7 if shape.kind == "hook" else -0.7])
         _name(axis, points[shape.points[0]] + shape.size * aside, body, INK, aside)
     axis.set(title=view.drawing.title, aspect="equal")
     axis.margins(0.12)
@@ -206,8 +211,11 @@ def _shape(axis: Any, shape: Shape, points: Array) -> None:
             axis.plot(*places.T, color=INK, linewidth=LINES[shape.kind])
 
 
-def _swing(axis: Any, view: MachineView, name: str, point: int, without: Array) -> None:
-    """Draw the angle about the point that holds the line, or else the way of the point."""
+def _swing(axis: Any, view: MachineView, name: str, point: int, without: Array, *, meet: bool) -> None:
+    """Draw the angle about the point that holds the line, or else the way of the point.
+
+    Ways that meet have their names where they begin.
+    """
     points = view.drawing.points[0]
     held = [start for start, end in view.pieces() if end == point]
     if held:
@@ -224,7 +232,11 @@ def _swing(axis: Any, view: MachineView, name: str, point: int, without: Array) 
             _name(axis, arc[0], f"+{name}", ANGLE, arc[0] - arc[2])
             return
     _arrow(axis, without, points[point], ANGLE)
-    _name(axis, 0.5 * (without + points[point]), f"+{name}", ANGLE, _left_of(points[point] - without))
+    way = points[point] - without
+    if meet:
+        _name(axis, without, f"+{name}", ANGLE, _left_of(way) - way)
+    else:
+        _name(axis, without + 0.5 * way, f"+{name}", ANGLE, _left_of(way))
 
 
 def _arrow(axis: Any, start: Array, end: Array, colour: str) -> None:
