@@ -32,7 +32,7 @@ from gen_profile.support.units import AXIS_UNITS, COUNTS, AxisScale, require_one
 from gen_profile_exporters import csv_dialects, setpoints
 from gen_profile_exporters.csv_dialects import DIALECTS, CsvDialect, Row
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.modulo import least, require_short_steps, unwrapped, wrapped
+from gen_profile_exporters.modulo import least, require_short_steps, turn_counts, unwrapped, wrapped
 
 TIME = "time_s"
 # quantity → what follows the axis unit in its column's name
@@ -62,6 +62,8 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     table = setpoints.axis_table(motion, target.axes)
     for number, axis in enumerate(target.axes):
         if axis.modulo is not None:
+            if axis.unit == COUNTS:
+                turn_counts(axis)  # whole ones, as places within it are written as such
             require_short_steps(table.position[:, number], axis.modulo, axis, target.cycle_time)
             table.position[:, number] = wrapped(table.position[:, number], axis.modulo)
     columns = [_time_texts(len(table.position), target.cycle_time)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import ExportError
-from gen_profile.support.units import AxisScale
+from gen_profile.support.units import COUNTS, AxisScale
 
 ALL_BITS = 2**32  # counts
 MOST_COUNTS = 2**31  # counts, of any other turn
@@ -33,10 +33,13 @@ def turn_counts(axis: AxisScale) -> int | None:
             f"{shown} has {turn} counts; drives count 2 to {MOST_COUNTS}, or all {ALL_BITS} of 32 bits."
         )
     if abs(exact - turn) > WHOLE:
-        metres = axis.modulo / abs(axis.factor)
+        cure = "all counts of a turn"
+        if axis.unit != COUNTS:
+            metres = axis.modulo / abs(axis.factor)
+            cure = f"axis.counts_per_metre = [COUNTS, {metres!r}] with the counts of a turn"
         raise ExportError(
             f"{shown} has {exact:.15g} counts, which are not whole, so that every turn would be off; state "
-            f"axis.counts_per_metre = [COUNTS, {metres!r}] with the counts of a turn."
+            f"{cure}."
         )
     return turn
 

@@ -172,6 +172,16 @@ def test_a_stand_on_the_other_side_of_the_turn_s_end_is_near():
     assert all(place >= COUNTS - 6 or place <= places[-1] + 1 for place in places)
 
 
+@pytest.mark.parametrize("encoder", [csv_table, exporter])
+def test_a_turn_in_counts_is_whole(encoder):
+    """Else a table would hold a count that is none of the turn's, and up to one beside the motion's place."""
+    goal = target(start=5.0, **RING | {"unit": "counts", "modulo": COUNTS + 0.5})
+    with pytest.raises(
+        ExportError, match=r"65536\.5 counts, which are not whole, .*; state all counts of a turn"
+    ):
+        encoder.encode(quintic((5.0, 14.0), duration=4.0), goal)
+
+
 @pytest.mark.parametrize(
     ("make", "options", "reason"),
     [
