@@ -2,7 +2,7 @@
 
 The block is that of constants (`structured_text`), with a handful of changes: what is the motion's own stands
 in an array of LREAL, twice; the statements take it from the buffer in use; ahead of them stand others
-(``text/buffers.st``) that answer requests, and behind them some (``text/state.st``) that show how the block
+(``text/requests.st``) that answer requests, and behind them some (``text/state.st``) that show how the block
 stands. A buffer holds
 
     length, checksum, checks                           of all that it holds

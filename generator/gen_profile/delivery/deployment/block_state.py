@@ -1,4 +1,4 @@
-"""What a block shows of itself in every cycle: ``aState``, that ``state.st`` and ``buffers.st`` write."""
+"""What a block shows of itself in every cycle: ``aState``, that ``state.st`` and ``requests.st`` write."""
 
 from typing import ClassVar, TypeVar
 

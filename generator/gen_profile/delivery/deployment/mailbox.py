@@ -1,4 +1,4 @@
-"""Requests to a playback block whose numbers are variables, and its replies (``buffers.st`` answers them)."""
+"""Requests to a playback block whose numbers are variables, and its replies (of ``requests.st``)."""
 
 import secrets
 import time
