@@ -68,7 +68,7 @@ FAULTS = [
     (
         "plant.type",
         "bridge-crane",
-        r"plant\.type: .*; did you mean 'double-pendulum-crane' or 'gantry-crane'\?",
+        r"plant\.type: .*; did you mean 'double-pendulum-crane', 'gantry-crane' or 'hall-crane'\?",
     ),
     ("plant.L", 6.0, r"plant\.L: unknown key; did you mean 'L1' or 'L2'\?"),
     ("plant.seil", 6.0, r"plant\.seil: unknown key; did you mean 'L1'\?"),
