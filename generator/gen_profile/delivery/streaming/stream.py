@@ -75,7 +75,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     content = read_motion(path)
     if format_of(path) != "can":
         raise SpecError(f"{path}: only the log of the format can is streamed; export that.")
-    spec = _vouched_spec(path, content, "can", accept_unverified)
+    spec = _covered_spec(path, content, "can", accept_unverified)
     require_rest(spec)
     return Source(spec=spec, plan=plan_of(content, target_of(spec)))
 
@@ -99,11 +99,11 @@ def verified_block(path: Path, *, accept_unverified: bool = False) -> tuple[Spec
     if not is_planner_block(path):
         raise SpecError(f"{path}: it holds no planner block that can be executed; C cannot be.")
     content = read_motion(path)
-    spec = _vouched_spec(path, content, PLANNER, accept_unverified)
+    spec = _covered_spec(path, content, PLANNER, accept_unverified)
     return spec, BlockInstance(block_in(path, content))
 
 
-def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: bool) -> Spec:
+def _covered_spec(path: Path, content: bytes, format_: str, accept_unverified: bool) -> Spec:
     """Take the spec of an artefact that its manifest covers."""
     manifest, beside = manifest_beside(path, content, planner=format_ == PLANNER), path.parent / FILENAME
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == format_}:
