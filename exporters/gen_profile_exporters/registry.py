@@ -7,7 +7,7 @@ only when its format is asked for.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Set
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path, PurePath
@@ -69,7 +69,7 @@ class Format(NamedTuple):
 
 
 _ROWS = tomllib.loads(Path(__file__).with_name("formats.toml").read_text("utf-8"))
-BUILT_IN = {name: Format(**row) for name, row in _ROWS.items()}
+BUILT_IN = {name: Format(**row) for name, row in sorted(_ROWS.items())}
 OTHER_NAMES = {"st": "plc"}
 GROUP = "gen_profile.exporters"
 
@@ -94,10 +94,15 @@ def find_exporter(name: str) -> Exporter:
         When no format has that name.
     """
     listed = format_named(name)
-    known = BUILT_IN if listed in BUILT_IN else formats()
+    known = _known({listed})
     if listed not in known:
         raise SpecError(f"export: unknown format {name!r}{suggestion(name, known)}")
     return cast("Exporter", import_module(known[listed].module))
+
+
+def _known(names: Set[str]) -> Mapping[str, Format]:
+    """Look among others' formats only for what is not the project's own: a broken one blocks only itself."""
+    return BUILT_IN if names <= BUILT_IN.keys() else formats()
 
 
 def require_targets(exporters: Mapping[str, Exporter], target: Target) -> None:
@@ -111,7 +116,7 @@ def require_targets(exporters: Mapping[str, Exporter], target: Target) -> None:
     """
     from gen_profile.support.units import require_one_way  # noqa: PLC0415  # loads attrs, which lists do without
 
-    known = formats()
+    known = _known(exporters.keys())
     able = ", ".join(name for name, form in known.items() if form.begins_anew)
     for name, exporter in exporters.items():
         for axis in () if known[name].begins_anew else target.axes:
@@ -135,7 +140,7 @@ def find_container(name: str) -> BlockContainer:
         It carries none, or no format has that name.
     """
     exporter = find_exporter(name)
-    if not formats()[format_named(name)].holds_block:
+    if not _known({format_named(name)})[format_named(name)].holds_block:
         raise SpecError(f"{name} carries no playback block; {_containers()}.")
     return cast("BlockContainer", exporter)
 
@@ -160,7 +165,7 @@ def _containers() -> str:
     return f"the suffixes of those that do are {', '.join(suffixes)}"
 
 
-def require_end(names: Iterable[str], *, stops: bool) -> None:
+def require_end(names: Set[str], *, stops: bool) -> None:
     """Refuse formats for a motion that ends at speed where their players would hold its last setpoint.
 
     Raises
@@ -169,7 +174,7 @@ def require_end(names: Iterable[str], *, stops: bool) -> None:
     """
     if stops:
         return
-    known = formats()
+    known = _known(names)
     holding = [name for name in names if not known[name].may_end_at_speed]
     if holding:
         able = ", ".join(name for name, form in known.items() if form.may_end_at_speed)

@@ -193,7 +193,7 @@ def _designed(
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     if not exporters:
         raise SpecError("export: name at least one format.")
-    require_end(exporters, stops=spec.move.stops)
+    require_end(exporters.keys(), stops=spec.move.stops)
     require_targets(exporters, target_of(spec))
     planned = plan(spec, progress)
     spec, command = planned.spec, planned.command
