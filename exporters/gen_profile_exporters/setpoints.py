@@ -80,7 +80,7 @@ def motion_of(table: AxisTable, axes: tuple[AxisScale, ...]) -> SampledProfile:
     )
 
 
-def counts(position: Array, axis: AxisScale, cycle_time: float) -> NDArray[np.int32]:
+def counts(position: Array, axis: AxisScale, cycle_time: float) -> Array:
     """Round one axis's positions, shape (samples,), to drive counts, half to even.
 
     Each count comes from the absolute position, so no error accumulates: it stays within half a count.
@@ -91,8 +91,9 @@ def counts(position: Array, axis: AxisScale, cycle_time: float) -> NDArray[np.in
         A count does not fit 32 bits, which is what drives take (CiA 402, object 607Ah).
     """
     rounded = np.rint(in_axis_units(position, np.array(axis.counts_per_si)))
-    require_within(INT32, rounded, f"axis {axis.name}", TOO_FAR, cycle_time)
-    return rounded.astype(np.int32)
+    if axis.modulo is None:  # else what is written lies within a turn
+        require_within(INT32, rounded, f"axis {axis.name}", TOO_FAR, cycle_time)
+    return rounded
 
 
 def require_within(

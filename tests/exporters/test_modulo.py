@@ -88,6 +88,14 @@ def test_a_position_may_pass_the_end_of_32_bits(mode):
         exporter.encode(profile, attrs.evolve(goal, axes=(attrs.evolve(goal.axes[0], modulo=None),)))
 
 
+def test_a_table_of_counts_may_pass_the_end_of_32_bits():
+    goal = target(start=2147.0, unit="counts", modulo=2.0**32)
+    (file,) = csv_table.encode(quintic((2147.0, 2149.0), duration=4.0), goal)
+    places = [int(line.split(b",")[1]) for line in file.content.splitlines()[1:]]
+    assert (places[0], places[-1]) == (2_147_000_000, 2_149_000_000 - 2**32)
+    assert csv_table.replay(file.content, goal).position[-1, 0] == pytest.approx(2149.0, abs=1e-6)
+
+
 def test_what_no_axis_of_that_kind_takes_is_refused():
     goal, profile = target(start=5.0, **RING), quintic((5.0, 14.0), duration=4.0)
     log = exporter.encode(profile, goal)[0].content
