@@ -27,6 +27,7 @@ PER_SI = {"m": 1.0, "mm": 1e3, "um": 1e6, "rad": 1.0, "deg": 180.0 / pi}
 QUANTITIES = {"position": "", "velocity": "_per_s", "acceleration": "_per_s2", "jerk": "_per_s3"}
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 COMMENTS = re.compile(r"\(\*.*?\*\)|//[^\n]*|\{.*?\}", re.DOTALL)
+ALL_BITS = 1 << 32  # counts of a turn that lies around zero
 SAME_TIME = 1e-9  # relative, by which a time in a table may be off its cycle
 GREATEST = 1 << 45  # whole number that is a coefficient
 MOST_HALVINGS = 50  # of a range, up to which shares of it are exact
@@ -111,13 +112,28 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
     except (NotProvedError, ValueError, IndexError, ArithmeticError) as error:
         raise NotProvedError(f"not covered, or damaged: an artefact of another format ({error})") from error
     (over, under), positions, resolution = Decimal(repr(cycle)).as_integer_ratio(), [], []
-    for column, axis in zip(columns, (spec["axis"][name] for name in axes), strict=True):
+    stated = [spec["axis"][name] for name in axes]
+    for column, axis, start in zip(columns, stated, spec["move"]["start"], strict=True):
         counted = layout == "counts" or axis["unit"] == "counts"
         per_si = axis["sign"] * (axis["counts_per_metre"] if counted else PER_SI[axis["unit"]])
-        positions.append([one / per_si for one in column])
+        anew = axis.get("modulo") and not layout
+        places = _unwound(column, axis["modulo"], start * per_si) if anew else column
+        positions.append([one / per_si for one in places])
         resolution.append(1 / abs(per_si) if counted and layout != "segments" else 0.0)
     times = [number * over / under for number in range(len(columns[0]))]
     return TimedSetpoints(times, cycle, positions, resolution)
+
+
+def _unwound(places: Sequence[float], turn: float, near: float) -> list[float]:
+    """Go on where positions of a table begin anew, by the shorter ways, from as near as can be to a place."""
+    low = -turn / 2 if turn == ALL_BITS else 0.0
+    require(all(low <= place < low + turn for place in places), "places outside the turn of axis.modulo")
+    turns = [round((near - places[0]) / turn)]
+    for before, place in pairwise(places):
+        jump = round((place - before) / turn)
+        require(abs(place - before - turn * jump) < turn / 2, "half a turn of axis.modulo in a cycle")
+        turns.append(turns[-1] - jump)
+    return [place + turn * number for place, number in zip(places, turns, strict=True)]
 
 
 # cycle in s, layout, and positions in an axis' units or counts

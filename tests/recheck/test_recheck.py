@@ -17,6 +17,7 @@ import gen_profile as gp
 from gen_profile.assurance.certificate.arithmetic.balls import ball
 from gen_profile.assurance.certificate.equations import enclosed_equations
 from gen_profile.plants.registry import find_plant
+from gen_profile.spec.reading import spec_from_dict
 from gen_profile.support.errors import CertificateError
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
@@ -58,6 +59,7 @@ COARSE = "export.cycle_time=0.02"  # fewer pieces of a motion to enclose
 CERTIFIED = [  # beside SPEC and QUICK
     ("flexible-joint", "robustness.uncertain={k=0.01, c=0.05}"),
     ("paper", "check.uncertain={}", "axis.unit=counts", "axis.counts_per_metre=30000"),
+    ("flexible-joint", "axis.unit=rad", "axis.modulo=1.0", "check.uncertain={}"),
     ("slosh-tank", "check.uncertain={}", COARSE),
     ("slosh-tank", "plant.mu=0", "limits.sway=0.1"),
     ("mass-spring-chain", "plant.c1=2", "robustness.uncertain={k2=0.05}"),
@@ -108,6 +110,32 @@ def test_a_block_is_read_as_the_program_plays_it(preset, layout, tables):
     assert ours.times == theirs.times.tolist() and ours.cycle == theirs.cycle_time
     assert np.array_equal(np.array(ours.positions).T, theirs.position)
     assert np.array_equal(ours.resolution, theirs.resolution)
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        {"unit": "deg", "modulo": 30.0},
+        {"unit": "deg", "modulo": 29.3, "sign": -1},
+        {"unit": "counts", "counts_per_metre": 2.0**32, "modulo": 2.0**32},
+    ],
+)
+def test_a_table_that_begins_anew_is_read_as_the_program_reads_it(axis):
+    document = gp.preset_spec(
+        "flexible-joint", ["export.cycle_time=0.02", "move.start=0.4", "move.target=2.0"]
+    ).to_dict()
+    document["axis"]["hub"] |= axis
+    spec = spec_from_dict(document)
+    profile, target = gp.plan(spec).command, target_of(spec)
+    (file,) = find_exporter("csv").encode(profile, target)
+    theirs = find_exporter("csv").replay(file.content, target)
+    ours = read_setpoints(file.content, document, ["hub"])
+    assert np.array_equal(np.array(ours.positions).T, theirs.position)
+    assert theirs.position[-1, 0] == pytest.approx(profile.target[0], 1e-6)
+    first = file.content.splitlines()[1].split(b",")[1]
+    outside = file.content.replace(b"," + first + b",", b",-3000000000.0,", 1)
+    with pytest.raises(NotProvedError, match=r"outside the turn of axis\.modulo"):
+        read_setpoints(outside, document, ["hub"])
 
 
 @pytest.mark.slow
