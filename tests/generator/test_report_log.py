@@ -59,6 +59,17 @@ def test_an_angle_s_axis_may_be_logged_in_degrees():
     np.testing.assert_allclose(log.positions["trolley"], 5.0)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("turn", [360.0, 30.0])
+def test_an_axis_that_begins_anew_goes_on(sign, turn):
+    moved = np.linspace(3.0, 7.0, len(TIMES))
+    overrides = ["move.start=3.0", "move.target=7.0", f"axis.sign={sign}", f"axis.modulo={turn}"]
+    spec = preset_spec("flexible-joint", overrides)
+    for head, place in (("position", sign * np.rad2deg(moved) % turn), ("position_rad", sign * moved)):
+        log = parse_log(table(["time", head], TIMES, place), "log.csv", spec)
+        np.testing.assert_allclose(log.positions["hub"], moved, atol=1e-6)
+
+
 def test_other_columns_are_left_alone_and_named():
     text = table(["time", "sway", "torque", "crab_sway_mm", "position_per_s"], *[TIMES] * 5)
     assert parse_log(text, "log.csv", paper()).ignored == ("torque", "crab_sway_mm", "position_per_s")

@@ -27,6 +27,7 @@ from gen_profile.studies.identification.log_table import SPELLINGS, LogTable, re
 from gen_profile.studies.identification.measurements import SI_UNITS, require_angle
 from gen_profile.support.errors import OutputError
 from gen_profile.support.units import COUNTS, UNITS
+from gen_profile_exporters.modulo import unwrapped
 
 # what loggers in some countries write, `gen-profile stream --log` among them: in English, German, French,
 # Italian and Spanish; the longest first: a part of one could be taken for another
@@ -136,7 +137,9 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     for (quantity, owner), values in signals.items():
         if quantity == "angle":
             require_angle(values)
-        by_quantity[quantity][owner] = read_only(values)
+        by_quantity[quantity][owner] = read_only(
+            _continuous(values, owner, spec) if quantity == "position" else values
+        )
     return MeasuredLog(
         source=source,
         times=times,
@@ -302,6 +305,14 @@ def _column(name: str, spec: Spec, where: str) -> _Column | None:
         template = "{where}: column {name!r} is in {unit}, which does not measure it."
         raise OutputError(template, where=where, name=name, unit=unit)
     return _Column(quantity=quantity, owner=owner, divisor=divisor)
+
+
+def _continuous(position: Array, axis: str, spec: Spec) -> Array:
+    """Go on where an axis begins anew after a turn, from as near as can be to where the move starts."""
+    number, scale = next((k, scale) for k, scale in enumerate(spec.axis_scales()) if scale.name == axis)
+    if scale.modulo is None:
+        return position
+    return unwrapped(position, scale.modulo / abs(scale.factor), float(spec.move.start[number]))
 
 
 def _divisor(spec: Spec, axis: str, unit: str, si: str) -> float | None:
