@@ -9,6 +9,9 @@ from counted_block import CountedBlock, compile_counting
 from solved_programmes import FOUND, NONE, ROWS, UNFINISHED, Programmes, crane_problem, text
 from st_interpreter import block_of
 
+from gen_profile.planner.execution import BlockInstance
+from gen_profile_exporters.planner.blocks.texts import linear_programme
+
 COUNT = int(os.environ.get("LINEAR_PROGRAMMES", "1000"))
 MET = 1e-6  # of full speed: bounds and sums of what is found
 LEAST = 2e-3  # full speeds: beyond the least cost
@@ -155,3 +158,61 @@ def test_c_and_the_interpreter_find_the_same_bits(programmes):
         places = np.array(found["aplace"][: problem.slots])
         assert (found["nresult"], found["niterations"]) == due[::2]
         assert np.array_equal(np.diff(places, prepend=0.0), due[1])
+
+
+PART = "solver(nPart := {part}, nAt := i, nSlots := nSlots, nRows := nRows, bFactored := bAgain, {arrays});"
+MATRICES = {"aBand": 200, "aRow": 13 * 48, "aWeight": 13, "aAcross": 13, "aRight": 50, "aPull": 13}
+
+
+def equations_text():
+    """The block of equations within one that does all parts in one call; with bAgain for another g."""
+    inputs = "".join(f"g{name} : ARRAY [0..{size - 1}] OF LREAL; " for name, size in MATRICES.items())
+    own = "".join(f"{name} : ARRAY [0..{size - 1}] OF LREAL; " for name, size in MATRICES.items())
+    arrays = ", ".join(f"{name} := {name}" for name in (*MATRICES, "aDx", "aRowNew"))
+
+    def over(count, part):
+        return f"FOR i := 0 TO {count} - 1 DO {PART.format(part=part, arrays=arrays)} END_FOR;"
+
+    copies = "".join(
+        f"FOR i := 0 TO {size - 1} DO {name}[i] := g{name}[i]; END_FOR;\n"
+        for name, size in MATRICES.items()
+        if name != "aBand"
+    )
+    return f"""{linear_programme("Programme", slots=48, rows=13)}
+FUNCTION_BLOCK Called
+VAR_INPUT nSlots : DINT; nRows : DINT; bAgain : BOOL; {inputs} END_VAR
+VAR_OUTPUT aDx : ARRAY [0..49] OF LREAL; aRowNew : ARRAY [0..12] OF LREAL; END_VAR
+VAR solver : Programme_equations; i : DINT; {own} END_VAR
+{copies}
+IF bAgain THEN {over("nSlots", 10)} ELSE
+FOR i := 0 TO 199 DO aBand[i] := gaBand[i]; END_FOR;
+{over("nSlots", 4)} END_IF;
+{over("nRows", 6)} {over("nSlots", 7)}
+END_FUNCTION_BLOCK
+"""
+
+
+def test_equations_of_a_step_are_solved_as_by_numpy():
+    """Rows of equal sums weigh nothing, those of a pair weigh each other; then for another right side."""
+    block = BlockInstance(equations_text())
+    for number in range(20):
+        draw = np.random.default_rng([7, number])
+        slots, equal, pairs = int(draw.integers(16, 49)), int(draw.integers(1, 6)), int(draw.integers(0, 5))
+        rows = equal + 2 * pairs
+        half = sum(np.diag(draw.uniform(-1, 1, slots - k) + (k == 0) * 3, -k) for k in range(4))
+        banded, border, weighs = half @ half.T, draw.normal(size=(rows, slots)), np.zeros((rows, rows))
+        for at in range(equal, rows, 2):
+            factor = draw.normal(size=(2, 2))
+            weighs[at : at + 2, at : at + 2] = factor @ factor.T
+        given = {name: np.zeros(size) for name, size in MATRICES.items()}
+        for k in range(4):
+            given["aBand"][4 * k + k : 4 * slots : 4] = np.diag(banded, -k)
+        given["aRow"].reshape(13, 48)[:rows, :slots] = border
+        given["aWeight"][:rows] = np.diag(weighs)
+        given["aAcross"][1:rows] = np.diag(weighs, -1)
+        for again in (0, 1):
+            given["aRight"][:slots] = right = draw.normal(size=slots)
+            given["aPull"][:rows] = pull = draw.normal(size=rows)
+            issued = block.call(np.concatenate([[slots, rows, again], *given.values()])[None])[0]
+            due = np.linalg.solve(np.block([[banded, border.T], [border, -weighs]]), np.r_[right, pull])
+            assert np.allclose(np.r_[issued[:slots], issued[50 : 50 + rows]], due, rtol=1e-6, atol=1e-8)

@@ -13,7 +13,16 @@ from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE, Planner
 from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent
-SIDES = 12  # of a polygon
+SIDES = 12  # of a polygon, whose normals have the cosines
+QUARTER = [1.0, 0.8660254037844387, 0.5]
+COSINES = [
+    *QUARTER,
+    0.0,
+    *(-c for c in reversed(QUARTER)),
+    *(-c for c in QUARTER[1:]),
+    0.0,
+    *reversed(QUARTER[1:]),
+]
 LONGEST, FEWEST = (
     64,
     40,
@@ -50,7 +59,7 @@ class Sizes:
 
 
 def linear_programme(name: str, *, slots: int, rows: int) -> str:
-    """Write the block of linear programmes.
+    """Write the block of linear programmes, behind the blocks that it has within it.
 
     Parameters
     ----------
@@ -70,8 +79,19 @@ def linear_programme(name: str, *, slots: int, rows: int) -> str:
         "band": 4 * (slots + 2),
         "wide": slots + 2,
     }
-    last = {f"last_{array}": length - 1 for array, length in lengths.items()}
-    return filled("linear_programme", linear_programme=name, slots=slots, wide=slots + 2, rows=rows, **last)
+    values = {
+        "linear_programme": name,
+        "equations": f"{name}_equations",
+        "polygon_weight": f"{name}_polygon_weight",
+        "sides_constants": constant_lines(
+            {"cSides": SIDES, "cCosine": COSINES, "cSine": [*COSINES[-SIDES // 4 :], *COSINES[: -SIDES // 4]]}
+        ),
+        **{f"last_{array}": length - 1 for array, length in lengths.items()},
+    }
+    return "\n".join(
+        filled(part, slots=slots, wide=slots + 2, rows=rows, **values)
+        for part in ("equations", "polygon_weight", "linear_programme")
+    )
 
 
 def operations(constants: PlannerConstants) -> int:

@@ -62,7 +62,7 @@ def _renamed(text: str, name: str, own: str) -> str:
     """Begin the names of the blocks of a motion as the own block's name, as vendors' formats ask."""
     before = name.replace("-", "_")
     text = re.sub(rf"\b{before}_planner\b", f"{own}_motion", text)
-    return re.sub(rf"\b{before}_(linear_programme|account|modes|rope_model)\b", rf"{own}_\1", text)
+    return re.sub(rf"\b{before}_(?=[a-z])", f"{own}_", text)
 
 
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
