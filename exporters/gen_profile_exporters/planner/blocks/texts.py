@@ -79,7 +79,7 @@ def linear_programme(name: str, *, slots: int, rows: int) -> str:
         "band": 4 * (slots + 2),
         "wide": slots + 2,
     }
-    values = {
+    values: dict[str, str | int] = {
         "linear_programme": name,
         "equations": f"{name}_equations",
         "polygon_weight": f"{name}_polygon_weight",
@@ -115,14 +115,15 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
     watched = sizes.of(constants)
     modes, swings = constants.modes, constants.modes * (1 + len(watched))
     name = constants.name.replace("-", "_")
-    names = {part: f"{name}_{part}" for part in ("linear_programme", "account", "modes", "planner")}
+    parts = ("linear_programme", "account", "modes", "motion_bounds", "decisions", "setpoints", "planner")
+    names = {part: f"{name}_{part}" for part in parts}
     shown = [*range(2 * modes), *range(swings - modes, swings)]  # as given, and both ends of the errors
     rows, slots = 2 * len(shown) + 1, longest(constants)  # those of the swings, and a target's way
     plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
     share = (constants.sway_share or LEAST_SHARE * constants.sway_limit) / len(constants.axes)
     stops = _stop_share(constants)
-    parts = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in watched)]
-    bounds = np.outer(share * np.array(parts), _shares(constants)).ravel()
+    levels = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in watched)]
+    bounds = np.outer(share * np.array(levels), _shares(constants)).ravel()
     lengths = {
         "live": max(1, len(constants.live)), "swing": swings, "rowed": len(shown), "slot": slots,
         "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
@@ -142,14 +143,20 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "bounds": initialiser([literal(float(v)) for v in bounds]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, watched)),
+        "motion_constants": filled("motion_constants", slots=slots).rstrip(),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
     }
-    measured = "bMeasured := nQuiet < cQuiet," if account else ""
+    follows: dict[str, str | int] = {"follows": int(account is not None), "measured": "", "uncalm": ""}
+    if account:
+        follows |= {
+            "measured": "bMeasured := nQuiet < cQuiet,",
+            "uncalm": "bUncalm := bUncalm AND NOT bPlanned,",
+        }
     return "\n".join(
         [
             linear_programme(names["linear_programme"], slots=slots, rows=rows),
             *([account] if account else (filled(part, **values) for part in ("modes", "account"))),
-            filled("planner", follows=int(account is not None), measured=measured, **values),
+            *(filled(part, **follows, **values) for part in parts[3:]),
         ]
     )
 
@@ -202,7 +209,6 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
     return {
         "cModes": c.modes,
         "cShown": shown,
-        "cSlots": slots,
         "cPlan": plan,
         "cFuture": plan + 4,
         "cOwnWork": 80,  # operations of every cycle

@@ -1,0 +1,155 @@
+"""The planner's table of decisions and its setpoints, each called alone."""
+
+import re
+
+import numpy as np
+import pytest
+from played_planner import played_text
+from scipy.interpolate import BSpline
+
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.spec.reading import preset_spec
+
+BEGIN, COMMAND, CHOOSE, FAILED, FOUND, SLOT, AGAIN = range(7)
+STOP, TARGET, SPEED, PROMPT = 1, 2, 3, 4
+NONE, REST, THERE, RAMP, DECLINE, PROMPTLY = range(6)
+SLOTS = 64
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    text = played_text(preset_spec("bay-crane", []))
+    found = re.findall(r"(?s)FUNCTION_BLOCK bay_crane_(\w+)\n.*?END_FUNCTION_BLOCK\n", text)
+    whole = re.findall(r"(?s)FUNCTION_BLOCK bay_crane_\w+\n.*?END_FUNCTION_BLOCK\n", text)
+    return dict(zip(found, whole, strict=True))
+
+
+class Table:
+    """The table for an axis of 1 m/s that takes 20 slots of 0.25 m to full speed, on a way of 0 to 50 m."""
+
+    def __init__(self, blocks):
+        self.block = BlockInstance(blocks["decisions"])
+        self.names = list(self.block.outputs)
+        self.given = dict.fromkeys(self.block.inputs, 0.0)
+        self.given |= {"fUnit": 1.0, "fLimit": 1.0, "fHighest": 50.0, "fLength": 0.25, "fReach": 10.0}
+        self.given["fMostChange"] = 0.05
+        self.ask(BEGIN)
+
+    def ask(self, order, **given):
+        self.given |= given | {"nOrder": order}
+        return dict(zip(self.names, self.block.call(np.array([[*self.given.values()]]))[0], strict=True))
+
+    def command(self, kind, goal=0.0, **given):
+        return self.ask(COMMAND, nCommand=kind, fGoal=goal, bNew=1.0, **given)
+
+    def fails(self, tried, **given):
+        return self.ask(
+            FAILED, nOfKind=tried["nKind"], nOfLength=tried["nLength"], nOfRamp=tried["nRamp"], **given
+        )
+
+
+@pytest.mark.parametrize(("command", "kind", "first"), [(STOP, REST, 20), (TARGET, THERE, 30)])
+def test_a_motion_is_sought_in_fewer_slots_until_none_is_left_between(blocks, command, kind, first):
+    """The fewest slots that are found are those at which a search by halves ends, whatever they are."""
+    for fewest in range(3, 40):
+        table, now, failed = Table(blocks), 40, []
+        table.command(command, 20.0)
+        assert table.ask(CHOOSE, nNow=now, bLeadsNow=1.0)["nLength"] == first
+        while (tried := table.ask(CHOOSE, nNow=now, bLeadsNow=1.0))["nKind"]:
+            assert tried["nKind"] == kind and tried["nLength"] < now and tried["nLength"] not in failed
+            if tried["nLength"] >= fewest:
+                now = tried["nLength"]
+                table.ask(FOUND, nOfKind=kind)
+            else:
+                failed.append(tried["nLength"])
+                table.fails(tried)
+        assert now == fewest
+
+
+def test_what_failed_counts_a_slot_less_in_each_slot(blocks):
+    table = Table(blocks)
+    table.command(STOP)
+    table.fails(table.ask(CHOOSE, nNow=40.0))
+    assert table.ask(CHOOSE, nNow=40.0)["nLength"] == 30
+    table.ask(SLOT)
+    assert table.ask(CHOOSE, nNow=39.0)["nLength"] == 29
+
+
+def test_a_target_is_sought_in_more_slots_than_the_axis_takes_and_then_by_its_speed(blocks):
+    table = Table(blocks)
+    table.command(TARGET, 2.0)
+    lengths = []
+    while (tried := table.ask(CHOOSE))["nKind"] == THERE:
+        lengths.append(tried["nLength"])
+        table.fails(tried)
+    assert lengths[0] == round(2 * np.sqrt(2 * 8.0 * 10.0) + 12)  # 8 slots at full speed away
+    assert lengths == sorted(lengths) and lengths[-1] == SLOTS
+    assert tried["nKind"] == RAMP and 0.0 < tried["fRamp"] < 1.0
+    assert table.ask(FOUND, nOfKind=DECLINE)["nLater"] == 12
+    assert table.ask(CHOOSE)["nKind"] == NONE  # once in a slot
+    table.ask(SLOT)
+    assert table.ask(CHOOSE)["nKind"] in (THERE, RAMP)
+
+
+def test_a_speed_is_another_one_beyond_its_band_and_the_end_where_there_is_no_room(blocks):
+    table = Table(blocks)
+    begun = table.command(SPEED, 0.5, fPlace=20.0)
+    assert begun["bChange"] and begun["nDoes"] == SPEED
+    assert not table.ask(COMMAND, bNew=0.0, fGoal=0.53)["bChange"]
+    assert table.ask(COMMAND, fGoal=0.55)["bChange"]
+    assert table.ask(COMMAND, fGoal=0.55, fLimit=0.3)["fAim"] == 0.3
+    ramp = table.ask(CHOOSE)
+    assert (ramp["nKind"], ramp["fRamp"], ramp["nRamp"]) == (RAMP, 0.3, 10)
+    assert table.ask(COMMAND, fGoal=-0.55)["bChange"]
+    table.ask(COMMAND, fPlace=0.5)
+    ends = table.ask(CHOOSE)
+    assert ends["bNoRoom"] and ends["nDoes"] == TARGET and ends["fAim"] == 0.0 and ends["fTop"] == 0.3
+    assert table.command(SPEED, 0.0)["nDoes"] == STOP
+
+
+def test_a_prompt_stop_that_fails_may_leave_four_times_as_much(blocks):
+    table = Table(blocks)
+    assert table.command(PROMPT)["fEase"] == 1.0
+    tried = table.ask(CHOOSE, nNow=30.0, fSpeed=1.0)
+    assert (tried["nKind"], tried["nLength"]) == (PROMPTLY, 29)
+    assert table.fails(tried)["fEase"] == 4.0
+
+
+def test_a_decline_that_fails_is_sought_longer_and_then_behind_a_gentler_ramp(blocks):
+    table = Table(blocks)
+    table.command(SPEED, 0.5, fPlace=20.0)
+    tried = table.ask(CHOOSE)
+    longer = table.fails({**tried, "nKind": DECLINE, "nLength": 50}, nOfBefore=15)
+    assert longer["bLonger"] and longer["nLater"] == 18
+    gentler = table.fails({**tried, "nKind": DECLINE, "nLength": 15 + SLOTS}, nOfBefore=15)
+    assert not gentler["bLonger"] and gentler["nLater"] == 12 and gentler["fLeaves"] == pytest.approx(0.45)
+    assert table.ask(CHOOSE)["nRamp"] > tried["nRamp"]
+
+
+def test_setpoints_are_the_derivatives_and_the_integral_of_one_spline(blocks):
+    """Over a whole motion, beside SciPy's B-spline of the same coefficients."""
+    draw, cycles, slot = np.random.default_rng(3), 20, 0.1
+    size = int(re.search(r"aFuture : ARRAY \[0..(\d+)\]", blocks["setpoints"])[1]) + 1
+    text = f"""{blocks["setpoints"]}
+FUNCTION_BLOCK Called
+VAR_INPUT nTick : DINT; fFrom : LREAL; nAhead : DINT; f0 : LREAL; f1 : LREAL; f2 : LREAL; f3 : LREAL; END_VAR
+VAR_OUTPUT fPosition : LREAL; fVelocity : LREAL; fAcceleration : LREAL; fTimeToGo : LREAL; END_VAR
+VAR given : bay_crane_setpoints; aFuture : ARRAY [0..{size - 1}] OF LREAL; END_VAR
+aFuture[0] := f0; aFuture[1] := f1; aFuture[2] := f2; aFuture[3] := f3;
+given(bMoving := TRUE, nTick := nTick, nSlot := {cycles}, fSlot := {slot!r}, fFrom := fFrom, nAhead := nAhead,
+    aFuture := aFuture);
+fPosition := given.fPosition; fVelocity := given.fVelocity; fAcceleration := given.fAcceleration;
+fTimeToGo := given.fTimeToGo;
+END_FUNCTION_BLOCK
+"""
+    block = BlockInstance(text)
+    future = np.r_[0.0, 0.0, draw.normal(size=6), np.zeros(6)]
+    spline = BSpline(np.arange(-2.0, len(future) + 1) * slot, future, 2)
+    place = spline.antiderivative()
+    for at in range(9):
+        for tick in (1, 7, 20):
+            row = [tick, place(at * slot), 7 - at, *future[at : at + 4]]
+            issued = block.call(np.array([row]))[0]
+            time = (at + tick / cycles) * slot
+            due = place(time), spline(time), spline.derivative()(time)
+            assert np.allclose(issued[:3], due, rtol=0, atol=1e-9)
