@@ -143,7 +143,6 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "bounds": initialiser([literal(float(v)) for v in bounds]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, watched)),
-        "motion_constants": filled("motion_constants", slots=slots).rstrip(),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
     }
     follows: dict[str, str | int] = {"follows": int(account is not None), "measured": "", "uncalm": ""}
@@ -156,9 +155,20 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         [
             linear_programme(names["linear_programme"], slots=slots, rows=rows),
             *([account] if account else (filled(part, **values) for part in ("modes", "account"))),
-            *(filled(part, **follows, **values) for part in parts[3:]),
+            *(
+                filled(part, motion_constants=_common(part, slots), **follows, **values)
+                for part in parts
+                if part not in ("linear_programme", "account", "modes")
+            ),
         ]
     )
+
+
+def _common(part: str, slots: int) -> str:
+    """Declare those of the constants that blocks have in common that a block uses."""
+    body = (FOLDER / f"{part}.st").read_text("ascii")
+    lines = filled("motion_constants", slots=slots).splitlines()
+    return "\n".join(line for line in lines if re.search(rf"\b{line.split()[0]}\b", body))
 
 
 def _stop_share(c: PlannerConstants) -> float:
