@@ -385,6 +385,14 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
             "limits.axis.y={velocity=1.0, acceleration=0.1, jerk=1.0, travel=[0.0, 20.0]}",
         ],
     ),
+    "bridge": parse_spec(  # its drives take longer to full speed than pulses last, and errors count
+        GANTRY,
+        [
+            *("export.cycle_time=0.02", "planner.live={L=[3.0, 12.0]}", "robustness.uncertain={L=0.04}"),
+            "limits.axis.x={velocity=2.0, acceleration=0.15, jerk=0.2, travel=[0.0, 150.0]}",
+            "limits.axis.y={velocity=0.63, acceleration=0.12, jerk=0.2, travel=[0.0, 25.0]}",
+        ],
+    ),
     "gyro": preset_spec(  # gusts and errors are small, so that a wrong estimate shows
         "gantry-crane",
         [

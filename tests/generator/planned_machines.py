@@ -100,6 +100,9 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
         (300, 83, 197),  # a stop 4 s late, as searches that came too late went on as if they had not
         (300, 80, 155),  # never ready again: disabled while a plan was sought with what was just taken over
     ],
+    "bridge": [
+        (600, 1032155232, 160),  # 14 s backwards, as the rest of a plan that was removed in part was a stop
+    ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
         (300, 5, 97),  # 11 s late at a target
