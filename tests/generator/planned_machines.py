@@ -102,6 +102,7 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
     ],
     "bridge": [
         (600, 1032155232, 160),  # 14 s backwards, as the rest of a plan that was removed in part was a stop
+        (600, 1032155232, 22),  # 234 s to a target, as what is left broke each rise of the pulses off
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded
