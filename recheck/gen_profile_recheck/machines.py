@@ -147,11 +147,8 @@ def _joint(q: Values, a: Values, k: SimpleNamespace) -> Posture:
 
 def _two_joints(q: Values, a: Values, k: SimpleNamespace) -> Posture:
     upper, lower, length, s = _direction(q[:2]), _direction(q[2:]), k.L0 + a[2], k.m2 / k.m1
-    (u, ux, uy), (n, nx, ny), across = (
-        upper.vectors,
-        lower.vectors,
-        _cross(upper.vectors[0], lower.vectors[0]),
-    )
+    (u, ux, uy), (n, nx, ny) = upper.vectors, lower.vectors
+    across = _cross(u, n)
     share = 1 / (1 + s * inner(across, across))
 
     def bent(whirled: Scalar, swung: Scalar, carry: Values, drag: Values) -> list[Scalar]:

@@ -34,21 +34,20 @@ on the way, and likewise what is for zones and events where there are none.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from textwrap import indent
 
-import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner import error_constants as of_errors
 from gen_profile_exporters.planner import search_constants as of_search
 from gen_profile_exporters.planner import sensor_constants as of_sensor
-from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants, axis_interface, axis_words
+from gen_profile_exporters.planner.axis_declarations import ZONES, axis_interface, axis_words
+from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import block_name, literal
 
 FUTURE = 140  # slots of a committed future
@@ -75,115 +74,6 @@ FIRST = re.compile(r"(?<![\w.])0(?: \* c\w+)+( \+ )?")
 WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class SwayConstants:
-    """How loads on ropes sway: sums of products of Chebyshev polynomials of the live parameters.
-
-    Attributes
-    ----------
-    curvatures : sequence of float
-        Bends of the live parameters, as in `PlannerConstants`.
-    exponents : (parameters, terms) array of int
-    coefficients : (rows, terms) array
-        For the squared frequencies (of two, for their sum and product), then for the matrix of the loads'
-        sway, row by row, in 1/s².
-    """
-
-    curvatures: Sequence[float]
-    exponents: NDArray[np.int64]
-    coefficients: Array
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class PlannerConstants:
-    """What the block needs to know of a machine.
-
-    Attributes
-    ----------
-    name, machine : str
-    axes : tuple of AxisConstants
-        That it plans.
-    cycle : float
-        s.
-    live : mapping of str to (float, float)
-        Ranges of the live parameters.
-    units, nominal : tuple of str, tuple of float
-        In which they are given, and their values where the controller gives none.
-    drift : tuple of float
-        By how much each may change before it is taken over anew.
-    rates : mapping of str to float
-        How fast some may change on the way, per s.
-    rope_length_gain : mapping of str to float
-        Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
-    sway_limit : float
-        m, that the loads may sway after a motion.
-    tolerated_sway : float
-        m, sway up to which nothing is done about it at rest; on the way, half of it.
-    events : bool
-        Whether the last events are outputs.
-    zones : bool
-        Whether blocked and slow intervals of the travel are inputs.
-    operations : int
-        That a cycle may spend.
-    periods : sequence of float
-        s, of the slowest mode at the corners of the live ranges.
-    sway_share : float
-        m, of the sway that errors may leave: what plans may spend; 0 for motions that leave none to first
-        order.
-    stated_error : float
-        Relative error that the frequencies may have.
-    second_order : (modes,) array
-        Weights in 1/m of what errors of the frequencies leave in each mode: of the integral of velocity and
-        wave, in which slots count by the square of their phase from the middle. 1 is worth half a slot at
-        full speed; 0 is no condition.
-    degrees : int
-        Chebyshev polynomials per live parameter.
-    curvatures : sequence of float
-        Of each live parameter t from -1 to 1: k of (t + k) / (1 + k t), of which they are; of the
-        frequencies and decays, then of what follows.
-    exponents : (parameters, terms) array of int
-        Which of them are multiplied.
-    least_decay : float
-        How slowly modes of the stated errors may decay, relative to those of the machine as given.
-    modes : int
-    model : (rows, terms) array
-        Coefficients for the squared frequencies (of two, for their sum and product), for the decays, then
-        with rates for the matrix of the linear machine in the loads' sway, row by row, or else for the
-        errors of the frequencies and the loads' sway by what is left in a mode, axis by axis; for a sensor.
-    sensor : SensorConstants or None
-    sway : SwayConstants or None
-        Where the loads hang on ropes, and the rope changes on the way or the load is measured.
-    """
-
-    name: str
-    machine: str
-    axes: tuple[AxisConstants, ...]
-    cycle: float
-    live: Mapping[str, tuple[float, float]]
-    units: tuple[str, ...]
-    nominal: tuple[float, ...]
-    drift: tuple[float, ...]
-    rates: Mapping[str, float]
-    rope_length_gain: Mapping[str, float]
-    sway_limit: float
-    tolerated_sway: float
-    events: bool
-    zones: bool
-    operations: int
-    periods: Sequence[float]
-    sway_share: float
-    stated_error: float
-    second_order: Array
-    degrees: int
-    curvatures: Sequence[float]
-    exponents: NDArray[np.int64]
-    least_decay: float
-    modes: int
-    model: Array
-    sensor: of_sensor.SensorConstants | None = None
-    sway: SwayConstants | None = None
 
 
 def block_text(constants: PlannerConstants) -> str:

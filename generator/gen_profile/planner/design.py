@@ -29,12 +29,8 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import Phrase, placed
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
-from gen_profile_exporters.planner.block import (
-    SLOTS_PER_PERIOD,
-    PlannerConstants,
-    SwayConstants,
-    block_text,
-)
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, block_text
+from gen_profile_exporters.planner.constants import PlannerConstants, SwayConstants
 
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
@@ -108,12 +104,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         most = period / (SLOTS_PER_PERIOD * FEWEST_CYCLES)
         problem = Phrase("at most {most:.2g} s for a machine that swings this fast", most=most)
         raise SpecError(placed("export.cycle_time", problem))
-    least = ZONED_OPERATIONS if spec.planner.zones else OPERATIONS
-    if spec.planner.operations and spec.planner.operations < least:
-        template = "at least {least} with zones, found {found}"
-        raise SpecError(
-            placed("planner.operations", Phrase(template, least=least, found=spec.planner.operations))
-        )
+    operations = _operations(spec, period)
     sensed = sensor_constants(spec, between(len(modes_of_live.live)), modes_of_live.others)
     parts = [modes_of_live.interpolant, modes_of_live.others, *([sensed[1]] if sensed else [])]
     exponents, coefficients = same_terms(*parts)
@@ -133,8 +124,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         rope_length_gain=lowered(spec),
         events=spec.planner.events,
         zones=spec.planner.zones,
-        operations=spec.planner.operations
-        or max(least, round(least * spec.export.cycle_time / 1e-3 * max(1.0, LEISURELY / period))),
+        operations=operations,
         periods=tuple(
             2.0 * np.pi / _rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live)
         ),
@@ -152,6 +142,16 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         sensor=sensed[0] if sensed else None,
         sway=_sway(spec, modes_of_live),
     )
+
+
+def _operations(spec: Spec, period: float) -> int:
+    """Give those that a cycle may take: more by default, the slower the cycle and the quicker the swing."""
+    least = ZONED_OPERATIONS if spec.planner.zones else OPERATIONS
+    stated = spec.planner.operations
+    if stated and stated < least:
+        template = "at least {least} with zones, found {found}"
+        raise SpecError(placed("planner.operations", Phrase(template, least=least, found=stated)))
+    return stated or max(least, round(least * spec.export.cycle_time / 1e-3 * max(1.0, LEISURELY / period)))
 
 
 def _sway(spec: Spec, modes_of_live: LiveModes) -> SwayConstants | None:

@@ -323,7 +323,7 @@ class CheckSpec(Checked, table="check"):
 
 @attrs.frozen(kw_only=True)
 class AxisSpec(Checked, table="axis"):
-    """What the target's axis counts in."""
+    """What the target's axis counts in, and after how many of these it begins anew."""
 
     unit: Literal["m", "mm", "um", "deg", "rad", "counts"]
     sign: Literal[1, -1] = 1
@@ -372,13 +372,12 @@ class Spec(Drawable, Checked):
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
-        move = self.move
         ranges = [f"{name} ±{100.0 * share:g} %" for name, share in self.robustness.uncertain.items()]
         return {
             "name": self.name,
             "machine": self.plant.type,
-            "move": f"{list(move.start)} to {list(move.target)}",
-            "duration": "the shortest" if move.shortest else f"{move.duration:g} s",
+            "move": f"{list(self.move.start)} to {list(self.move.target)}",
+            "duration": "the shortest" if self.move.shortest else f"{self.move.duration:g} s",
             "uncertain": ", ".join(ranges) or "nothing",
         }
 

@@ -9,7 +9,7 @@ import numpy as np
 from gen_profile.motion.profile import Array
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import initialiser
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, SwayConstants
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.blocks.texts import (
     SIDES,
     Sizes,
@@ -18,6 +18,7 @@ from gen_profile_exporters.planner.blocks.texts import (
     longest,
     planner,
 )
+from gen_profile_exporters.planner.constants import PlannerConstants, SwayConstants
 from gen_profile_exporters.playback.structured_text import literal
 
 SHARE = 0.5  # of the allowed sway, that motions may leave by stated errors

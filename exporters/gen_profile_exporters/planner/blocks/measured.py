@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gen_profile_exporters.planner.block import PlannerConstants
 from gen_profile_exporters.planner.blocks.texts import constant_lines, filled
+from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.planner.sensor_constants import (
     SensorConstants,
     model_rows,

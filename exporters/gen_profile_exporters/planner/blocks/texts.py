@@ -9,7 +9,8 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE, PlannerConstants
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE
+from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent
@@ -120,10 +121,6 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
     shown = [*range(2 * modes), *range(swings - modes, swings)]  # as given, and both ends of the errors
     rows, slots = 2 * len(shown) + 1, longest(constants)  # those of the swings, and a target's way
     plan = 2 * slots + 4  # a ramp, two slots of its speed, and a decline
-    share = (constants.sway_share or LEAST_SHARE * constants.sway_limit) / len(constants.axes)
-    stops = _stop_share(constants)
-    levels = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * stops for e in watched)]
-    bounds = np.outer(share * np.array(levels), _shares(constants)).ravel()
     lengths = {
         "live": max(1, len(constants.live)), "swing": swings, "rowed": len(shown), "slot": slots,
         "entry": rows * slots, "row": rows, "pair": max(1, rows // 2), "mode": modes,
@@ -140,17 +137,16 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "slots": slots,
         "stop_share": literal(_stop_share(constants)),
         "polygon": literal(float(np.cos(np.pi / SIDES))),
-        "bounds": initialiser([literal(float(v)) for v in bounds]),
+        "bounds": initialiser([literal(float(v)) for v in _bounds(constants, watched)]),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, watched)),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
     }
-    follows: dict[str, str | int] = {"follows": int(account is not None), "measured": "", "uncalm": ""}
-    if account:
-        follows |= {
-            "measured": "bMeasured := nQuiet < cQuiet,",
-            "uncalm": "bUncalm := bUncalm AND NOT bPlanned,",
-        }
+    follows: dict[str, str | int] = {
+        "follows": int(account is not None),
+        "measured": "bMeasured := nQuiet < cQuiet," if account else "",
+        "uncalm": "bUncalm := bUncalm AND NOT bPlanned," if account else "",
+    }
     return "\n".join(
         [
             linear_programme(names["linear_programme"], slots=slots, rows=rows),
@@ -175,6 +171,13 @@ def _stop_share(c: PlannerConstants) -> float:
     if not c.sway_share or c.rates:
         return 1.0
     return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share)
+
+
+def _bounds(c: PlannerConstants, watched: Sequence[float]) -> Array:
+    """Bound in m what a plan may leave in each mode: of the machine as given, and of those watched."""
+    share = (c.sway_share or LEAST_SHARE * c.sway_limit) / len(c.axes)
+    levels = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * _stop_share(c) for e in watched)]
+    return np.outer(share * np.array(levels), _shares(c)).ravel()
 
 
 def _shares(c: PlannerConstants) -> Array:
@@ -222,13 +225,12 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cPlan": plan,
         "cFuture": plan + 4,
         "cOwnWork": 80,  # operations of every cycle
-        "cFoundWork": 250
-        + 8 * slots
-        + 15 * swings,  # operations where a programme is found, and the next begins
+        # operations where a programme is found, and the next begins
+        "cFoundWork": 250 + 8 * slots + 15 * swings,
         "cReserve": 150 + 11 * plan + 30 * swings,  # operations where a plan was found
         "cSlotWork": 650 + rows * (rows + 10),  # operations of an iteration, for each slot
-        "cStepWork": 2_200 * (shown - c.modes)
-        + 2 * rows * (20 + rows * (rows + 14)),  # and for each iteration
+        # and for each iteration
+        "cStepWork": 2_200 * (shown - c.modes) + 2 * rows * (20 + rows * (rows + 14)),
         "cVelocity": [axis.velocity for axis in c.axes],
         "cAcceleration": [axis.acceleration for axis in c.axes],
         "cJerk": [axis.jerk for axis in c.axes],

@@ -10,7 +10,6 @@ from gen_profile_exporters.planner.block import (
     ROUNDING,
     STILL,
     WHERE,
-    PlannerConstants,
     interface,
     narrow,
     with_while_loops,
@@ -24,6 +23,7 @@ from gen_profile_exporters.planner.blocks.texts import (
     operations,
     planner,
 )
+from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import block_name, literal
 
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command

@@ -38,9 +38,8 @@ FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis w
 NOTICED = 0.2  # periods, in which the end of a motion is
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
-NOTHING = (
-    0.01  # of the allowed sway, too little to be seen: stated bounds of sway and stops may be left by so much
-)
+# of the allowed sway, too little to be seen: stated bounds of sway and stops may be left by so much
+NOTHING = 0.01
 LEFT, OVERSTATED = "left by errors", "overstated"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
 ACTS = 2.0  # slots, in which what a stick asked for is led to
@@ -279,14 +278,25 @@ def stops(run: Followed) -> Iterator[Allowance]:
             margin = max(limits.margin for limits in run.limits)
             yield from greatest("loose", wide, margin + EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
-        takes = in_time(run, to_speeds(run, _while_it_reacts(run, begin)))
-        rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
-        for k, limits in enumerate(run.limits):
-            leads = known[k] + limits.velocity * takes  # a stop that is not planned yet may end there
-            yield Allowance("loose", begin, max(up[k, order.begin], down[k, order.begin]), leads)
-            yield from greatest(
-                "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
-            )
+        yield from _no_wider(run, order, own, known, np.maximum(up, down))
+
+
+def _no_wider(run: Followed, order: TimedOrder, own: slice, known: Array, wide: Array) -> Iterator[Allowance]:
+    """Judge how wide the ends of a stop are, as it begins and once the axes rest.
+
+    Parameters
+    ----------
+    known : (axes,) array
+        m, to the farthest target so far: a stop that is not planned yet may end beyond it.
+    wide : (axes, cycles) array
+        m, from the axes to the farther ends.
+    """
+    takes = in_time(run, to_speeds(run, _while_it_reacts(run, own.start)))
+    rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
+    for k, limits in enumerate(run.limits):
+        leads = known[k] + limits.velocity * takes
+        yield Allowance("loose", own.start, wide[k, order.begin], leads)
+        yield from greatest("loose", wide[k, own] * rests, limits.margin + EXACT, own.start)
 
 
 def _while_it_reacts(run: Followed, cycle: int) -> Array:
