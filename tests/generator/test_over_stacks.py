@@ -192,13 +192,17 @@ class TestCheck:
                 assert nearest(spec, response.times, bodies).room == pytest.approx(found, abs=1e-6)
 
 
-def test_a_library_gives_no_profile_for_lower_stacks(tmp_path):
-    """A rail that is lower by a metre has all stacks higher by one."""
-    yard = quay([[8.0, 10.5, 20.0]], move={"start": [0.0, 26.0], "target": [20.0, 26.0]})
-    assert gp.run_sweep(yard, {"path.rail": [33.0, 36.0]}, ["csv"], tmp_path).statuses == {"passed": 2}
-    for asked, used in ((33.0, 33.0), (35.0, 33.0), (36.0, 36.0)):
-        assert gp.lookup(tmp_path, {"path.rail": asked}).used == {"path.rail": used}
-    assert "path.clearance" in gp.lookup(tmp_path, {"path.rail": 35.0}).passed_over[1]
+@pytest.mark.parametrize(("key", "low", "high"), [("path.rail", 36.0, 33.0), ("path.stacks.1.2", 20.0, 23.0)])
+def test_a_library_gives_no_profile_for_lower_stacks(tmp_path, key, low, high):
+    """A rail that is lower by a metre has all stacks higher by one; one stack may be higher by itself."""
+    stacks = [[2.0, 4.0, 1.0], [8.0, 10.5, 20.0]]
+    yard = quay(stacks, move={"start": [0.0, 26.0], "target": [20.0, 26.0]})
+    assert gp.run_sweep(yard, {key: sorted((low, high))}, ["csv"], tmp_path).statuses == {"passed": 2}
+    between = (2.0 * low + high) / 3.0
+    for asked, used in ((high, high), (between, high), (low, low)):
+        assert gp.lookup(tmp_path, {key: asked}).used == {key: used}
+    (reason,) = gp.lookup(tmp_path, {key: between}).passed_over.values()
+    assert "path.clearance" in reason
 
 
 @pytest.mark.parametrize("end", ["start", "target"])

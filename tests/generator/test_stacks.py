@@ -1,5 +1,7 @@
 """What may stand under a crane, as a spec states it, and how near a load comes to it."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from generator.quay import STACKS, quay
@@ -8,7 +10,7 @@ from scipy.interpolate import CubicSpline
 import gen_profile as gp
 from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.methods.solvers.over_stacks.hoist import Rates, highest, least_time, rest_to_rest
-from gen_profile.spec.reading import spec_from_dict
+from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.spec.stacks import trolley_and_hoist
 
 PROFILE = [[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [10.5, 6.0], [10.5, 2.0], [12.0, 3.0]]
@@ -126,6 +128,42 @@ def test_one_way_to_state_stacks_replaces_another():
     changed = quay(path={"profile": PROFILE}, move={"start": [20.0, 10.0]})
     assert changed.path.stacks == AS_STACKS
     assert gp.evolve_spec(changed, path={"stacks": STACKS}).path.stacks == quay().path.stacks
+
+
+FILED = '[path]\nrail = 36.0\nload = [2.5, 2.6]\nfile = "bay.csv"\n'
+LISTED = FILED.replace('file = "bay.csv"', "stacks = [[1, 2, 3], [4, 5, 6]]")
+
+
+@pytest.mark.parametrize("text", [FILED, LISTED])
+@pytest.mark.parametrize(
+    ("change", "stacks"),
+    [
+        ("path.stacks.1.2=7.5", ((1.0, 2.0, 3.0), (4.0, 5.0, 7.5))),
+        ("path.stacks.0=[0.0, 2, 4]", ((0.0, 2.0, 4.0), (4.0, 5.0, 6.0))),
+    ],
+)
+def test_one_number_of_one_stack_can_be_changed(tmp_path, text, change, stacks):
+    (tmp_path / "bay.csv").write_text("from,to,height\n1,2,3\n4,5,6\n", "utf-8")
+    document = {**quay(move={"start": [0.0, 10.0]}).to_dict(), **tomllib.loads(text)}
+    assert spec_from_dict(overridden(document, [change]), tmp_path).path.stacks == stacks
+
+
+@pytest.mark.parametrize(
+    ("text", "change", "sentence"),
+    [
+        (LISTED, "path.stacks.2.0=1", "'2' is none of the numbers 0 to 1"),
+        (LISTED, "path.stacks.1.3=1", "'3' is none of the numbers 0 to 2"),
+        (LISTED, "path.stacks.1.height=1", "'height' is none of the numbers 0 to 2"),
+        (FILED, "path.stacks.2.0=1", "path.stacks.2: there are 2 stacks, numbered from 0"),
+        (FILED, "path.stacks.1.3=1", "path.stacks.1: holds three numbers: 0 is from"),
+        (FILED, "path.stacks.1=high", r"path.stacks.1: must be three numbers in m"),
+    ],
+)
+def test_a_number_of_no_stack_is_refused(tmp_path, text, change, sentence):
+    (tmp_path / "bay.csv").write_text("from,to,height\n1,2,3\n4,5,6\n", "utf-8")
+    document = {**quay(move={"start": [0.0, 10.0]}).to_dict(), **tomllib.loads(text)}
+    with pytest.raises(gp.SpecError, match=sentence):
+        spec_from_dict(overridden(document, [change]), tmp_path)
 
 
 def test_which_axis_is_the_hoist():

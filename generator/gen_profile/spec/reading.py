@@ -364,14 +364,28 @@ def _override(document: Table, override: str) -> None:
     path = [part.strip() for part in key.split(".")]
     if not equals or not all(path):
         raise SpecError(f"set {override!r}: write KEY=VALUE, such as plant.L1=0.5.")
-    table = document
+    table: Any = document
     for depth, part in enumerate(path[:-1]):
-        inner = table.setdefault(part, {})
-        if not isinstance(inner, dict):
-            taken = ".".join(path[: depth + 1])
-            raise SpecError(f"set {override!r}: {taken!r} is a value, not a table.")
+        place = ".".join(path[: depth + 1])
+        if isinstance(table, list):
+            inner = table[_number_in(table, part, override)]
+        else:
+            inner = table.setdefault(part, {})
+        if not isinstance(inner, dict | list):
+            raise SpecError(f"set {override!r}: {place!r} is a value, not a table.")
         table = inner
-    _set(table, path, _override_value(text))
+    value = _override_value(text)
+    if isinstance(table, list):
+        table[_number_in(table, path[-1], override)] = value
+    else:
+        _set(table, path, value)
+
+
+def _number_in(values: list[Any], part: str, override: str) -> int:
+    """Read the number of a value in a list, from 0."""
+    if part.isdecimal() and int(part) < len(values):
+        return int(part)
+    raise SpecError(f"set {override!r}: {part!r} is none of the numbers 0 to {len(values) - 1} in that list.")
 
 
 def _set(table: Table, path: Sequence[str], value: object) -> None:

@@ -94,7 +94,9 @@ def stacks_of(table: Mapping[str, Any], folder: Path, structurer: Structurer) ->
     """
     faults = structurer.faults
     table = structurer.known(table, (*SOURCES, *kinds_of(StacksSpec)), "path")
-    given = [key for key in SOURCES if key in table]
+    stacks = table.get("stacks")
+    changes = stacks if isinstance(stacks, Mapping) else {}
+    given = [key for key in SOURCES if key in table and not (key == "stacks" and changes)]
     others = {key: value for key, value in table.items() if key not in SOURCES}
     if len(given) != 1:
         faults.add("path", "state one of stacks, profile and file: what stands under the crane")
@@ -102,13 +104,32 @@ def stacks_of(table: Mapping[str, Any], folder: Path, structurer: Structurer) ->
     (source,) = given
     rows = table[source]
     if source == "file":
-        rows = _rows(folder / rows, faults) if isinstance(rows, str) else rows
-        if not isinstance(rows, list):
+        if not isinstance(rows, str):
             faults.add("path.file", "must name a CSV file of the columns from, to, height, or place, height")
-            rows = []
+        rows = _rows(folder / rows, faults) if isinstance(rows, str) else []
     if source == "profile" or (source == "file" and rows and len(rows[0]) == 2):
         rows = _pieces(rows, f"path.{source}", structurer)
-    return {**others, "stacks": rows}
+    return {**others, "stacks": _changed(rows, changes, faults)}
+
+
+def _changed(rows: Any, changes: Mapping[str, Any], faults: Faults) -> Any:
+    """Put other numbers into stacks of a file or profile: whole rows, or some numbers of a row, by number."""
+    if not changes:
+        return rows
+    changed: list[Any] = [list(row) for row in rows]
+    for number, change in changes.items():
+        if not number.isdecimal() or int(number) >= len(changed):
+            faults.add(
+                f"path.stacks.{number}", "there are {count} stacks, numbered from 0", count=len(changed)
+            )
+        elif not isinstance(change, Mapping):
+            changed[int(number)] = change
+        elif change.keys() <= {"0", "1", "2"}:
+            for column, value in change.items():
+                changed[int(number)][int(column)] = value
+        else:
+            faults.add(f"path.stacks.{number}", "holds three numbers: 0 is from, 1 is to, 2 is the height")
+    return changed
 
 
 def _rows(path: Path, faults: Faults) -> list[list[float]]:
