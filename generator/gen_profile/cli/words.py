@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from gen_profile.spec.model import Spec
     from gen_profile.studies.comparison.compare import Comparison
     from gen_profile.studies.comparison.robustness import Robustness
-    from gen_profile.studies.identification.identify import Identification
-    from gen_profile.studies.identification.learning import Learning
     from gen_profile.studies.sweep.library import Library
     from gen_profile.studies.sweep.lookup import LookupResult
     from gen_profile.studies.sweep.run import Sweep
@@ -40,7 +38,6 @@ if TYPE_CHECKING:
 
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
-RESTS = 0.5  # of a half-range, from which on 1 % of another parameter is worth a word
 
 _TABLES = tomllib.loads((Path(__file__).parents[1] / "lists" / "figures.toml").read_text("utf-8"))
 # head → unit, figure, how many of the unit make one of the figure's
@@ -93,7 +90,7 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         rows.append(("left out", f"sensitivity to {names}: {solution.redundancy}"))
     rows += [("wrote", str(outcome.folder / artefact.path)) for artefact in outcome.artefacts]
     rows += [row for path, certificate in certificates.items() for row in _written(path, certificate)]
-    return _block(outcome.spec.name, rows)
+    return block(outcome.spec.name, rows)
 
 
 def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
@@ -115,7 +112,7 @@ def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
         ("check", _verdict(check)),
         *([] if certificate is None else (*_proved(certificate), *_written(judged.path, certificate))),
     ]
-    return _block(str(judged.path), rows)
+    return block(str(judged.path), rows)
 
 
 def _provenance(judged: JudgedFile) -> Iterator[tuple[str, str]]:
@@ -126,7 +123,7 @@ def _provenance(judged: JudgedFile) -> Iterator[tuple[str, str]]:
 
 def certificate(path: Path, document: Certificate) -> str:
     """Tell what a certificate proves."""
-    return _block(str(path), list(_proved(document)))
+    return block(str(path), list(_proved(document)))
 
 
 def _written(path: Path, certificate: Certificate) -> list[tuple[str, str]]:
@@ -160,14 +157,14 @@ def deployment(outcome: Deployment) -> str:
         rows.append(("sensor margins", f"{later:.2g} s later than stated, {times:.2g} times too much"))
     rows += [("proof", "skipped")] if outcome.proof is None else _proof(outcome.proof)
     rows += [("wrote", f"{outcome.folder / file.path}, {file.bytes} bytes") for file in outcome.files]
-    return _block(outcome.spec.name, rows)
+    return block(outcome.spec.name, rows)
 
 
 def block_judgement(judged: BlockJudgement) -> str:
     """Tell how a planner block was judged, or what became of one history."""
     rows = [*_provenance(judged)]
     if judged.history is None:
-        return _block(str(judged.path), [*rows, *_proof(judged.check)])
+        return block(str(judged.path), [*rows, *_proof(judged.check)])
     worst = judged.check.worst
     commands = (
         f"{command.time:.3g} s {command.command}" + "".join(f" {value:.4g}" for value in command.values)
@@ -181,7 +178,7 @@ def block_judgement(judged: BlockJudgement) -> str:
         ("sway on the way", _by_load(worst.on_the_way)),
         ("history kept", "passed" if judged.check.passed else "FAILED"),
     ]
-    return _block(str(judged.path), rows)
+    return block(str(judged.path), rows)
 
 
 def _proof(proof: Proof) -> list[tuple[str, str]]:
@@ -279,70 +276,6 @@ def robustness(curves: Robustness) -> str:
     return "\n".join([title, _text(table), *left_out])
 
 
-def identification(identified: Identification, path: Path) -> str:
-    """Tell what was identified, how well, and how the measurements agree with it."""
-    document = identified.to_dict()
-    rows = []
-    for name, row in document["parameters"].items():
-        size = f"{row['value']:.6g} ± {row['half_range']:.2g} {row['unit']}"
-        relative = f"±{100.0 * row['half_range'] / abs(row['value']):.2g} %; " if row["value"] else ""
-        rows.append((name, f"{size} ({relative}{row['given']:g} before)"))
-    for row in document["readings"]:
-        what = row["parameter"] if "parameter" in row else f"period of mode {row['mode']}"
-        read = row["value"] if "parameter" in row else row["seconds"]
-        off = (read - row["model"]) / row["uncertainty"]
-        size = f"{read:.6g} ± {row['uncertainty']:.2g} {row['unit']}"
-        rows.append((f"read {what}", f"{size}, {off:+.1f} σ off the model"))
-    for row in document["logs"]:
-        sizes = f"swing ±{row['swing']:.2g} {row['unit']}, noise {row['noise']:.2g} {row['unit']}"
-        taken = f" ({row['averages']} averages over {row['lasts_s']:.4g} s)" if row["averages"] else ""
-        samples = f"{row['samples']} samples of its {row['quantity']}{taken}"
-        rows.append((f"log of {row['load']}", f"{samples}, {sizes}"))
-        rows += [("as read", sentence) for sentence in row["read"]]
-    rows += [("WARNING", sentence) for sentence in identified.warnings()]
-    rows += [*_stated_ranges(identified), *_rests(identified)]
-    rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
-    return _block(identified.spec.name, rows)
-
-
-def learning(learned: Learning, path: Path) -> str:
-    """Tell which ranges are left, and what the runs showed."""
-    document = learned.to_dict()
-    rows = []
-    for name, row in document["parameters"].items():
-        (low, high), before = row["range"], row["before"]
-        size = f"{low:.5g} to {high:.5g} {row['unit']}"
-        rows.append((name, f"{size} ({before[0]:.5g} to {before[1]:.5g} before)"))
-    for row in document["runs"]:
-        if "seen" in row:
-            rows.append((f"{row['load']}", f"seen {row['seen']:.4g} ± {row['bound']:.2g} m after the motion"))
-            continue
-        left = f"{row['left']:.2g} of {row['swing']:.2g} {row['unit']} RMS left by the best machine"
-        rows.append((f"log of {row['load']}", f"the motion begins at {row['begins_s']:.2f} s; {left}"))
-    rows += [("WARNING", sentence) for sentence in learned.warnings()]
-    rows += [("ranges hold", f"with {document['confidence']:.1%} for each log"), ("wrote", str(path))]
-    return _block(learned.spec.name, rows)
-
-
-def _stated_ranges(identified: Identification) -> Iterator[tuple[str, str]]:
-    """Tell which range of the spec is wider than what the measurements leave open."""
-    for name, row in identified.to_dict()["parameters"].items():
-        fraction = row["half_range"] / abs(row["value"] or 1.0)
-        if row["stated"] is not None and row["stated"] > fraction:
-            yield "kept", f"the spec's range of {name}, ±{row['stated']:.2%}: it may change in service"
-
-
-def _rests(identified: Identification) -> Iterator[tuple[str, str]]:
-    """Tell what a result rests on that was not measured, where a per cent of that matters."""
-    uncertain = identified.given.robustness.uncertain
-    for name, row in identified.to_dict()["parameters"].items():
-        for other, moved in row["rests_on"].items():
-            if abs(moved) > RESTS * row["half_range"]:
-                range_ = f" (±{uncertain[other]:.2%})" if other in uncertain else ""
-                words = f"{other} as the spec states it{range_}: 1 % more makes {moved:+.2g} {row['unit']}"
-                yield f"{name} rests on", words
-
-
 def sweep(done: Sweep) -> str:
     """Tell how many cases ended how, with an example of each failure."""
     rows = [("varied", ", ".join(f"{axis.key} ({len(axis.values)})" for axis in done.store.grid.axes))]
@@ -351,7 +284,7 @@ def sweep(done: Sweep) -> str:
         rows.append((status, f"{count} of {len(done.store.grid)}{example}"))
     if done.kept:
         rows.append(("kept", f"{done.kept} that had been finished before"))
-    return _block(done.store.name, [*rows, ("wrote", str(done.table))])
+    return block(done.store.name, [*rows, ("wrote", str(done.table))])
 
 
 def found_profile(nearest: LookupResult) -> str:
@@ -367,7 +300,7 @@ def found_profile(nearest: LookupResult) -> str:
         *(("passed over", f"case {case}: {reason}") for case, reason in nearest.passed_over.items()),
         *(("file", str(nearest.judgement.path.parent / one["path"])) for one in nearest.row["artefacts"]),
     ]
-    return _block(nearest.judgement.spec.name, rows)
+    return block(nearest.judgement.spec.name, rows)
 
 
 def library(written: Library) -> str:
@@ -379,7 +312,7 @@ def library(written: Library) -> str:
         *zip(["wrote", *[""] * len(written.files)], map(str, written.files), strict=False),
         ("", f"{written.index} tells which is which"),
     ]
-    return _block(written.path.stem, rows)
+    return block(written.path.stem, rows)
 
 
 def report(made: Report, path: Path) -> str:
@@ -387,14 +320,14 @@ def report(made: Report, path: Path) -> str:
     rows = [("move", _move(made.design.spec)), ("check", _verdict(made.check))]
     rows += [("measured", sentence) for sentence in made.observed()]
     rows.append(("wrote", str(path)))
-    return _block(made.design.spec.name, rows)
+    return block(made.design.spec.name, rows)
 
 
 def planner_report(made: PlannerReport, path: Path) -> str:
     """Tell how the planner block was judged, and where the page lies."""
     judged = made.judgement
     rows = [*_provenance(judged), *_proof(judged.check), ("wrote", str(path))]
-    return _block(str(judged.path), rows)
+    return block(str(judged.path), rows)
 
 
 def _cost_of_lag(figures: Mapping[str, float], effort: str) -> list[tuple[str, str]]:
@@ -478,7 +411,8 @@ def _verdict(check: Check | None) -> str:
     )
 
 
-def _block(title: str, rows: Sequence[tuple[str, str]]) -> str:
+def block(title: str, rows: Sequence[tuple[str, str]]) -> str:
+    """Lay rows of a name and a text out below a title."""
     table = Table.grid(padding=(0, 2))
     for row in rows:
         table.add_row("", *row)

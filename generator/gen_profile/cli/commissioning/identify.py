@@ -99,7 +99,7 @@ def identify(
     picture: Path | None,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
-    from gen_profile.cli import words
+    from gen_profile.cli.commissioning.words import identification
     from gen_profile.studies.identification.identify import identify as run
     from gen_profile.studies.identification.identify import write_spec
     from gen_profile.studies.identification.measurements import Measurement, parse_period, parse_reading
@@ -121,7 +121,7 @@ def identify(
             raise
         draw(identified, picture, tell)
         write_spec(identified.spec, out, rewritten(identified.spec))
-    print_outcome({**identified.to_dict(), "path": str(out)}, words.identification(identified, out))
+    print_outcome({**identified.to_dict(), "path": str(out)}, identification(identified, out))
 
 
 def _to_change(chosen: SpecChoice) -> tuple[Spec, Callable[[Spec], str]]:
@@ -176,6 +176,7 @@ def learn(
     """
     from gen_profile.assurance.verification.check import replayed
     from gen_profile.cli import words
+    from gen_profile.cli.commissioning.words import learning
     from gen_profile.delivery.designs.design import design
     from gen_profile.studies.identification.identify import write_spec
     from gen_profile.studies.identification.learning import learn as run
@@ -191,7 +192,7 @@ def learn(
         write_spec(learned.spec, out, rewritten(learned.spec))
         made = design(learned.spec, formats, folder, progress=tell) if formats else None
     document = {**learned.to_dict(), "path": str(out), "design": None if made is None else made.to_dict()}
-    text = words.learning(learned, out)
+    text = learning(learned, out)
     print_outcome(document, text if made is None else f"{text}\n{words.design(made)}")
     if made is not None:
         warn(made.check)
