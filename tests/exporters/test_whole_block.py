@@ -133,11 +133,13 @@ def test_what_it_does_not_do_yet_is_said():
 
 
 @pytest.mark.slow
-def test_a_machine_without_stated_errors_moves_too():
-    block = BlockInstance(whole_text(parse_spec(BAY)))
+@pytest.mark.parametrize("rope", [{}, {"fL1": 5.5}], ids=["that stays", "that comes with it"])
+@pytest.mark.parametrize("changes", [[], ["robustness.uncertain={L1=0.05}"]], ids=["no errors", "errors"])
+def test_a_target_from_rest_is_reached_to_the_last_bit(changes, rope):
+    block = BlockInstance(whole_text(parse_spec(BAY, changes)))
     given = block.inputs | {"fActPosition": 10.0}
     rows = [given] + 100 * [given | {"bEnable": 1.0}]
-    rows += 3000 * [given | {"bEnable": 1.0, "bExecute": 1.0, "fTarget": 12.0}]
+    rows += 3000 * [given | {"bEnable": 1.0, "bExecute": 1.0, "fTarget": 12.0} | rope]
     issued = block.call(np.array([list(row.values()) for row in rows]))[-1]
     last = dict(zip(block.outputs, issued.tolist(), strict=True))
-    assert last["bDone"] == 1.0 and abs(last["fPosition"] - 12.0) < 1e-9
+    assert (last["bDone"], last["fPosition"], last["bPromise"]) == (1.0, 12.0, 1.0)
