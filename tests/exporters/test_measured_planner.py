@@ -50,7 +50,7 @@ bOn := bEnable;
 aLive[0] := fL1;
 aLive[1] := fm2;
 observer(bReady := planner.bReady, fVelocity := planner.fVelocity, bNews := bSensorValid, fValue := fSensor,
-    fAge := fSensorAge, nPeriod := 1340, bLed := TRUE, bStands := NOT planner.bMoving, bKept := TRUE,
+    fAge := fSensorAge, bLed := TRUE, bMoves := planner.bMoving, bKept := TRUE,
     aLive := aLive, aSwing := aSwing, aSwingRate := aSwingRate);
 nBefore := nCommand;
 bNew := FALSE;
@@ -65,7 +65,7 @@ bNew := bNew OR (nCommand <> nBefore);
 planner(bBegin := bBegin, bForget := TRUE, fBeginAt := fActPosition,
     nOperations := {operations(constants)} - 400,
     nCommand := nCommand, fGoal := fGoal, bNew := bNew, fLimit := 1.1, fLowest := 0.0, fHighest := 40.0,
-    bMeasured := observer.bUsed AND (observer.nObserved > 600), fSwing := aSwing[0],
+    bMeasured := observer.bSees, fSwing := aSwing[0],
     fSwingRate := aSwingRate[0], aLive := aLive);
 {given}
 fSway := observer.fSway;

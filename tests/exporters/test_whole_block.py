@@ -15,7 +15,6 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block
 from gen_profile.planner.interface import block_axes, live_inputs
 from gen_profile.spec.reading import parse_spec, preset_spec
-from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.registry import containers
@@ -57,6 +56,12 @@ def random_rows(inputs, cycles, seed):
             kind = draw.choice(["Slow", "Blocked"])
             given |= {f"a{kind}Low[1]": low, f"a{kind}High[1]": low + draw.choice([-1.0, 1.0, 2.5])}
             given["aSlowLimit[1]"] = round(draw.uniform(0.05, 0.5), 2)
+        if "fSensor" in inputs:
+            given |= {
+                "fSensor": round(draw.uniform(-0.1, 0.1), 3),
+                "fSensorAge": round(draw.uniform(0.0, 0.2), 2),
+            }
+            given |= {"bSensorValid": float(draw.random() > 0.1), "bSensorCheck": float(draw.random() < 0.1)}
         row = np.array(list(given.values()))
         if draw.random() < 0.03:
             row[draw.choice([k for k, name in enumerate(given) if name[0] != "b" and name[0] != "n"])] = (
@@ -66,9 +71,15 @@ def random_rows(inputs, cycles, seed):
     return np.concatenate(rows)
 
 
+MEASURED = [
+    "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}",
+    'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}',
+    "planner.disturbance={swing={payload=0.5}, gust={acceleration=0.1, longest=5.0}, settle=12.0}",
+]
 KINDS = {
     "zones": ["planner.zones=true", "planner.events=true"],
     "a rope that changes on the way": ["planner.live_rate={L1=0.1}", "planner.events=true"],
+    "a load that is measured": [*MEASURED, "planner.events=true"],
 }
 
 
@@ -122,14 +133,6 @@ def test_it_is_short_enough_to_be_reviewed(block):
     for one in blocks:
         most = 500 if follows and one.name.endswith("_motion") else 450
         assert one.body.count("\n") <= most, one.name
-
-
-def test_what_it_does_not_do_yet_is_said():
-    sensor = 'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}'
-    changes = ["planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}", sensor]
-    changes.append("planner.disturbance={swing={payload=0.5}, settle=12.0}")
-    with pytest.raises(ExportError, match="take no sensor, as yet"):
-        whole_text(preset_spec("bay-crane", changes))
 
 
 @pytest.mark.slow

@@ -24,6 +24,7 @@ from gen_profile_exporters.playback.structured_text import literal
 SHARE = 0.5  # of the allowed sway, that motions may leave by stated errors
 FAST = 0.25  # of what a mode may leave, the next faster one may
 ENDS = (-1.0, 1.0)  # shares of the errors, of the machines that are watched
+NO_LIVE = {"": (0.0, 1.0)}  # in the place of live parameters, where there are none
 LEFT_OUT = 1e-7  # of a mode, by the series of a slot or a cycle
 
 
@@ -50,8 +51,8 @@ def account_texts(c: PlannerConstants) -> str:
     modes, machines, slots = c.modes, 1 + len(ENDS), longest(c)
     swings, rows, plan, name = modes * machines, 6 * modes + 1, 2 * slots + 4, c.name.replace("-", "_")
     lengths = {
-        "live": len(c.live), "swing": swings, "mode": modes, "entry": rows * slots, "row": rows,
-        "pair": rows // 2, "plan": plan, "power": len(c.live) * _degrees(c), "matrix": modes**2,
+        "live": max(1, len(c.live)), "swing": swings, "mode": modes, "entry": rows * slots, "row": rows,
+        "pair": rows // 2, "plan": plan, "power": max(1, len(c.live)) * _degrees(c), "matrix": modes**2,
         "turn": machines * modes**2, "push": 4 * swings, "state": 2 * swings, "sweep": 2 * modes * swings,
         "sum": 2 * swings, "model_row": modes + modes**2, "step": max(3, 2 * modes), "machine": machines,
         "part": 6 * terms(c, _longest_slot(c)),
@@ -104,10 +105,11 @@ def _degrees(c: PlannerConstants) -> int:
 
 
 def _of_live(c: PlannerConstants) -> dict[str, object]:
+    lives = c.live or NO_LIVE
     return {
         "cLives": len(c.live),
-        "cLiveLow": [low for low, _ in c.live.values()],
-        "cLiveHigh": [high for _, high in c.live.values()],
+        "cLiveLow": [low for low, _ in lives.values()],
+        "cLiveHigh": [high for _, high in lives.values()],
         "cStretch": [1.0, *(1.0 + c.stated_error * share for share in ENDS)],
     }
 
@@ -122,8 +124,8 @@ def _of_rope(c: PlannerConstants) -> dict[str, object]:
         **_of_live(c),
         "cDegrees": _degrees(c),
         "cTerms": sway.coefficients.shape[1],
-        "cLiveBend": [float(v) for v in sway.curvatures],
-        "cExponent": [int(v) for v in sway.exponents.ravel()],
+        "cLiveBend": [float(v) for v in sway.curvatures] or [0.0],
+        "cExponent": [int(v) for v in sway.exponents.ravel()] or len(sway.coefficients[0]) * [0],
         "cModel": [float(v) for v in sway.coefficients.ravel()],
     }
 
@@ -143,8 +145,8 @@ def _of_account(c: PlannerConstants) -> dict[str, object]:
         **_of_live(c),
         "cCycle": c.cycle,
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
-        "cRate": [float(c.rates.get(name, 0.0)) for name in c.live],
-        "cLowers": [float(c.rope_length_gain.get(name, 0.0)) for name in c.live],
+        "cRate": [float(c.rates.get(name, 0.0)) for name in c.live or NO_LIVE],
+        "cLowers": [float(c.rope_length_gain.get(name, 0.0)) for name in c.live or NO_LIVE],
         "cTerms": longest_series,
         "cCycleTerms": short_series,
         "cModelWork": evaluated + modes + slot,

@@ -2,43 +2,46 @@
 
 import numpy as np
 
+from gen_profile_exporters.planner.blocks.followed import NO_LIVE
 from gen_profile_exporters.planner.blocks.texts import constant_lines, filled
 from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.planner.sensor_constants import (
     SensorConstants,
+    cycle_work,
     model_rows,
     real_constants,
     whole_constants,
 )
 
-ROWS_BEFORE = 3  # of the model by mode: frequency, decay and error; then sway, axis by axis
 # names in the block, by those of the constants that today's block has
 NAMES = {
     "cSensorOldest": "cOldest", "cSensorMost": "cMost", "cSensorStep": "cStep", "cSensorGate": "cGate",
     "cSensorFrozen": "cFrozen", "cSensorHides": "cHides", "cSensorNoisy": "cMostNoise",
     "cSensorSmoothing": "cSmoothing", "cSensorScale": "cMisread", "cSensorAlike": "cCorrelated",
-    "cSensorForgets": "cForgets", "cSensorFloor": "cFloor", "cSwing": "cSwing",
+    "cSensorForgets": "cForgets", "cSensorFloor": "cFloor", "cSwing": "cSwing", "cDampMost": "cGrown",
+    "cDampRoused": "cStill", "cSensorRows": "cSensorRows",
     "cExpectedLength": "cLength", "cDropOutCycles": "cDropOut",
 }  # fmt: skip
 
 
-def observer(c: PlannerConstants, sensor: SensorConstants, number: int = 0) -> str:
-    """Write the block of the observer along an axis, by its number among those that are planned."""
-    modes, lives = c.modes, c.live or {"": (0.0, 1.0)}
-    first = (ROWS_BEFORE + len(c.axes)) * modes + number * model_rows(modes)
-    model = np.vstack([c.model[: 2 * modes], c.model[first : first + model_rows(modes)]])
-    axes = len(c.axes)
+def observer(c: PlannerConstants, sensor: SensorConstants) -> str:
+    """Write the block of the observer along an axis, which is told which one."""
+    modes, lives, axes = c.modes, c.live or NO_LIVE, len(c.axes)
+    one = model_rows(modes)
+    model = np.vstack([c.model[: 2 * modes], c.model[-axes * one :]])
     known = real_constants(sensor, c.cycle) | whole_constants(sensor, modes, axes, c.cycle)
     exponents = c.exponents if c.live else np.zeros((1, model.shape[1]), dtype=np.int64)
     constants = {
         **{name: known[ours] for ours, name in NAMES.items()},
         "cRate": int(sensor.rate),
-        "cMostPush": c.axes[number].quick_deceleration,
+        "cMostPush": [axis.quick_deceleration for axis in c.axes],
         "cModes": modes,
         "cCycle": c.cycle,
         "cLives": len(c.live),
         "cDegrees": c.degrees,
         "cTerms": model.shape[1],
+        "cWork": cycle_work(sensor, modes),
+        "cModelWork": model.shape[1] * (2 * (2 * modes + one) + len(c.live)) + 4 * len(lives) * c.degrees,
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveBend": [float(v) for v in c.curvatures or (0.0, 0.0)],
@@ -46,7 +49,7 @@ def observer(c: PlannerConstants, sensor: SensorConstants, number: int = 0) -> s
         "cModel": [float(v) for v in model.ravel()],
     }
     lengths = {
-        "live": len(lives), "mode": modes, "observed": len(model), "power": len(lives) * c.degrees,
+        "live": len(lives), "mode": modes, "observed": 2 * modes + one, "power": len(lives) * c.degrees,
         "expected": int(known["cExpectedLength"]),
     }  # fmt: skip
     return filled(

@@ -14,6 +14,8 @@ from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent
+# of a target, that is damped on the way
+ROOM = "fAim := table.fAim, fRoom := cCalmRoom, fSpanLow := fSpanLow, fSpanHigh := fSpanHigh,"
 SIDES = 12  # of a polygon, whose normals have the cosines
 QUARTER = [1.0, 0.8660254037844387, 0.5]
 COSINES = [
@@ -31,6 +33,7 @@ LONGEST, FEWEST = (
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.2  # times that, of machines between both ends of the errors, which have no rows
+AGAIN = 1.1  # times where damping ends: so much left by what is committed asks for another motion
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 MACHINES = 16  # that are watched, where there are operations for them:
 SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
@@ -144,8 +147,10 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
     }
     follows: dict[str, str | int] = {
         "follows": int(account is not None),
-        "measured": "bMeasured := nQuiet < cQuiet," if account else "",
-        "uncalm": "bUncalm := bUncalm AND NOT bPlanned," if account else "",
+        "is_measured": int(constants.sensor is not None),
+        "measured": "bMeasured := nQuiet < cQuiet," if constants.sensor else "",
+        "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
+        "room": ROOM if constants.sensor else "",
     }
     return "\n".join(
         [
@@ -237,6 +242,18 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cStopShare": _stop_share(c),
         "cSwayLimit": c.sway_limit / len(c.axes),
         "cCalmRoom": _calm_room(c),
+        **_damping(c),
+    }
+
+
+def _damping(c: PlannerConstants) -> dict[str, object]:
+    """Give the sways of the slowest mode between which one that was measured is damped, in m."""
+    if c.sensor is None:
+        return {}
+    return {
+        "cDampsFrom": c.sensor.again,
+        "cDampsAgain": AGAIN * c.sensor.end,
+        "cDampsTo": c.sensor.end,
     }
 
 
@@ -267,10 +284,11 @@ def filled(part: str, **values: str | int) -> str:
     """Read a block's text and put in what it leaves open, as ``@name``.
 
     What stands between ``@where_follows`` and ``@end`` is for a rope that changes on the way, where
-    ``follows`` is given and not 0; between ``@where_stays`` and ``@end`` for one that does not.
+    ``follows`` is given and not 0; between ``@where_stays`` and ``@end`` for one that does not; and
+    between ``@where_measured`` and ``@end`` for a load that is measured, where ``is_measured`` is not 0.
     """
     follows = bool(values.get("follows"))
-    stated = {"follows": follows, "stays": not follows}
+    stated = {"follows": follows, "stays": not follows, "measured": bool(values.get("is_measured"))}
     text = WHERE.sub(
         lambda some: some[2] if stated.get(some[1], True) else "", (FOLDER / f"{part}.st").read_text("ascii")
     )

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping
 
-from gen_profile.support.errors import ExportError
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants
 from gen_profile_exporters.planner.block import (
     HOLD,
@@ -15,6 +14,7 @@ from gen_profile_exporters.planner.block import (
     with_while_loops,
 )
 from gen_profile_exporters.planner.blocks import followed
+from gen_profile_exporters.planner.blocks.measured import observer
 from gen_profile_exporters.planner.blocks.texts import (
     FOLDER,
     Sizes,
@@ -33,16 +33,11 @@ TOLERANCE = ("is not the cycle time of this block", "is not within 0.1 % of the 
 
 
 def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
-    """Write the planner block with all blocks that it has within it; the last one is its own.
-
-    Raises
-    ------
-    ExportError
-        It asks for what these blocks do not do yet.
-    """
-    if constants.sensor is not None:
-        raise ExportError("The blocks within blocks take no sensor, as yet.")
-    within = followed.motion(constants) if constants.rates else planner(constants, sizes or Sizes())
+    """Write the planner block with all blocks that it has within it; the last one is its own."""
+    follows = constants.rates or constants.sensor
+    within = followed.motion(constants) if follows else planner(constants, sizes or Sizes())
+    if constants.sensor:
+        within += "\n" + observer(constants, constants.sensor)
     motion = _renamed(within, constants.name, block_name(constants.name))
     return around(motion, constants)
 
@@ -50,9 +45,10 @@ def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
 def around(motion: str, constants: PlannerConstants) -> str:
     """Write the shell around a motion, `FB_NAME_motion` with the inputs and outputs of `planner.st`."""
     own = block_name(constants.name)
-    names = {part: f"{own}_{part}" for part in ("motion", "quick_stop", "zones", "event_log")}
+    names = {part: f"{own}_{part}" for part in ("motion", "observer", "quick_stop", "zones", "event_log")}
     parts = [motion]
-    values = names | {"last_zone": str(ZONES - 1), "last_live": str(max(1, len(constants.live)) - 1)}
+    lasts = {"zone": ZONES, "live": max(1, len(constants.live)), "mode": constants.modes}
+    values = names | {f"last_{array}": str(length - 1) for array, length in lasts.items()}
     taken = {"quick_stop": True, "zones": constants.zones, "event_log": constants.events}
     parts += [filled(part, **values) for part, is_taken in taken.items() if is_taken]
     return narrow(with_while_loops("\n".join([*parts, _shell(constants, values)])))
@@ -68,12 +64,17 @@ def _renamed(text: str, name: str, own: str) -> str:
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     varied = c.stated_error > 0.0 and not c.rates
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
+    stated["measured"] = c.sensor is not None
     head = interface(c).replace(*TOLERANCE)
     head = re.sub(r"(?m)^(\s*bStop : BOOL;.*\n)", rf"\1{PROMPT}\n", head, count=1)
-    body = WHERE.sub(
-        lambda part: part[2] if stated[part[1]] else "", (FOLDER / "shell.st").read_text("ascii")
-    )
-    body = EACH.sub(lambda part: "".join(_of_axis(part[1], n, a) for n, a in enumerate(c.axes)), body)
+    body = (FOLDER / "shell.st").read_text("ascii")
+    words = c.sensor.words if c.sensor else {}
+
+    def of_axes(part: re.Match[str]) -> str:
+        kinds = [("sensed" if n in words else "unsensed") if words else "" for n in range(len(c.axes))]
+        return "".join(_of_axis(part[1], n, a, kinds[n]) for n, a in enumerate(c.axes))
+
+    body = WHERE.sub(lambda part: part[2] if stated[part[1]] else "", EACH.sub(of_axes, body))
     given = {
         **values,
         "first_suffix": c.axes[0].suffix,
@@ -86,7 +87,11 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
 PROMPT = "    bPromptStop : BOOL; (* stops are never faster than the axis is then, and may leave more sway *)"
 
 
-def _of_axis(text: str, number: int, axis: AxisConstants) -> str:
+def _of_axis(text: str, number: int, axis: AxisConstants, sensed: str) -> str:
+    def taken(part: re.Match[str]) -> str:
+        return part[2] if part[1] == sensed else "" if part[1] in ("sensed", "unsensed") else part[0]
+
+    text = WHERE.sub(taken, text)
     text = text.replace("@axis_number", str(number)).replace("@axis_velocity", literal(axis.velocity))
     return text.replace("#", axis.suffix)
 
@@ -106,6 +111,14 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": list(c.drift) or [0.0],
     }
+    if c.sensor:
+        common |= {
+            "cAxes": len(c.axes),
+            "cStatedError": c.stated_error,
+            "cSettled": c.sensor.again,
+            "cRoused": c.sensor.roused,
+            "cKnown": c.sensor.end,
+        }
     if c.rates:
         common["cLiveStep"] = [(1.0 + ROUNDING) * c.rates.get(name, 0.0) * c.cycle for name in c.live]
     for axis in c.axes:
