@@ -142,8 +142,9 @@ def test_a_cam_that_is_interpolated_never_begins_anew(dialect):
 
 
 def test_formats_and_blocks_that_never_begin_anew_refuse(tmp_path):
-    with pytest.raises(ExportError, match=r"axis\.modulo = 360 deg, and plc has no .*; export can, csv, or"):
-        design(ring(), ["csv", "plc"], tmp_path)
+    able = "export can, csv, plc, plcopen-xml, or"
+    with pytest.raises(ExportError, match=rf"axis\.modulo = 360 deg, and twincat has no .*; {able}"):
+        design(ring(), ["csv", "twincat"], tmp_path)
     with pytest.raises(ExportError, match="a planner block does not"):
         deploy_planner(ring(), ["plc"], tmp_path)
     assert not any(tmp_path.iterdir())

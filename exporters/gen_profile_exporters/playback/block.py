@@ -16,6 +16,7 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import (
     COMMENT,
     TOKEN,
+    BlockSource,
     BlockVariable,
     bare,
     declared_variables,
@@ -33,6 +34,24 @@ _HOLE = re.compile(r"@(\w+)")
 
 
 @attrs.frozen
+class BlockShape:
+    """What decides on a block's text beside a motion's numbers.
+
+    Attributes
+    ----------
+    layout : str
+        Of its table.
+    axes : int
+    begins_anew : bool
+        Whether one of them does, after a turn.
+    """
+
+    layout: str
+    axes: int
+    begins_anew: bool = False
+
+
+@attrs.frozen
 class Token:
     """A piece of a program's text, its number among the pieces, and the program."""
 
@@ -47,7 +66,7 @@ class Token:
         return 1 + self.program.count("\n", 0, piece.start() if piece else None)
 
 
-def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
+def fill(values: Mapping[str, str], shape: BlockShape) -> str:
     """Write a block: a value for every hole, by its name.
 
     Raises
@@ -57,14 +76,14 @@ def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
     """
     from jinja2 import UndefinedError  # noqa: PLC0415  # slow to import
 
-    frame = _frame(layout, axes) | {"constants": _constants(layout, axes, {})}
+    frame = _frame(shape) | {"constants": _constants(shape, {})}
     try:
-        return filled(f"playback/text/layout_{layout}.st", **frame, **values)
+        return filled(f"playback/text/layout_{shape.layout}.st", **frame, **values)
     except UndefinedError as error:
         raise KeyError(str(error)) from error
 
 
-def match(text: str, layout: str, axes: int) -> dict[str, Token]:
+def match(text: str, shape: BlockShape) -> dict[str, Token]:
     """Read a block: what stands in every hole, by its name.
 
     Raises
@@ -72,7 +91,7 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
     ExportError
         The text differs from the template elsewhere, or one value from place to place.
     """
-    program, due = _without_comments(text), _due(layout, axes)
+    program, due = _without_comments(text), _due(shape)
     tokens, values = TOKEN.findall(program), dict[str, Token]()
     for number, (piece, (expected, hole)) in enumerate(zip(tokens, due, strict=False)):
         known = values.setdefault(hole, Token(piece, number, program)).text if hole else expected
@@ -89,35 +108,34 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
     return values
 
 
-def statements(layout: str, axes: int, *, is_buffered: bool = False, is_library: bool = False) -> str:
+def statements(shape: BlockShape, *, is_buffered: bool = False, is_library: bool = False) -> str:
     """Write a block's statements, which hold no value of a motion.
 
     Parameters
     ----------
-    layout : str
-    axes : int
+    shape : BlockShape
     is_buffered : bool
         Whether they check a buffer in place of the table; constants have their names all the same.
     is_library : bool
         Whether they refuse to start while ``nProfile`` counts no motion.
     """
-    text = _open_program(layout, axes, is_buffered=is_buffered, is_library=is_library)
+    text = _open_program(shape, is_buffered=is_buffered, is_library=is_library)
     return parse_function_block(text).body
 
 
-def variable_names(layout: str, axes: int) -> list[str]:
+def variable_names(shape: BlockShape) -> list[str]:
     """List the block's variables in the order of their declaration."""
-    return re.findall(r"^ +(\w+) : ", _open_program(layout, axes), re.MULTILINE)
+    return re.findall(r"^ +(\w+) : ", _open_program(shape), re.MULTILINE)
 
 
-def constants(values: Mapping[str, str], layout: str, axes: int) -> list[str]:
+def constants(values: Mapping[str, str], shape: BlockShape) -> list[str]:
     """List the initial values of all constants that enter the checksum, a text for each."""
-    return [one.initial for one in _constants(layout, axes, values)]
+    return [one.initial for one in _constants(shape, values)]
 
 
-def constant_count(layout: str, axes: int) -> int:
+def constant_count(shape: BlockShape) -> int:
     """Count them; each is counted once for every axis."""
-    return len(_constants(layout, axes, {})) * axes
+    return len(_constants(shape, {})) * shape.axes
 
 
 def layout_of(text: str) -> str:
@@ -128,32 +146,43 @@ def layout_of(text: str) -> str:
     return "counts" if whole else "samples"
 
 
+def shape_of(source: BlockSource) -> BlockShape:
+    """Tell the shape of a block by what it declares."""
+    variables = {variable.name: variable for variable in source.variables}
+    axes = len(variables["fScale"].values)
+    return BlockShape(layout_of(source.declaration()), axes, begins_anew="cModulo" in variables)
+
+
 @cache
-def _due(layout: str, axes: int) -> list[tuple[str, str]]:
+def _due(shape: BlockShape) -> list[tuple[str, str]]:
     """List the pieces of the template, each with the name of the hole that it is, if it is one."""
-    pieces = TOKEN.findall(_without_comments(_open_program(layout, axes)))
+    pieces = TOKEN.findall(_without_comments(_open_program(shape)))
     return [(piece, hole[1] if (hole := _HOLE.fullmatch(piece)) else "") for piece in pieces]
 
 
 @cache
-def _open_program(layout: str, axes: int, *, is_buffered: bool = False, is_library: bool = False) -> str:
-    frame = _frame(layout, axes, is_buffered=is_buffered, is_library=is_library)
-    return left_open(f"playback/text/layout_{layout}.st", **frame, constants=_constants(layout, axes, {}))
+def _open_program(shape: BlockShape, *, is_buffered: bool = False, is_library: bool = False) -> str:
+    frame = _frame(shape, is_buffered=is_buffered, is_library=is_library)
+    return left_open(f"playback/text/layout_{shape.layout}.st", **frame, constants=_constants(shape, {}))
 
 
-def _constants(layout: str, axes: int, values: Mapping[str, str]) -> list[BlockVariable]:
+def _constants(shape: BlockShape, values: Mapping[str, str]) -> list[BlockVariable]:
     """List the constants that enter the checksum."""
-    text = left_open("playback/text/constants.st", **_frame(layout, axes), **values)
+    text = left_open("playback/text/constants.st", **_frame(shape), **values)
     return declared_variables("VAR CONSTANT", text)
 
 
-def _frame(layout: str, axes: int, *, is_buffered: bool = False, is_library: bool = False) -> dict[str, Any]:
-    """Give what the layout and the number of axes decide."""
+def _frame(shape: BlockShape, *, is_buffered: bool = False, is_library: bool = False) -> dict[str, Any]:
+    """Give what the shape decides."""
+    layout, axes = shape.layout, shape.axes
     several = axes > 1
     array = f"ARRAY [1..{axes}] OF " if several else ""
     whole = layout == "counts"
     return {
         "has_segments": layout == "segments",
+        "begins_anew": shape.begins_anew,
+        "unwrapped": "fUnwrapped" if shape.begins_anew else "fPosition",
+        "actual": "fActual" if shape.begins_anew else "fActPosition",
         "is_buffered": is_buffered,
         "is_library": is_library,
         "columns": len(COLUMNS[layout]),

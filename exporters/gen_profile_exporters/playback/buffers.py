@@ -27,7 +27,7 @@ import numpy as np
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser, parse_function_block
 from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.playback.block import COLUMNS, fill, layout_of, statements
+from gen_profile_exporters.playback.block import COLUMNS, BlockShape, fill, shape_of, statements
 from gen_profile_exporters.playback.table import checks_of, counted_axes
 from gen_profile_exporters.playback.table_checksum import checksum
 from gen_profile_exporters.templates import filled
@@ -103,7 +103,10 @@ def is_buffered(source: BlockSource) -> bool:
 def kind_of(target: Target, layout: str, *, library: bool) -> int:
     """Hash what two blocks must have in common for one to play the other's tables: layout, axes, units."""
     counted = counted_axes(target, layout)
-    axes = ", ".join(f"{axis.name} {axis.unit} {axis.factor!r}" for axis in counted)
+    axes = ", ".join(
+        f"{axis.name} {axis.unit} {axis.factor!r}{f' {axis.modulo!r}' if axis.modulo else ''}"
+        for axis in counted
+    )
     return zlib.crc32(f"playback {layout}{' library' * library}: {axes}".encode()) >> 1
 
 
@@ -130,7 +133,8 @@ def _buffered(
     sources: Sequence[BlockSource], target: Target, capacity: int | None, *, library: bool
 ) -> BlockSource:
     constants = {variable.name: variable for variable in sources[0].variables}
-    layout, axes = layout_of(sources[0].declaration()), len(constants["cStart"].values)
+    shape = shape_of(sources[0])
+    layout, axes = shape.layout, shape.axes
     cycle = float(constants["cCycleTime"].initial)
     texts = _texts([_motion_texts(source, layout, axes) for source in sources], cycle, library=library)
     if capacity is None:
@@ -160,8 +164,8 @@ def _buffered(
         name=sources[0].name,
         variables=(*taken, *added, *(SELECTION if library else ())),
         body=_prelude(layout, axes, library=library)
-        + _from_buffer(statements(layout, axes, is_buffered=True, is_library=library), layout)
-        + _shown_state(axes, library=library),
+        + _from_buffer(statements(shape, is_buffered=True, is_library=library), layout)
+        + _shown_state(shape, library=library),
     )
 
 
@@ -333,7 +337,10 @@ def constant_block(values: Mapping[str, Sequence[str]], like: BlockSource, layou
         "start_tolerance": shared["fStartTolerance"],
         "block": like.name,
     }
-    written = parse_function_block(fill(dict.fromkeys(OF_HEADER, "") | holes, layout, axes))
+    if anew := "cModulo" in shared:
+        holes |= {"modulo": shared["cModulo"], "modulo_low": shared["cModuloLow"]}
+    shape = BlockShape(layout, axes, begins_anew=anew)
+    written = parse_function_block(fill(dict.fromkeys(OF_HEADER, "") | holes, shape))
     return attrs.evolve(written, header=like.header)
 
 
@@ -383,13 +390,12 @@ def _prelude(layout: str, axes: int, *, library: bool) -> str:
     )
 
 
-def _shown_state(axes: int, *, library: bool) -> str:
-    step = len(AXIS_STATE)
+def _shown_state(shape: BlockShape, *, library: bool) -> str:
+    axes, step = shape.axes, len(AXIS_STATE)
     at, index, indent_ = (f" + {step} * nAxis", "[nAxis]", "    ") if axes > 1 else ("", "", "")
     first = STATE_HEAD - (step if axes > 1 else 0)
-    lines = [
-        f"{indent_}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(AXIS_STATE)
-    ]
+    names = ("Unwrapped" if shape.begins_anew else AXIS_STATE[0], *AXIS_STATE[1:])
+    lines = [f"{indent_}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(names)]
     lines = ["FOR nAxis := 1 TO cAxes DO", *lines, "END_FOR;"] if axes > 1 else lines
     motion = "DINT_TO_LREAL(nSelected)" if library else "0.0"
     return filled("playback/text/state.st", axes=lines, last=state_length(axes) - 1, motion=motion)

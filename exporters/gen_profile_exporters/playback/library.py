@@ -18,7 +18,7 @@ from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback import buffers
-from gen_profile_exporters.playback.block import COLUMNS, SAMPLED, layout_of, statements
+from gen_profile_exporters.playback.block import COLUMNS, SAMPLED, layout_of, shape_of, statements
 from gen_profile_exporters.playback.buffers import buffered, constant_sources, is_buffered, is_library
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
@@ -35,8 +35,8 @@ SCALARS, PER_AXIS = (tuple(f"c{name}" for name in names) for names in (buffers.S
 TABLES = (*(f"c{name}" for name in SAMPLED), *POWERS)
 ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
 
-OUTPUTS = ("fPosition",)  # which begins at the start
-OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *OUTPUTS)
+BEGINNING = ("fPosition", "fUnwrapped")  # at the start
+OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *BEGINNING)
 
 _SCALAR = re.compile(rf"\b({'|'.join((*SCALARS, *PER_AXIS))})\b(?!\[)")
 _AXIS = re.compile(rf"\b({'|'.join(PER_AXIS)})\[nAxis\]")
@@ -138,13 +138,12 @@ def _singles(library: BlockSource) -> list[BlockSource]:
 
 def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockSource:
     """Put blocks together that differ in their motions only."""
-    axes = next(len(variable.values) for variable in sources[0].variables if variable.name == "cStart")
     merged = [_merged(same) for same in zip(*(source.variables for source in sources), strict=True)]
     return BlockSource(
         header=header,
         name=name,
         variables=(*merged, *_selector(sources)),
-        body=_selecting(statements(layout_of(sources[0].declaration()), axes, is_library=True)),
+        body=_selecting(statements(shape_of(sources[0]), is_library=True)),
     )
 
 
@@ -167,7 +166,7 @@ def _rows(source: BlockSource) -> int:
 def _merged(same: Sequence[BlockVariable]) -> BlockVariable:
     """Make one variable of those of the same name in all blocks."""
     first = same[0]
-    if first.name not in OWN or first.name in OUTPUTS:
+    if first.name not in OWN or first.name in BEGINNING:
         return first
     values = [text for variable in same for text in variable.values]
     return _array(first.name, first.scalar_type, values, first.comment)

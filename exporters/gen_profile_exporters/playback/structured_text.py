@@ -26,11 +26,12 @@ from gen_profile.support.units import AxisScale
 from gen_profile_exporters.block_source import BlockSource, initialiser, is_planner, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.machine_variants import AxisVariants
+from gen_profile_exporters.modulo import least
 from gen_profile_exporters.playback import block as playback_block
 from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.playback.block import Token
 from gen_profile_exporters.playback.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR
-from gen_profile_exporters.playback.table import PlaybackTable, counted_axes, tabulate
+from gen_profile_exporters.playback.table import PlaybackTable, counted_axes, shape_for, tabulate
 from gen_profile_exporters.playback.table_checksum import checksum
 from gen_profile_exporters.setpoints import plausible_cycle_time
 
@@ -88,7 +89,7 @@ def block_text(profile: Profile, target: Target) -> str:
     """Write the block, see `encode`."""
     table = tabulate(profile, target)
     values = _table_values(table) | _values(table) | _header_values(table, target)
-    text = playback_block.fill(values, table.layout, len(table.axes))
+    text = playback_block.fill(values, table.shape)
     if target.export.plc_tables == "constants":
         return text
     return buffers.buffered([parse_function_block(text)], target).text()
@@ -105,7 +106,7 @@ def read_table(text: str, target: Target) -> PlaybackTable:
             )
         text = buffers.constant_sources(source, target)[0].text()
     layout = playback_block.layout_of(text)
-    tokens = playback_block.match(text, layout, len(target.axes))
+    tokens = playback_block.match(text, shape_for(target.axes, layout))
     if not _NAME.fullmatch(tokens["block"].text):
         raise ExportError(
             f"line {tokens['block'].line}: {tokens['block'].text!r} stands where a name is due."
@@ -151,7 +152,7 @@ def table_checksum(table: PlaybackTable) -> int:
 
 
 def _checksum(table: PlaybackTable, values: Mapping[str, str]) -> int:
-    constants = playback_block.constants(values, table.layout, len(table.axes))
+    constants = playback_block.constants(values, table.shape)
     numbers = np.array([_array(Token(text)) * np.ones(len(table.axes)) for text in constants])
     return checksum(np.append(table.values(), numbers.T))
 
@@ -168,24 +169,31 @@ def _constants(table: PlaybackTable) -> dict[str, str]:
     limits, rows = table.limits, table.columns[0].size
     last = 0 if table.first is None else len(table.first) - 1
     segments = {} if table.first is None else {"last_segment": str(last), "segments": f"[0..{last}]"}
-    return segments | {
-        "last": str(table.last),
-        "row_count": str(rows),
-        "checks": str(table.checks()),
-        "play_on": str(table.play_on),
-        "rows": f"[0..{rows - 1}]",
-        "cycle_time": literal(table.cycle_time),
-        "slope": literal(limits.slope),
-        "slope_rate": literal(limits.slope_rate),
-        "room": _per_axis(limits.room),
-        "inverse": _per_axis(limits.inverse_velocity),
-        "stop_jerk": _per_axis(limits.jerk),
-        "start": _per_axis(table.start),
-        "target": _per_axis(table.target),
-        "least_scale": _per_axis([variant.least_scale for variant in table.variants]),
-        "mirrors": _per_axis([variant.mirror for variant in table.variants]),
-        "shifts": _per_axis([variant.shift for variant in table.variants]),
-    }
+    turns = [axis.modulo or 0.0 for axis in table.axes]
+    turns_low = [least(turn) for turn in turns]
+    modulo = {"modulo": _per_axis(turns), "modulo_low": _per_axis(turns_low)} if any(turns) else {}
+    return (
+        segments
+        | modulo
+        | {
+            "last": str(table.last),
+            "row_count": str(rows),
+            "checks": str(table.checks()),
+            "play_on": str(table.play_on),
+            "rows": f"[0..{rows - 1}]",
+            "cycle_time": literal(table.cycle_time),
+            "slope": literal(limits.slope),
+            "slope_rate": literal(limits.slope_rate),
+            "room": _per_axis(limits.room),
+            "inverse": _per_axis(limits.inverse_velocity),
+            "stop_jerk": _per_axis(limits.jerk),
+            "start": _per_axis(table.start),
+            "target": _per_axis(table.target),
+            "least_scale": _per_axis([variant.least_scale for variant in table.variants]),
+            "mirrors": _per_axis([variant.mirror for variant in table.variants]),
+            "shifts": _per_axis([variant.shift for variant in table.variants]),
+        }
+    )
 
 
 def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
@@ -211,7 +219,7 @@ def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
 
 def _checked(table: PlaybackTable) -> int:
     """Count what enters the checksum."""
-    return len(table.values()) + playback_block.constant_count(table.layout, len(table.axes))
+    return len(table.values()) + playback_block.constant_count(table.shape)
 
 
 def axis_lines(table: PlaybackTable) -> list[str]:

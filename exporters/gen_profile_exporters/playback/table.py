@@ -7,6 +7,7 @@ counts     the same as whole 32-bit drive counts, counts per s and counts per sÂ
 ========== ==================================================================================
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 from math import ceil
 
@@ -19,6 +20,8 @@ from gen_profile.support.units import COUNTS, AxisScale
 from gen_profile_exporters import setpoints
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.machine_variants import AxisVariants
+from gen_profile_exporters.modulo import require_short_steps, turn_counts
+from gen_profile_exporters.playback.block import BlockShape
 from gen_profile_exporters.playback.path_limits import PathLimits, latest_stop, path_limits
 from gen_profile_exporters.playback.quintic_segments import QuinticSegments, fit, horner
 
@@ -63,6 +66,11 @@ class PlaybackTable:
     target: Array
     variants: tuple[AxisVariants, ...]
     stated_play_on: int | None = None
+
+    @property
+    def shape(self) -> BlockShape:
+        """Of the block that holds it."""
+        return shape_for(self.axes, self.layout)
 
     @property
     def start(self) -> Array:
@@ -182,6 +190,9 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     """
     motion = setpoints.sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
     axes = counted_axes(target, target.export.plc_layout)
+    for axis, positions in zip(axes, motion.position.T, strict=True):
+        if axis.modulo is not None:
+            require_short_steps(positions * axis.factor, axis.modulo, axis, motion.cycle_time)
     first, last = None, len(motion.position) - 1
     if target.export.plc_layout == "segments":
         segments = fit(quantities(motion), motion.cycle_time)
@@ -211,11 +222,25 @@ def quantities(table: setpoints.AxisTable | SampledProfile) -> Array:
     return np.stack([values for values in columns if values is not None])
 
 
+def shape_for(axes: Sequence[AxisScale], layout: str) -> BlockShape:
+    """Give the shape of a block for axes."""
+    return BlockShape(layout, len(axes), begins_anew=any(axis.modulo is not None for axis in axes))
+
+
 def counted_axes(target: Target, layout: str) -> tuple[AxisScale, ...]:
-    """Scale the axes as a block of that layout counts them."""
+    """Scale the axes as a block of that layout counts them.
+
+    Raises
+    ------
+    ExportError
+        A turn after which one of them begins anew has no whole counts.
+    """
     if layout != "counts":
         return target.axes
-    return tuple(attrs.evolve(axis, unit=COUNTS, factor=axis.counts_per_si) for axis in target.axes)
+    return tuple(
+        attrs.evolve(axis, unit=COUNTS, factor=axis.counts_per_si, modulo=turn_counts(axis))
+        for axis in target.axes
+    )
 
 
 def _literal(columns: Array) -> Array:

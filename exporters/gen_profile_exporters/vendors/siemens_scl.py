@@ -27,7 +27,7 @@ from gen_profile_exporters.block_source import (
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import SIEMENS, VELOCITY
 from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
-from gen_profile_exporters.playback.block import layout_of, variable_names
+from gen_profile_exporters.playback.block import BlockShape, layout_of, variable_names
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, is_buffered
 from gen_profile_exporters.playback.structured_text import block_text, literal, replays
 from gen_profile_exporters.setpoints import axis_table
@@ -126,7 +126,7 @@ def _portable(match: re.Match[str], text: str, target: Target) -> BlockSource:
     section = "VAR" if is_buffered(source) else "VAR CONSTANT"  # of arrays, which SCL has no constants of
     constants = [attrs.evolve(variable, section=section) for variable in tables]
     back = attrs.evolve(source, variables=(*others, *constants))
-    names = variable_names(layout_of(text), len(target.axes))
+    names = variable_names(BlockShape(layout_of(text), len(target.axes)))
     plays = {name.lower() for name in names} <= {variable.name.lower() for variable in others + tables}
     return ordered(back, names) if plays else back
 
