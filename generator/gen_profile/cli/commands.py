@@ -268,7 +268,9 @@ def _certified(path: Path, spec: Spec | None) -> Certificate:
     from gen_profile.assurance.certificate.from_file import certify_artefact
 
     with progress() as tell:
-        return certify_artefact(path, spec, progress=partial(tell, "proving it for boxes of machines"))
+        certificate = certify_artefact(path, spec, progress=partial(tell, "proving it for boxes of machines"))
+    print_warnings(certificate.warnings())
+    return certificate
 
 
 def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path) -> None:

@@ -28,6 +28,11 @@ def plant_types() -> list[str]:
     return sorted({*BUILT_IN, *shown, *(entry.name for entry in entry_points(group=GROUP))})
 
 
+def is_built_in(type_: str) -> bool:
+    """Whether a type is one of the project's own."""
+    return type_ in BUILT_IN or type_.rpartition("-")[0] in FAMILIES
+
+
 def find_plant(type_: str) -> Plant:
     """Load a machine.
 

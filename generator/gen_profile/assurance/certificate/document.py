@@ -56,6 +56,8 @@ class Certificate(Summarised):
         Likewise.
     rounded : bool
         Whether setpoints are rounded to counts, for the reasons where nothing is proved.
+    not_rechecked : tuple of str
+        What of it `gen_profile_recheck` does not cover, and so cannot prove again.
     """
 
     spec_sha256: str
@@ -72,6 +74,7 @@ class Certificate(Summarised):
     motions: tuple[Motions, ...]
     scales: Array
     rounded: bool = False
+    not_rechecked: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -104,6 +107,16 @@ class Certificate(Summarised):
                 f"narrow the ranges (check.uncertain), or take more time{coarse}.",
             )
         return tuple(sway.reason for sway in self.sways if sway.reason is not None)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Say that the certificate, if there is one, cannot be proved again by the re-checker."""
+        if not (self.proved and self.not_rechecked):
+            return ()
+        what = ", ".join(self.not_rechecked)
+        return (
+            f"The re-checker (gen_profile_recheck) does not cover {what}: it will refuse this certificate, "
+            "and only gen-profile check --certificate proves it again.",
+        )
 
     @property
     def demand(self) -> float:
@@ -162,6 +175,7 @@ class Certificate(Summarised):
             "from_s": self.arrival,
             "until_s": self.until,
             "reasons": list(self.reasons()),
+            "not_rechecked": list(self.not_rechecked),
         }
 
 

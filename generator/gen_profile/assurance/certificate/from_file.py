@@ -16,6 +16,7 @@ from gen_profile.assurance.certificate.boxes import covers
 from gen_profile.assurance.certificate.certify import SLACK, Attempt, Progress, attempt
 from gen_profile.assurance.certificate.document import Certificate, certificate_path, damaged, encode, parse
 from gen_profile.assurance.certificate.in_order import in_order
+from gen_profile.assurance.certificate.rechecking import not_covered
 from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayBounds, limits_of
 from gen_profile.assurance.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.assurance.verification.check import spec_and_manifest
@@ -100,7 +101,8 @@ def check_certificate(
                 f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
             )
     met = zip(claimed.sways, largest_met.tolist(), strict=True)
-    return attrs.evolve(claimed, sways=tuple(attrs.evolve(sway, largest_met=most) for sway, most in met))
+    sways = tuple(attrs.evolve(sway, largest_met=most) for sway, most in met)
+    return attrs.evolve(claimed, sways=sways, not_rechecked=not_covered(artefact.path, artefact.spec))
 
 
 def _bound_again(
@@ -156,6 +158,7 @@ def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certific
         motions=result.motions,
         scales=result.scales,
         rounded=bool(artefact.setpoints.resolution.any()),
+        not_rechecked=not_covered(artefact.path, artefact.spec),
     )
 
 
