@@ -7,6 +7,7 @@ import pytest
 from command_line import COMMANDS, cli
 
 from gen_profile.plants.registry import find_plant, plant_types
+from gen_profile_exporters.registry import BUILT_IN
 
 ROOT = Path(__file__).parents[2]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
@@ -30,6 +31,14 @@ def test_a_page_begins_with_what_it_is_for(page):
     assert re.fullmatch(
         r"> \*\*What it is for:\*\* .+\. \*\*When to read it:\*\* .+\. \*\*Example:\*\* .+\.", box
     )
+
+
+def test_every_format_is_on_its_page():
+    page = (ROOT / "docs" / "formats.md").read_text("utf-8")
+    rows = re.findall(r"^\| (`.*?) \| (`.*?) \|", page, re.M)
+    for name, form in BUILT_IN.items():
+        (files,) = (files for names, files in rows if f"`{name}`" in names)
+        assert form.suffix in files, name
 
 
 def commands_on(page):
