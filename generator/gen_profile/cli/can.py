@@ -25,8 +25,8 @@ def can() -> None:
 
 
 @can.command("list", epilog="Example: gen-profile can list --interface socketcan --channel can0")
-@option("--interface NAME", "Only this interface, such as socketcan; all of them by default.")
-@option("--channel NAME", "Ask on this channel of it which nodes are there.")
+@option("--interface NAME", "List only this interface, such as socketcan; all by default.")
+@option("--channel NAME", "Ask which nodes are on this channel of the interface.")
 @options.bitrate("channel")
 @options.output
 def list_(interface: str | None, channel: str | None, bitrate: int) -> None:

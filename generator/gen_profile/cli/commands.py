@@ -118,10 +118,10 @@ def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
 @options.spec
 @options.plot
-@option("--all", "Draw all methods, not only the most telling ones.", into="every")
+@option("--all", "Draw all methods, not only the most instructive ones.", into="every")
 @option(
     "--base",
-    "What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
+    "Move that the shapers filter, in place of solver.base; jerk-limited needs limits.jerk.",
     click.Choice(["quintic", "septic", "jerk-limited"]),
 )
 @options.output
@@ -141,7 +141,7 @@ def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | N
 @options.spec
 @option(
     "--parameter NAME",
-    "What is off: once for a curve, twice for a map; the first uncertain parameter by default.",
+    "Parameter that deviates: once for a curve, twice for a map; the first uncertain parameter by default.",
     into="parameters",
     multiple=True,
 )
@@ -157,7 +157,7 @@ def compare(chosen: SpecChoice, picture: Path | None, every: bool, base: str | N
     Number(0.0, 0.9, min_open=True),
     into="half_range",
 )
-@option("--points", "Errors tried per parameter; 61 of a curve, 25 of a map by default.", Count(3, 1001))
+@option("--points", "Errors to try per parameter; 61 for a curve, 25 for a map by default.", Count(3, 1001))
 @options.plot
 @option("--csv", "Write the numbers as a table.", OutputFile(), into="path")
 @options.output
@@ -179,14 +179,14 @@ def robustness(chosen: SpecChoice, *, picture: Path | None, path: Path | None, *
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
 @click.argument("artefact", type=PathType())
 @options.spec
-@option("--samples", "Draw N machines, in place of check.samples.", Count(0, 1_000_000))
+@option("--samples", "Draw N random machines, in place of check.samples.", Count(0, 1_000_000))
 @option("--scenario N", "Try only the scenario of this number (row).", int)
-@option("--strict", "Let faults in the timing of setpoints count as well.")
+@option("--strict", "Let timing faults of setpoints count as well.")
 @options.repeatable(
-    "--scale AXIS=FACTOR", "Judge the motion smaller along an axis, as a playback block plays it."
+    "--scale AXIS=FACTOR", "Judge the motion scaled along an axis, as a playback block plays it."
 )
-@options.repeatable("--mirror AXIS", "Judge the motion the other way along an axis.")
-@options.repeatable("--offset AXIS=DISTANCE", "Judge the motion begun elsewhere along an axis, in m or rad.")
+@options.repeatable("--mirror AXIS", "Judge the motion mirrored along an axis.")
+@options.repeatable("--offset AXIS=DISTANCE", "Judge the motion shifted along an axis, in m or rad.")
 @option("--csv", "Write all scenarios as a table, one row each.", OutputFile(), into="table_path")
 @options.certify
 @option("--certificate", "Check a certificate again, and nothing else.", InputFile())

@@ -23,16 +23,16 @@ PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86
 @option("--fmi", "Version of FMI; 2 by default.", click.Choice(("2", "3")), into="version", default="2")
 @option(
     "--input",
-    "What a plant's drives are asked for; setpoint (interpolated positions) by default.",
+    "Input of a plant's drives; setpoint (interpolated positions) by default.",
     click.Choice(INPUTS),
     into="input_name",
 )
-@option("--platform", "What to compile for; this computer by default.", click.Choice(PLATFORMS))
-@option("--source-only", "Put no binary in, for TwinCAT and real-time targets.")
+@option("--platform", "Platform to compile for; this computer by default.", click.Choice(PLATFORMS))
+@option("--source-only", "Include no binary, for TwinCAT and real-time targets.")
 @option(
     "--out", "FMU or SSP to write; named after the spec in this folder by default.", OutputFile(), into="path"
 )
-@option("--author NAME", "Who made the model; gen-profile by default.")
+@option("--author NAME", "Author of the model; gen-profile by default.")
 @options.output
 def fmu(
     kind: str,

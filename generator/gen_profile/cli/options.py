@@ -36,6 +36,10 @@ class Count(click.IntRange):
 class Number(click.FloatRange):
     """A finite number within bounds: NaN lies beyond none of them."""
 
+    def _describe_range(self) -> str:
+        """Say nothing in the help where there are no bounds, in place of click's ``x<=None``."""
+        return "" if self.min is self.max is None else super()._describe_range()
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Take the number."""
         from gen_profile.support.suggestion import number_meant
@@ -210,7 +214,7 @@ def preset(text: str) -> Callable[[Command], Command]:
 
 def bitrate(channel: str) -> Callable[[Command], Command]:
     """Take the bit rate of a CAN channel."""
-    words = f"Of the {channel} in bit/s, where no system sets it; 500000 by default."
+    words = f"Bit rate of the {channel} in bit/s, where the system does not set it; 500000 by default."
     return option("--bitrate", words, Count(10_000, 1_000_000), default=500_000)
 
 

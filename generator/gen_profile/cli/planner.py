@@ -48,7 +48,7 @@ def planner() -> None:
 @options.spec
 @options.export("Form of the block: plc, another that holds one, c, linux or openplc", "plc", _complete_forms)
 @options.folder
-@options.histories("Prove it on N histories of commands; on 200 by default, and fewer are a trial.")
+@options.histories("Prove it on N histories of commands; 200 by default, fewer are only a trial.")
 @option("--seed", "Prove it on other histories, drawn with this check.seed.", Count(0, 2**32 - 1))
 @options.scheduler("run the histories")
 @option("--no-check", "Skip the proof; the manifest then says unverified.")
@@ -122,13 +122,13 @@ def write(
 )
 @option(
     "--events",
-    "CSV of the block's events to write, if it keeps them (planner.events).",
+    "CSV of the block's events to write, if it has them (planner.events).",
     OutputFile(),
     into="events_path",
 )
 @option(
     "--sensor",
-    "CSV with time_s, value (of several axes value_AXIS): what sensors show; each row holds until the next.",
+    "CSV of the sensors' readings: time_s, value (or value_AXIS); each row holds until the next.",
     InputFile(),
     into="sensor_path",
 )
@@ -170,7 +170,7 @@ def play(
 @click.argument("events", type=InputFile())
 @options.output
 def explain(events: Path) -> None:
-    """Say in words what a planner block's events mean: a CSV with time_s, code, value."""
+    """Explain a planner block's events in words: a CSV with time_s, code, value."""
     from gen_profile.planner.events import read_events
 
     events_read = read_events(_read(events, "events"))
@@ -199,7 +199,7 @@ planner_options = options.together(
     ),
     options.repeatable(
         "--live-parameter NAME=VALUE",
-        "What a live parameter of --planner is from the start.",
+        "Initial value of a live parameter of --planner.",
         into="live_parameters",
     ),
 )

@@ -30,28 +30,28 @@ if TYPE_CHECKING:
 )
 @options.repeatable(
     "--field NAME=VALUE",
-    "What the page shall also say, as Customer=ACME; without a value, a line to sign.",
+    "A line to add to the page, as Customer=ACME; without a value, a line to fill in by hand.",
     into="fields",
 )
 @options.export("Format whose file is checked and named by its hash (see gen-profile formats)")
 @option(
     "--measured LOG.csv",
-    "What the machine really did: columns time_s, <axis>_position_mm, <load>_sway_mm, <load>_angle_deg.",
+    "Log of the real machine: columns time_s, <axis>_position_mm, <load>_sway_mm, <load>_angle_deg.",
     PathType(),
     into="log",
 )
 @option(
     "--measured-start SECONDS",
-    "When the move begins in the log; found by itself by default.",
+    "When the move begins in the log; detected by default.",
     Number(),
     into="log_start",
 )
 @option(
     "--columns MEANING=COLUMN,…",
-    "Which column of the log holds what, as in time_ms=Zeit,payload_sway_mm=4; by names by default.",
+    "Which column of the log holds what, as in time_ms=Zeit,payload_sway_mm=4; by their names by default.",
     into="log_columns",
 )
-@option("--no-compare", "Leave other methods out, which takes less time.")
+@option("--no-compare", "Leave out the comparison with other methods, to save time.")
 @options.output
 def report(
     chosen: SpecChoice,

@@ -28,13 +28,13 @@ from gen_profile.cli.progress import progress
 @option(
     "--out DIR|FILE.sqlite",
     "Folder to write to, or one file for everything; ./gen-profile-sweep by default. A sweep begun "
-    "there goes on.",
+    "there is continued.",
     PathType(),
     into="folder",
     default="gen-profile-sweep",
 )
-@options.scheduler("do it")
-@option("--workers", "Processes of this computer; as many as pay by default.", Count(min=1))
+@options.scheduler("run the cases")
+@option("--workers", "Processes on this computer; as many as are worthwhile by default.", Count(min=1))
 @options.output
 def sweep(
     chosen: SpecChoice,
@@ -79,7 +79,7 @@ def lookup(words: tuple[str, ...], out: Path | None) -> None:
     """Find the nearest safe profile of a sweep.
 
     Every key that was varied is an option here. Nearness counts in steps of the grid: what is more than one
-    away is no answer. Safe is what, played on the machine asked for, keeps the limits of the check.
+    away is no answer. A profile is safe if it keeps the check's limits on the machine asked for.
     """
     from gen_profile.cli import words as tables
     from gen_profile.studies.sweep.lookup import lookup as run
@@ -101,7 +101,7 @@ def lookup(words: tuple[str, ...], out: Path | None) -> None:
 )
 @options.output
 def library(folder: Path, path: Path) -> None:
-    """Put a sweep's PLC blocks into one.
+    """Combine a sweep's PLC blocks into one.
 
     An input of the block selects the profile.
     """

@@ -46,10 +46,16 @@ Words = tuple[str, ...]
 
 @cli.command(epilog="Example: gen-profile commission crane.toml --export plc --to opc.tcp://10.0.0.5:4840")
 @click.argument("path", metavar="SPEC.toml", type=PathType())
-@options.preset("What a spec that is not there begins as.")
-@options.repeatable("--set KEY=VALUE", "A key of it.", into="overrides")
+@options.preset("Preset that a new spec starts from.")
+@options.repeatable("--set KEY=VALUE", "Override a key of the spec.", into="overrides")
 @option("--swing CSV|URL", "Log of a free swing, or a phone's address, as for log-swing.")
-@option("--for SECONDS", "To log the phone for; 60 s.", Number(min=1.0), into="seconds", default=60.0)
+@option(
+    "--for SECONDS",
+    "How long to log the phone; 60 s by default.",
+    Number(min=1.0),
+    into="seconds",
+    default=60.0,
+)
 @options.repeatable("--export FORMAT", "Format to write.", into="formats")
 @option("--to URL", "Controller to deploy to, as for deploy; an empty text for none.", into="url")
 @option("--yes", "Ask nothing: what no option answers stays as it is.")
@@ -58,7 +64,7 @@ def commission(path: Path, *, yes: bool, **given: Any) -> None:
     """Go from a tape measure to a controller, step by step.
 
     Measure, log a swing, identify, design, prove, report, deploy, and record it. What no option answers is
-    asked; SPEC.toml is made where it is not there, and gone on with where it is.
+    asked; an existing SPEC.toml is continued, a missing one is created.
     """
     require_installed("A report needs Plotly", "report", "plotly")
     run = _Guide(click.get_current_context(), given, yes)

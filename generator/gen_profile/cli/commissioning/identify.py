@@ -41,7 +41,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )
     @option(
         "--time-unit",
-        "Unit of its times; by default what their column's name says, or the times show.",
+        "Unit of the log's times; by default what their column's name says, or the times show.",
         click.Choice(["s", "ms", "us", "ns"]),
     )
     @wraps(command)
@@ -77,7 +77,7 @@ def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @log_options
 @option(
     "--after SECONDS",
-    "Leave out what the log holds before this time; of dates, so long after the first.",
+    "Ignore the log before this time; where times are dates, this long after the first.",
     Number(),
 )
 @options.repeatable("--free NAME", "Identify a parameter that was not read directly.")
@@ -148,15 +148,18 @@ def _positions(text: str) -> list[float]:
 @click.argument("logs", metavar="[LOG.csv]...", nargs=-1, type=PathType())
 @option("--played", "The file whose setpoints the axes followed in these runs.", InputFile(), required=True)
 @options.repeatable(
-    "--seen LOAD=M±M", "Greatest sway in m after a run as it was seen, within a bound (+- will do for ±)."
+    "--seen LOAD=M±M", "Greatest sway in m observed after a run, with its bound (+- will do for ±)."
 )
 @log_options
 @options.spec_output("learned.toml")
 @options.repeatable(
-    "--export FORMAT", "Design for the ranges that are left, check, and write in this format.", into="formats"
+    "--export FORMAT", "Design for the narrowed ranges, check, and write in this format.", into="formats"
 )
 @option(
-    "--folder DIR", "Folder for that; ./gen-profile-out by default.", PathType(), default="gen-profile-out"
+    "--folder DIR",
+    "Folder for these files; ./gen-profile-out by default.",
+    PathType(),
+    default="gen-profile-out",
 )
 @options.output
 def learn(
@@ -172,7 +175,7 @@ def learn(
 ) -> None:
     """Narrow a spec's ranges by what runs of a motion showed.
 
-    A run is a log of the swing, from before the motion until some swings after it, or what was seen then.
+    A run is a log of the swing, from before the motion until some swings after it, or the sway observed then.
     """
     from gen_profile.assurance.verification.check import replayed
     from gen_profile.cli import words

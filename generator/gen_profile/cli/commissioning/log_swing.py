@@ -28,11 +28,13 @@ DRAWN, HEIGHT, MARGIN = 30.0, 8, 12  # s that a curve shows, its lines, and colu
 @cli.command("log-swing", epilog="Example: gen-profile log-swing http://192.168.0.42:8080 --out run.csv")
 @click.argument("source")
 @option("--out", "Log to write; ./swing.csv by default.", OutputFile(), default="swing.csv")
-@option("--for SECONDS", "Log so long, not until Ctrl-C.", Number(min=1.0), into="seconds")
-@option("--node NODEID", "Of an OPC UA server, as ns=4;s=GVL.rAngle; on CAN the encoder's number.")
-@option("--counts", "Of a turn of the encoder; it is asked for them by default.", Count(1, 2**32))
+@option("--for SECONDS", "How long to log, instead of until Ctrl-C.", Number(min=1.0), into="seconds")
+@option(
+    "--node NODEID", "Node to read: of an OPC UA server, as ns=4;s=GVL.rAngle; on CAN the encoder's number."
+)
+@option("--counts", "Counts per revolution of the encoder; read from it by default.", Count(1, 2**32))
 @options.bitrate("CAN channel")
-@option("--unit UNIT", "Of its values, for the column's name; rad by default.", default="rad")
+@option("--unit UNIT", "Unit of the values, for the column's name; rad by default.", default="rad")
 @client_options
 @options.output
 def log_swing(

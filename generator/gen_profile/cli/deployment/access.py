@@ -38,18 +38,22 @@ PACKAGES = {
 access_options = options.together(
     option(
         "--certificate FILE",
-        "PEM file with the certificate and key of this side; made if it is not there.",
+        "PEM file with the client's certificate and key; created if missing.",
         PathType(),
     ),
-    option("--user NAME", f"User there; password in {PASSWORD}, or asked.", default=""),
+    option(
+        "--user NAME", f"User on the server; the password is taken from {PASSWORD}, or asked for.", default=""
+    ),
 )
 # what a server is trusted by, and how it is spoken to
 client_options = options.together(
-    option("--fingerprint SHA256", "Of the server's certificate, as compared.", default=""),
+    option(
+        "--fingerprint SHA256", "SHA-256 of the server's certificate, once you have compared it.", default=""
+    ),
     access_options,
     option(
         "--security",
-        "Of the connection; sign-and-encrypt by default.",
+        "Security of the connection; sign-and-encrypt by default.",
         click.Choice(["sign-and-encrypt", "sign", "none"]),
         default="sign-and-encrypt",
     ),
@@ -66,7 +70,7 @@ def controller_options(*, required: bool) -> Callable[[Any], Any]:
             required=required,
         ),
         option("--db", "Data block of the block's arrays, for S7.", Count(1, MOST_BLOCKS), into="data_block"),
-        option("--instance PATH", "Which block, where the server shows several.", default=""),
+        option("--instance PATH", "Path of the block, where the server has several.", default=""),
         client_options,
     )
 

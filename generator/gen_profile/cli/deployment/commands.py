@@ -42,11 +42,11 @@ if TYPE_CHECKING:
 @click.argument("artefact", type=PathType())
 @controller_options(required=True)
 @option("--verify", "Only tell whether the controller uses this table.")
-@option("--watch", "Verify, then hold every setpoint to what was proved until Ctrl-C.")
-@option("--for SECONDS", "Watch so long.", Number(min=0.1), into="seconds")
-@option("--log CSV", "Write what is watched, a row for each cycle seen.", OutputFile())
-@option("--rollback", "Go back to this table, which the idle buffer holds.")
-@option("--trial", "Use a planner that was judged on fewer histories than make a proof.")
+@option("--watch", "Verify, then compare every setpoint with the proved table until Ctrl-C.")
+@option("--for SECONDS", "How long to watch.", Number(min=0.1), into="seconds")
+@option("--log CSV", "Write what is watched, one row per cycle seen.", OutputFile())
+@option("--rollback", "Switch back to this table, which the idle buffer holds.")
+@option("--trial", "Accept a planner that was judged on fewer histories than a proof needs.")
 @option("--by NAME", "Who deploys, for the record; the user by default.", default="")
 @signing_option("record")
 @signed_by_option
@@ -208,7 +208,7 @@ def _user() -> str:
 @click.argument("artefact", type=PathType())
 @option("--port", "Port on the loopback interface; 4840 by default.", Count(1, MOST_PORT), default=4840)
 @access_options
-@option("--no-security", "Let any program of this computer in.")
+@option("--no-security", "Accept any program on this computer.")
 @option(
     "--db",
     "Speak S7 in place of OPC UA, with the block's arrays in this data block, and bExecute in M0.0.",

@@ -43,23 +43,23 @@ _bus_options = options.together(
 @options.spec_shown_as("[ARTEFACT|SPEC.toml]")
 @_bus_options
 @planner_options
-@option("--mode", "Mode of the drives, for a spec.", click.Choice(["csp", "ip", "csv"]))
+@option("--mode", "Mode of operation of the drives, for a spec.", click.Choice(["csp", "ip", "csv"]))
 @option("--node N", "CANopen node of the first axis, for a spec.", int)
-@option("--simulate-drive", "Let simulated drives move the machine's FMU.")
-@option("--to-start", "Move slowly to the motion's start from anywhere, and end.")
-@options.repeatable("--jog AXIS=DISTANCE", "Move slowly by a distance in m (or rad) from anywhere, and end.")
-@option("--reset-fault", "Reset drives in fault first; know why they were.")
+@option("--simulate-drive", "Stream to simulated drives that move the machine's FMU.")
+@option("--to-start", "Move slowly to the motion's start from anywhere, and exit.")
+@options.repeatable("--jog AXIS=DISTANCE", "Move slowly by a distance in m (or rad) from anywhere, and exit.")
+@option("--reset-fault", "First reset drives that are in fault; know the cause before you do.")
 @option(
     "--self-test", "First measure, for as long as the motion lasts, whether this machine can hold the cycle."
 )
 @option(
     "--live",
-    "Draw the motion while it runs: here, or on a page of this machine.",
+    "Plot the motion while it runs: in the terminal, or on a page on this computer.",
     click.Choice(["terminal", "browser"]),
 )
 @option("--eds FILE", "First try the drives' settings on their EDS or DCF.", options.InputFile())
-@option("--dry-run", "Print the plan, and touch no bus.")
-@option("--accept-unverified", "Stream what was exported without its check.")
+@option("--dry-run", "Print the plan, without touching the bus.")
+@option("--accept-unverified", "Stream a file that was exported without its check.")
 @option("--log CSV", "Write planned and actual positions side by side.", OutputFile(), into="table")
 @options.output
 def stream(table: Path | None, **given: Any) -> None:
@@ -109,9 +109,9 @@ def stream(table: Path | None, **given: Any) -> None:
 )
 @options.spec
 @_bus_options
-@option("--miss", "What it does without a setpoint.", click.Choice(_MISSES), default="extrapolate")
-@option("--own-mapping", "Start with another PDO mapping than CiA 402 proposes.")
-@option("--eds", "Write its EDS, and end.", OutputFile())
+@option("--miss", "What a drive does without a setpoint.", click.Choice(_MISSES), default="extrapolate")
+@option("--own-mapping", "Start with a PDO mapping other than CiA 402's default.")
+@option("--eds", "Write the drive's EDS, and exit.", OutputFile())
 @options.output
 def drive_sim(
     chosen: SpecChoice,
