@@ -157,17 +157,18 @@ END_FUNCTION_BLOCK
 
 @pytest.fixture(scope="module")
 def swings(spec):
-    """Turns in a slot, cycles of a slot, fades, gains and the account's own bounds."""
+    """Turns in a slot, cycles of a slot, fades, gains and the account's own bounds, those of the modes' sum last."""
     draw = np.random.default_rng(5)
     phases, fades = draw.uniform(0.1, 1.5, SWINGS), draw.uniform(0.98, 1.0, SWINGS)
     (stated,) = re.findall(r"cBound : [^[]*\[[^]]*\] OF LREAL := \[([^]]*)\]", blocks_before_planner(spec))
-    bounds = np.array([float(v) for v in stated.split(",")])
-    return phases, 10, fades, draw.uniform(0.5, 2.0, SWINGS), bounds
+    bounds = np.tile([float(v) for v in stated.split(",")], SWINGS // 2)
+    (most,) = re.findall(r"cMost : LREAL := ([^;]*);", blocks_before_planner(spec))
+    return phases, 10, fades, draw.uniform(0.5, 2.0, SWINGS), bounds, float(most)
 
 
 @pytest.fixture
 def account(spec, swings):
-    phases, cycles, fades, gains, _ = swings
+    phases, cycles, fades, gains, *_ = swings
     waves = [f(part * phases) for part in (1.0, 1.0 / cycles) for f in (np.cos, np.sin)]
     known = Account(spec, [*waves, fades, gains], cycles)
     known.call(11)
@@ -175,7 +176,7 @@ def account(spec, swings):
 
 
 def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings):
-    phases, _, fades, gains, bounds = swings
+    phases, _, fades, gains, bounds, most = swings
     draw = np.random.default_rng(6)
     taken = draw.uniform(-1, 1, 300)
     account.call(5)
@@ -197,7 +198,7 @@ def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings)
     assert np.allclose(radii[:4], 0.7 * np.cos(np.pi / 12) * levels[[2, 3, 8, 9]] / 2.0)
     # plans: weighed, another one that is weighed changes nothing, committed, and what is taken of it
     sums = past + ahead[:, :25] @ trial
-    assert account.call(3, trial, nSlots=25)[0] == pytest.approx(np.max(np.abs(sums) / levels), rel=1e-10)
+    assert account.call(3, trial, nSlots=25)[0] == pytest.approx(_most(gains, sums) / most, rel=1e-10)
     account.call(4)
     account.call(3, 0.1 * trial, nSlots=25)
     account.call(6)
@@ -208,14 +209,14 @@ def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings)
     known = past * fades**3 + (units[:, t : t + 3] * fades[:, None] ** np.arange(2, -1, -1)) @ trial[:3]
     ahead = units[:, t + 3 :] / fades[:, None] ** np.arange(1, 58)
     more = known + ahead[:, :23] @ np.r_[0.4, trial[3:]]
-    levels = np.maximum(bounds / gains, np.abs(fades**3 * sums))
+    most = max(most, _most(gains, fades**3 * sums))
     account.call(7, fTaken=0.4)
     account.call(4)
-    assert account.call(12)[0] == pytest.approx(np.max(np.abs(more) / levels), rel=1e-10)
+    assert account.call(12)[0] == pytest.approx(_most(gains, more) / most, rel=1e-10)
     half = 0.5 * more + 0.5 * fades**3 * sums
     account.call(8, fPart=0.5)
     account.call(4)
-    assert account.call(12)[0] == pytest.approx(np.max(np.abs(half) / levels), rel=1e-10)
+    assert account.call(12)[0] == pytest.approx(_most(gains, half) / most, rel=1e-10)
 
 
 def _most(gains, sums):
@@ -245,7 +246,7 @@ def test_behind_a_ramp_values_tell_what_swings_about_the_steady_motion(account, 
 
 def test_a_decline_in_any_slot_keeps_what_the_motion_before_it_leaves(account, swings):
     """However long the steady speed is kept, rows and radii bound what both leave."""
-    phases, _, fades, gains, bounds = swings
+    phases, _, fades, gains, bounds, most = swings
     draw = np.random.default_rng(8)
     trial = 4e-5 * draw.uniform(-1.0, 1.0, 6)
     account.call(5)
@@ -274,8 +275,8 @@ def test_a_decline_in_any_slot_keeps_what_the_motion_before_it_leaves(account, s
     turns = np.exp(1j * phases) / fades
     ramp = turns[:, None] ** np.arange(1, 7) @ trial + 6e-5 * turns**7 / (1.0 - turns)
     whole = turns[:, None] ** np.arange(1, 16) @ np.r_[trial, decline]
-    both = (np.abs(ramp) + np.abs(whole - ramp)) * gains / bounds
-    assert worst == pytest.approx(both.max(), rel=1e-9)
+    both = np.abs(ramp) + np.abs(whole - ramp)
+    assert worst == pytest.approx(_most(gains, both) / most, rel=1e-9)
 
 
 def kept_at(account, swing, trial, speed, swings):
@@ -288,7 +289,7 @@ def kept_at(account, swing, trial, speed, swings):
 
 def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
     """The same sums as if slots had been shorter until then: a plan is weighed as swings are then."""
-    phases, cycles, fades, gains, bounds = swings
+    phases, cycles, fades, gains, _, most = swings
     share = 1.0 / cycles
     first, plan = np.array([0.6, -0.2, 0.5]), np.array([0.3, 0.9, -0.4, 0.1])
     account.call(5)
@@ -305,7 +306,7 @@ def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
     ends = (
         past * (1.0 - (1.0 - fades) * share) ** 7 + (units[:, 3:] / fades[:, None] ** np.arange(1, 5)) @ plan
     )
-    assert worst == pytest.approx(np.max(np.abs(ends) * gains / bounds), rel=1e-6)
+    assert worst == pytest.approx(_most(gains, ends) / most, rel=1e-6)
     account.call(13, nSlots=23)  # as many cycles at once, and back again
     later = account.call(12)[0]
     account.call(13, nSlots=-23)
@@ -314,6 +315,5 @@ def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
         account.call(9)
     assert account.call(12)[0] == pytest.approx(later, rel=1e-9)
     account.call(11)
-    assert account.call(12)[0] == pytest.approx(
-        np.max(np.abs((units[:, 3:] / fades[:, None] ** np.arange(1, 5)) @ plan) * gains / bounds), rel=1e-6
-    )
+    alone = (units[:, 3:] / fades[:, None] ** np.arange(1, 5)) @ plan
+    assert account.call(12)[0] == pytest.approx(_most(gains, alone) / most, rel=1e-6)

@@ -32,7 +32,7 @@ LONGEST, FEWEST = (
 )  # slots of the longest programme, where there are operations for it, and where there are few
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
-BETWEEN = 1.2  # times that, of machines between both ends of the errors, which have no rows
+BETWEEN = 1.2  # times that, on any machine that is watched
 AGAIN = 1.1  # times where damping ends: so much left by what is committed asks for another motion
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 MACHINES = 16  # that are watched, where there are operations for them:
@@ -138,9 +138,9 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "rowed": len(shown),
         "shown": initialiser([str(v) for v in shown]),
         "slots": slots,
-        "stop_share": literal(_stop_share(constants)),
         "polygon": literal(float(np.cos(np.pi / SIDES))),
-        "bounds": initialiser([literal(float(v)) for v in _bounds(constants, watched)]),
+        "bounds": initialiser([literal(float(v)) for v in _share(constants) * _shares(constants)]),
+        "most": literal(BETWEEN * _stop_share(constants) * _share(constants)),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, watched)),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
@@ -178,11 +178,9 @@ def _stop_share(c: PlannerConstants) -> float:
     return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share)
 
 
-def _bounds(c: PlannerConstants, watched: Sequence[float]) -> Array:
-    """Bound in m what a plan may leave in each mode: of the machine as given, and of those watched."""
-    share = (c.sway_share or LEAST_SHARE * c.sway_limit) / len(c.axes)
-    levels = [1.0, *(1.0 if abs(e) == 1.0 else BETWEEN * _stop_share(c) for e in watched)]
-    return np.outer(share * np.array(levels), _shares(c)).ravel()
+def _share(c: PlannerConstants) -> float:
+    """Bound in m what a plan may leave at both ends of the errors."""
+    return (c.sway_share or LEAST_SHARE * c.sway_limit) / len(c.axes)
 
 
 def _shares(c: PlannerConstants) -> Array:
