@@ -115,15 +115,35 @@ def test_a_prompt_stop_that_fails_may_leave_four_times_as_much(blocks):
     assert table.fails(tried)["fEase"] == 4.0
 
 
-def test_a_decline_that_fails_is_sought_longer_and_then_behind_a_gentler_ramp(blocks):
+def test_a_decline_that_fails_is_sought_longer_and_then_behind_a_ramp_to_less(blocks):
     table = Table(blocks)
     table.command(SPEED, 0.5, fPlace=20.0)
     tried = table.ask(CHOOSE)
     longer = table.fails({**tried, "nKind": DECLINE, "nLength": 50}, nOfBefore=15)
     assert longer["bLonger"] and longer["nLater"] == 18
-    gentler = table.fails({**tried, "nKind": DECLINE, "nLength": 15 + SLOTS}, nOfBefore=15)
-    assert not gentler["bLonger"] and gentler["nLater"] == 12 and gentler["fLeaves"] == pytest.approx(0.45)
-    assert table.ask(CHOOSE)["nRamp"] > tried["nRamp"]
+    less = table.fails({**tried, "nKind": DECLINE, "nLength": 15 + SLOTS}, nOfBefore=15)
+    assert not less["bLonger"] and less["nLater"] == 12
+    again = table.ask(CHOOSE)
+    assert again["nRamp"] > tried["nRamp"] and again["fRamp"] == pytest.approx(0.3)
+    table.ask(FOUND, nOfKind=DECLINE)
+    assert table.ask(CHOOSE)["fRamp"] == 0.5
+
+
+def test_from_rest_what_swings_is_left_where_it_cannot_be_calmed(blocks):
+    table = Table(blocks)
+    table.command(SPEED, 0.5, fPlace=20.0, bStands=1.0)
+    tried, calming = table.ask(CHOOSE), []
+    while not (left := table.fails(tried, bSwings=1.0))["bQuiet"]:
+        calming.append(tried["nRamp"])
+        tried = table.ask(CHOOSE)
+    assert calming[0] == 14 and max(calming) < 30  # the axis alone takes 10
+    quiet = table.ask(CHOOSE)
+    assert (quiet["nKind"], quiet["nRamp"], left["nLater"]) == (RAMP, 30, 20)
+    slower = table.fails({**quiet, "nKind": DECLINE, "nLength": 62}, nOfBefore=32)
+    assert slower["bQuiet"] and slower["nLater"] == 25
+    again = table.ask(CHOOSE)
+    assert again["nRamp"] == 30 and again["fRamp"] == pytest.approx(0.3)
+    assert not table.ask(FOUND, nOfKind=DECLINE)["bQuiet"]
 
 
 def test_setpoints_are_the_derivatives_and_the_integral_of_one_spline(blocks):

@@ -84,7 +84,7 @@ def test_modes_are_those_of_the_linearised_machine(spec, modes, rope, load):
 
 ORDERS = {
     "nOrder": "DINT", "fTaken": "LREAL", "nBefore": "DINT", "nSlots": "DINT", "nMet": "DINT", "nGap": "DINT",
-    "fAfter": "LREAL", "fPart": "LREAL", "bAnySlot": "BOOL",
+    "fAfter": "LREAL", "fPart": "LREAL", "bAnySlot": "BOOL", "bQuiet": "BOOL",
 }  # fmt: skip
 ROWS, PLAN = 13, 2 * SLOTS + 4
 TAKEN = ("aTurnRe", "aTurnIm", "aTickRe", "aTickIm", "aFade", "aGain")
@@ -157,7 +157,7 @@ END_FUNCTION_BLOCK
 
 @pytest.fixture(scope="module")
 def swings(spec):
-    """Turns in a slot, cycles of a slot, fades, gains and the account's own bounds, those of the modes' sum last."""
+    """Turns in a slot, cycles of a slot, fades, gains, bounds and that of the modes' sum."""
     draw = np.random.default_rng(5)
     phases, fades = draw.uniform(0.1, 1.5, SWINGS), draw.uniform(0.98, 1.0, SWINGS)
     (stated,) = re.findall(r"cBound : [^[]*\[[^]]*\] OF LREAL := \[([^]]*)\]", blocks_before_planner(spec))
@@ -195,6 +195,11 @@ def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings)
         known = past[swing] + ahead[swing, :5] @ trial[:5]
         assert values[row] + 1j * values[row + 1] == pytest.approx(-known / 2.0, abs=1e-11)
     levels = bounds / gains
+    *_, alone, quiet = account.call(2, trial, nBefore=5, nSlots=20, nMet=2, nGap=1, fPart=0.7, bQuiet=1.0)
+    assert np.array_equal(quiet, rows) and np.array_equal(alone[:4], values[:4])
+    for swing, row in zip(shown[2:], at[2:], strict=True):  # what the trial adds to what has swung
+        own = ahead[swing, :5] @ trial[:5]
+        assert alone[row] + 1j * alone[row + 1] == pytest.approx(-own / 2.0, abs=1e-11)
     assert np.allclose(radii[:4], 0.7 * np.cos(np.pi / 12) * levels[[2, 3, 8, 9]] / 2.0)
     # plans: weighed, another one that is weighed changes nothing, committed, and what is taken of it
     sums = past + ahead[:, :25] @ trial
@@ -290,6 +295,7 @@ def kept_at(account, swing, trial, speed, swings):
 def test_an_axis_that_stands_begins_in_any_cycle(account, swings):
     """The same sums as if slots had been shorter until then: a plan is weighed as swings are then."""
     phases, cycles, fades, gains, _, most = swings
+    most *= 1.05  # quiet motions may add so much
     share = 1.0 / cycles
     first, plan = np.array([0.6, -0.2, 0.5]), np.array([0.3, 0.9, -0.4, 0.1])
     account.call(5)

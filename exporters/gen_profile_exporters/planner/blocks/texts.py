@@ -32,7 +32,7 @@ LONGEST, FEWEST = (
 )  # slots of the longest programme, where there are operations for it, and where there are few
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
-BETWEEN = 1.2  # times that, on any machine that is watched
+BETWEEN = 1.15  # times that, on any machine that is watched
 AGAIN = 1.1  # times where damping ends: so much left by what is committed asks for another motion
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 MACHINES = 16  # that are watched, where there are operations for them:
@@ -151,6 +151,7 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "measured": "bMeasured := nQuiet < cQuiet," if constants.sensor else "",
         "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
         "room": ROOM if constants.sensor else "",
+        "quiet": "" if account else "bQuiet := table.bQuiet,",
     }
     return "\n".join(
         [
