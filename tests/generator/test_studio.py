@@ -5,9 +5,12 @@ import json
 import random
 import shlex
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
+import tomlkit
+from generator.quay import quay
 
 from gen_profile.methods.solvers.plan import plan
 from gen_profile.presentation.studio.depth import depth
@@ -297,3 +300,30 @@ def test_whatever_is_turned_is_answered_without_a_traceback():
         ends[end] += 1
         assert "Internal error" not in json.dumps(by_part)
     assert min(ends["verdict"], ends["faults"]) > 1
+
+
+class TestOverStacks:
+    def test_the_way_is_sketched_before_it_is_found_for_all_machines(self):
+        document = quay().to_dict()
+        start = WrittenSpec(words=("quay.toml",), text=tomlkit.dumps(document), folder=Path())
+        state = StudioState(edits={"path.stacks.2": [25.0, 27.5, 16.4]})
+        answer = picture(Question(start=start, state=state))
+        first = next(answer)
+        assert first["part"] == "sketch"
+        found = {part["part"]: part for part in answer}
+        assert found["verdict"]["passed"] and found["side"]["stacks"][2] == (25.0, 27.5, 16.4)
+        assert found["setting"]["command"].endswith("--set 'path.stacks.2=[25.0, 27.5, 16.4]'")
+        ways = [{str(line["name"]): line for line in part["lines"]} for part in (first, found["side"])]
+        about, exact = (way["middle of the payload, nominal"] for way in ways)
+        between = np.linspace(2.0, 35.0, 50)
+        apart = np.interp(between, about["x"], about["y"]) - np.interp(between, exact["x"], exact["y"])
+        assert 0.0 < np.abs(apart).max() < 1.0
+        shaded = [np.ptp(way["swept by the payload"]["y"]) for way in ways]
+        assert shaded[1] > shaded[0] + 0.2  # ropes of other lengths
+
+    def test_what_is_known_of_the_load_has_knobs(self):
+        spec = quay()
+        shown = {(one.path, one.index): one.value for one in knobs(spec, spec.to_dict(), spec)}
+        assert shown["path.rail", None] == 36.0
+        assert [shown["path.load", 0], shown["path.load", 1]] == [2.5, 2.6]
+        assert [shown["path.clearance", 0], shown["path.clearance", 1]] == [0.5, 1.0]

@@ -13,7 +13,7 @@ from gen_profile.methods.solvers.direct.set_up import DirectOptions
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.support.interrupts import interrupts_collected
-from gen_profile.support.work import OutOfWork, budget, left, spend
+from gen_profile.support.work import OutOfWork, Overtaken, budget, left, spend
 
 
 def test_a_budget_within_another_takes_from_both():
@@ -97,3 +97,17 @@ def test_a_program_ends_at_once_when_interrupted(monkeypatch):
     program.equal(one, np.ones(1))
     with pytest.raises(KeyboardInterrupt):
         program.solve(one, np.zeros(1))
+
+
+def test_what_is_no_longer_asked_for_is_left_and_not_taken_for_a_search_that_ended():
+    asked = []
+    with pytest.raises(Overtaken), budget(1e6, stop=lambda: bool(asked)):
+        for number in range(100):
+            try:
+                with budget(50.0):
+                    spend(0.1)
+            except OutOfWork:
+                pytest.fail("a search would go on with what it has")
+            if number == 40:
+                asked.append("something else")
+            assert number <= 41

@@ -26,12 +26,17 @@ class OutOfWork(Exception):
     """A search has used up its budget."""
 
 
+class Overtaken(BaseException):
+    """What is computed is no longer asked for; no search goes on with what it has found."""
+
+
 @attrs.define
 class _Budget:
     left: float
     ends: float  # by the processor's clock
     look: float  # at the clock, when so much is left
     outer: _Budget | None
+    stop: Callable[[], bool] | None
 
     def take(self, seconds: float) -> None:
         self.left -= seconds
@@ -39,6 +44,8 @@ class _Budget:
             raise OutOfWork
         if self.left < self.look:
             self.look = self.left - CLOCK_INTERVAL
+            if self.stop is not None and self.stop():
+                raise Overtaken
             if time.process_time() > self.ends:
                 self.left = -math.inf  # for code that catches this and goes on
                 raise OutOfWork
@@ -48,7 +55,7 @@ _current: ContextVar[_Budget | None] = ContextVar("budget", default=None)
 
 
 @contextmanager
-def budget(seconds: float, clock: float = math.inf) -> Iterator[None]:
+def budget(seconds: float, clock: float = math.inf, stop: Callable[[], bool] | None = None) -> Iterator[None]:
     """Let what is done in the context cost no more than this, nor more than budgets around it have left.
 
     Parameters
@@ -57,8 +64,15 @@ def budget(seconds: float, clock: float = math.inf) -> Iterator[None]:
         Of counted work.
     clock : float
         By the processor's clock, in s.
+    stop : callable, optional
+        Asked whether to go on, whenever the clock is looked at.
+
+    Raises
+    ------
+    Overtaken
+        It is to go no further.
     """
-    token = _current.set(_Budget(seconds, time.process_time() + clock, seconds, _current.get()))
+    token = _current.set(_Budget(seconds, time.process_time() + clock, seconds, _current.get(), stop))
     try:
         yield
     finally:

@@ -6,7 +6,6 @@ from itertools import cycle
 import attrs
 import numpy as np
 
-from gen_profile.dynamics.evaluation.clearance import zones_of
 from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.dynamics.evaluation.phrases import machine, place_unit
 from gen_profile.dynamics.evaluation.residual_sway import RESIDUAL_SAMPLES
@@ -16,8 +15,6 @@ from gen_profile.dynamics.evaluation.static_deflection import StaticDeflection, 
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.presentation.charts.figure import (
-    FRAME,
-    LIMIT,
     PALETTE,
     PLAIN,
     Band,
@@ -38,8 +35,6 @@ NEAR = 2.5  # times what is shown, up to which a limit is drawn; beyond, it woul
 ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
 FOLLOWED = Style(colour=PALETTE[1], dash="dash")
-STANDING = Style(colour=FRAME)
-KEPT_OUT = Style(colour=LIMIT, dash="dash", width=1.0)
 WINDY = Style(colour=PALETTE[-1], dash="dot")
 
 
@@ -144,41 +139,6 @@ def sway_figure(
         panels.append(panel)
     caption = f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}"
     return Figure(caption, panels)
-
-
-def path_figure(
-    spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], samples: int = SAMPLES
-) -> Figure:
-    """Draw the ways of the loads over what stands there, from the side; none without stacks."""
-    path, plant = spec.path, spec.machine()
-    assert path is not None
-    times = np.linspace(0.0, evaluation.motion.duration, samples)
-    places, panels = evaluation.swing.bodies(times), []
-    zones = zones_of(spec)
-    for number, body in enumerate(plant.bodies):
-        below = path.rail - path.size(number, len(plant.bodies))[1] / 2.0
-        lines = [
-            Line(
-                one.name, places[one.index, :, number, 0], places[one.index, :, number, 2] + below, one.style
-            )
-            for one in shown
-        ]
-        own = [zone for zone in zones if zone.body == number]
-        lines += [_outline("stacks", *path.stacks[zone.stack], STANDING) for zone in own]
-        lines += [_outline("clearance", zone.low, zone.high, zone.top + below, KEPT_OUT) for zone in own]
-        title = Phrase("Way of the {body}", body=body)
-        panels.append(Panel(title, "height of its underside (m)", lines, x_label="place of its middle (m)"))
-    caption = (
-        "From the side. Dashed in red: what the middle of a load's underside keeps out of, its width and the "
-        "clearance included; where it stands at the start or the target, it is lifted out."
-    )
-    return Figure(caption, panels)
-
-
-def _outline(name: str, low: float, high: float, height: float, style: Style) -> Line:
-    """Draw what stands on the ground."""
-    places, heights = [low, low, high, high], [0.0, height, height, 0.0]
-    return Line(name, np.array(places), np.array(heights), style)
 
 
 def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:

@@ -38,12 +38,15 @@ class Style:
         In pixels; of points the radius.
     shown : bool
         Whether it is drawn before it is asked for.
+    fill : float
+        Opacity of what a closed curve goes around; 0 where only the curve is drawn.
     """
 
     colour: str = PALETTE[0]
     dash: Dash = "solid"
     width: float = 1.6
     shown: bool = True
+    fill: float = 0.0
 
 
 PLAIN = Style()
@@ -98,6 +101,8 @@ class Panel:
         Of a logarithmic vertical axis, counted down from the greatest value; None for a linear one.
     span : (float, float) or None
         Ends of the vertical axis; None for one that shows everything.
+    even : bool
+        Whether a unit is as long on both axes.
     """
 
     title: str
@@ -108,6 +113,7 @@ class Panel:
     bands: Sequence[Band] = ()
     decades: float | None = None
     span: tuple[float, float] | None = None
+    even: bool = False
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -137,6 +143,7 @@ class Bars:
     limit: float
     y_label: ClassVar[str] = "method"
     lines: ClassVar[Sequence[Line]] = ()
+    even: ClassVar[bool] = False
 
     @property
     def end(self) -> float:
@@ -178,6 +185,7 @@ class Map:
     cells: bool = False
     headroom: float = HEADROOM
     lines: ClassVar[Sequence[Line]] = ()
+    even: ClassVar[bool] = False
 
 
 @attrs.frozen(eq=False)

@@ -18,7 +18,7 @@ METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pd
 DASHES: dict[parts.Dash, str] = {"solid": "-", "dash": "--", "dot": ":", "points": "none"}
 HATCHES: dict[parts.Dash, str] = {"solid": "", "dash": "///", "dot": "..", "points": ""}
 WIDE, HIGH = (9.0, 7.5, 5.2, 3.9), (6.0, 3.8, 3.8, 3.4)  # inches of a panel, by columns from 1
-BESIDE = 5.5  # inches of a figure beside another one
+BESIDE, EVEN = 5.5, 9.0  # inches of a figure beside another one, and where its axes have one scale
 LETTERS = 13  # of a caption, in an inch
 
 
@@ -72,11 +72,12 @@ def drawn(figures: Sequence[parts.Figure], title: str) -> Any:
 
     columns = _columns(figures[0])
     rows = -(-len(figures[0].panels) // columns)
-    widths = [columns * WIDE[columns - 1], *[BESIDE] * (len(figures) - 1)]
+    beside = [EVEN if any(panel.even for panel in figure.panels) else BESIDE for figure in figures[1:]]
+    widths = [columns * WIDE[columns - 1], *beside]
     height = max(6.0, 1.0 + rows * (2.4 if rows > 2 and columns == 1 else HIGH[columns - 1]))
     picture = Canvas(figsize=(sum(widths), height), layout="constrained")
-    beside = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
-    for number, (part, figure, width) in enumerate(zip(beside, figures, widths, strict=True)):
+    subfigures = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
+    for number, (part, figure, width) in enumerate(zip(subfigures, figures, widths, strict=True)):
         _draw(part, figure, width, 1 if number else columns)
     picture.suptitle(title)
     return picture
@@ -112,7 +113,7 @@ def _draw(part: Any, figure: parts.Figure, width: float, columns: int) -> None:
         title=caption,
         title_fontsize="small",
         loc="outside lower center",
-        ncols=max(1, int(width / 2.1)),
+        ncols=max(1, int(width / max(2.1, 0.9 + max(map(len, handles)) / LETTERS))),
         handlelength=3.5,
     )
 
@@ -124,7 +125,11 @@ def _columns(figure: parts.Figure) -> int:
 def _curves(axis: Any, panel: parts.Panel) -> None:
     shown = [line for line in panel.lines if line.style.shown]
     for line in shown:
-        axis.plot(line.x, line.y, label=line.name, **_ink(line.style))
+        if line.style.fill:
+            look = {"alpha": line.style.fill, "linewidth": 0.0, "zorder": 1}
+            axis.fill(line.x, line.y, label=line.name, color=line.style.colour, **look)
+        else:
+            axis.plot(line.x, line.y, label=line.name, **_ink(line.style))
     for band in panel.bands:
         if band.high > band.low:
             axis.axvspan(band.low, band.high, color=parts.FRAME, alpha=0.2, linewidth=0.0, zorder=0)
@@ -133,7 +138,10 @@ def _curves(axis: Any, panel: parts.Panel) -> None:
     for level in panel.levels:
         _level(axis, level)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
-    axis.set_xlim(min(float(line.x.min()) for line in shown), max(float(line.x.max()) for line in shown))
+    if panel.even:
+        axis.set_aspect("equal")
+    else:
+        axis.set_xlim(min(float(line.x.min()) for line in shown), max(float(line.x.max()) for line in shown))
     axis.grid(alpha=0.3)
     if panel.decades is not None:
         greatest = max(float(line.y.max()) for line in shown)

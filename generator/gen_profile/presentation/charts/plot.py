@@ -17,7 +17,6 @@ from gen_profile.motion.profile import Profile
 from gen_profile.presentation.charts.comparison import comparison_figure
 from gen_profile.presentation.charts.curves import (
     motion_figure,
-    path_figure,
     profile_figure,
     select_machines,
     sway_figure,
@@ -28,6 +27,7 @@ from gen_profile.presentation.charts.machine import draw_machine
 from gen_profile.presentation.charts.picture import require_drawable, save
 from gen_profile.presentation.charts.proof import draw
 from gen_profile.presentation.charts.robustness import robustness_figure
+from gen_profile.presentation.charts.side_view import path_figure
 from gen_profile.spec.model import Spec
 from gen_profile.studies.comparison.compare import Comparison
 from gen_profile.studies.comparison.robustness import Robustness
@@ -103,12 +103,11 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
         case Plan(spec=spec, evaluation=evaluation):
             arrival = evaluation.motion.duration
             sway = sway_figure(spec, evaluation, select_machines(evaluation), arrival)
-            over = [] if spec.path is None else [path_figure(spec, evaluation, select_machines(evaluation))]
-            return (
-                [motion_figure(spec, evaluation), *over, sway],
-                spec.name,
-                f"{spec.name}: {spec.plant.type}",
-            )
+            if spec.path is not None:
+                over = path_figure(spec, evaluation)
+                sway = Figure(f"{over.caption} {sway.caption}", [*over.panels, *sway.panels])
+            title = f"{spec.name}: {spec.plant.type}"
+            return [motion_figure(spec, evaluation), sway], spec.name, title
         case Profile(method=method):
             return [profile_figure(result)], method, method
         case Check():

@@ -21,7 +21,13 @@ def figure_json(figure: parts.Figure) -> dict[str, Any]:
     """Nest plain values for a page's script: the legend's entries, and data and layout of every panel."""
     return {
         "legend": [
-            {"name": name, "colour": style.colour, "dash": style.dash, "shown": style.shown}
+            {
+                "name": name,
+                "colour": style.colour,
+                "dash": style.dash,
+                "shown": style.shown,
+                "fill": style.fill,
+            }
             for name, style in figure.styles.items()
         ],
         "panels": [_panel(panel) for panel in figure.panels],
@@ -51,6 +57,10 @@ def _curves(panel: parts.Panel) -> dict[str, Any]:
         }
     elif panel.span is not None:
         layout["yaxis"] |= {"range": list(panel.span)}
+    if panel.even:
+        layout["xaxis"] |= {"constrain": "domain"}
+        layout["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
+        layout["hovermode"] = "closest"
     return {"data": [_trace(line) for line in panel.lines], "layout": layout}
 
 
@@ -116,6 +126,9 @@ def _trace(line: parts.Line) -> dict[str, Any]:
     look: dict[str, Any] = {"line": {"color": style.colour, "width": style.width, "dash": style.dash}}
     if style.dash == "points":
         look = {"marker": {"color": style.colour, "size": 2.0 * style.width}}
+    if style.fill:
+        look = {"line": {"width": 0}, "fill": "toself", "fillcolor": style.colour, "opacity": style.fill}
+        look["hoverinfo"] = "skip"
     return {
         "type": "scatter",
         "mode": "markers" if "marker" in look else "lines",

@@ -57,6 +57,8 @@ class Animation:
     load : str
         Name of the end load.
     actors : sequence of Actor
+    obstacles : (n, 4) array
+        What stands there, in the first view: left, bottom, width and height in m.
     """
 
     times: Array
@@ -64,6 +66,7 @@ class Animation:
     limit: float
     load: str
     actors: Sequence[Actor]
+    obstacles: Array = attrs.field(factory=lambda: np.zeros((0, 4)))
     kind = "animation"
 
     def to_json(self, bounds: Sequence[Sequence[float]] | None = None) -> dict[str, Any]:
@@ -84,6 +87,7 @@ class Animation:
             "arrival": self.arrival,
             "limit_mm": 1e3 * self.limit,
             "load": self.load,
+            "obstacles": self.obstacles.tolist(),
             "views": [
                 {"title": drawing.title, "bounds": box, "units": _units(box)}
                 for drawing, box in zip(self.actors[0].drawings, bounds, strict=True)
@@ -110,6 +114,8 @@ class Animation:
             for drawing in drawings
             for places in (drawing.points, drawing.rest)
         ]
+        if view == 0:
+            corners += [(box[:2], box[:2] + box[2:]) for box in self.obstacles]
         low, high = np.min([corner[0] for corner in corners], 0), np.max([corner[1] for corner in corners], 0)
         size = (1.0 + 2.0 * MARGIN) * (high - low)
         width = max(float(size[0]), float(size[1]) / NARROWEST)
@@ -168,4 +174,14 @@ def animation(spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], 
         limit=spec.check.residual_sway[plant.loads[-1]],
         load=plant.end_load_name,
         actors=actors,
+        obstacles=_obstacles(spec),
     )
+
+
+def _obstacles(spec: Spec) -> Array:
+    """Tell where stacks are below the suspension."""
+    path = spec.path
+    if path is None:
+        return np.zeros((0, 4))
+    floor = min(0.0, *(height for *_, height in path.stacks))
+    return np.array([(a, floor - path.rail, b - a, top - floor) for a, b, top in path.stacks])

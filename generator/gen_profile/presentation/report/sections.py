@@ -20,13 +20,13 @@ from gen_profile.presentation.charts.comparison import compared_styles, comparis
 from gen_profile.presentation.charts.curves import (
     hamiltonian_figure,
     motion_figure,
-    path_figure,
     select_machines,
     spectrum_figure,
     sway_figure,
 )
 from gen_profile.presentation.charts.figure import PLAIN
 from gen_profile.presentation.charts.robustness import curves_figure, maps_figure
+from gen_profile.presentation.charts.side_view import path_figure
 from gen_profile.presentation.report.animation import animation
 from gen_profile.presentation.report.content import (
     Block,
@@ -111,7 +111,7 @@ def sections(
     if outcome.plan.passage is not None and check.nearest is not None:
         near, gained = check.nearest, outcome.plan.passage.gained(evaluation.motion.duration)
         kept = f"The clearance on {machine(near.scenario.name)}: {near.nearness(spec.path)}."
-        over = path_figure(spec, evaluation, shown)
+        over = path_figure(spec, evaluation)
         yield Section(title="Over the stacks", words=[f"{gained}.", kept], blocks=[over])
     limits = _limits(spec, evaluation, outcome.figures, check)
     yield Section(title="Limits and margins", blocks=[limits])

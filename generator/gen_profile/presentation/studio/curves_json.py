@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
+import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.presentation.charts.figure import Figure, Panel
 from gen_profile.presentation.charts.plotly_json import rounded
+from gen_profile.presentation.charts.side_view import side_view
+from gen_profile.spec.model import Spec
 
 MOST = 2000  # points of a curve, of which a screen shows fewer still
 
@@ -41,6 +44,30 @@ def _panel(panel: Panel) -> dict[str, Any]:
         "bands": [[band.low, band.high] for band in panel.bands],
         "decades": panel.decades,
         "span": panel.span,
+    }
+
+
+def side_json(spec: Spec, places: Array) -> dict[str, Any]:
+    """Nest plain values of ways over stacks, seen from the side, and of the stacks.
+
+    Parameters
+    ----------
+    spec : Spec
+        With a path over stacks.
+    places : (machines, samples, bodies, 2) array
+        As `side_view` takes them.
+    """
+    panel, path = side_view(spec, places), spec.path
+    assert path is not None
+    return {
+        "title": panel.title,
+        "x_label": panel.x_label,
+        "y_label": panel.y_label,
+        "lines": [
+            {"name": line.name, **attrs.asdict(line.style), "x": rounded(line.x), "y": rounded(line.y)}
+            for line in panel.lines
+        ],
+        "stacks": path.stacks,
     }
 
 

@@ -15,6 +15,7 @@ import attrs
 from gen_profile.dynamics.evaluation.phrases import place_unit
 from gen_profile.plants.plant import Parameter
 from gen_profile.spec.model import MoveSpec, Spec
+from gen_profile.spec.stacks import StacksSpec
 from gen_profile.spec.structure import kinds_of
 from gen_profile.spec.values import Bounds
 from gen_profile.support.units import RATES
@@ -119,6 +120,7 @@ def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
     yield from _fields(spec.cost, "cost")
     yield from _fields(spec.solver, "solver")
     yield from _limits(spec)
+    yield from _path(spec.path)
     yield from _fields(spec.actuator, "actuator")
     yield from _residual_sway(spec, document.get("check", {}))
     yield from _fields(spec.check, "check")
@@ -279,6 +281,26 @@ def _limits(spec: Spec) -> Iterator[Knob]:
             rate = RATES.get(knob.words.rpartition(".")[2])
             yield attrs.evolve(knob, unit=f"{unit}{rate}") if rate else knob
         yield _pair("limits.travel", f"{place}.travel", name, table.travel, unit)
+
+
+def _path(path: StacksSpec | None) -> Iterator[Knob]:
+    """List what is known of the load over stacks; the stacks themselves are moved in their picture."""
+    if path is None:
+        return
+    yield Knob(path="path.rail", kind="number", value=path.rail, unit="m")
+    size = ("width", "height")
+    pairs = [("load", size, path.load), ("hook", size, path.hook)]
+    for key, names, pair in [*pairs, ("clearance", ("sideways", "upwards"), path.clearances)]:
+        for index, value in enumerate(pair or ()):
+            yield Knob(
+                path=f"path.{key}",
+                index=index,
+                kind="number",
+                words=f"path.{key}.{names[index]}",
+                value=value,
+                unit="m",
+                least=0.0,
+            )
 
 
 def _residual_sway(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:

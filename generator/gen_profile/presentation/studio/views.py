@@ -16,12 +16,13 @@ from gen_profile.dynamics.evaluation.phrases import machine, move, place_unit
 from gen_profile.dynamics.problem.limits import LIMIT_TOLERANCE
 from gen_profile.methods.solvers.draft import Plan
 from gen_profile.methods.solvers.method_selection import ANSWER
+from gen_profile.methods.solvers.over_stacks.plan import sketched
 from gen_profile.methods.solvers.plan import draft, judged
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.motion.metrics import extremes, peak
 from gen_profile.presentation.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.presentation.report.animation import animation
-from gen_profile.presentation.studio.curves_json import curves_json
+from gen_profile.presentation.studio.curves_json import curves_json, side_json
 from gen_profile.presentation.studio.knobs import knobs
 from gen_profile.presentation.studio.manual import help_on
 from gen_profile.presentation.studio.orders import Question
@@ -51,6 +52,7 @@ def picture(question: Question) -> Iterator[Part]:
     try:
         spec = question.spec()
         with budget(*ANSWER):
+            yield from _sketched(spec)
             drafted = draft(spec)
             if drafted.found is None:
                 yield failure("none", [SEARCHING])
@@ -66,6 +68,8 @@ def _shown(spec: Spec, evaluation: MotionEvaluation) -> Iterator[Part]:
     """Draw the motion, and the machines under it."""
     arrival = evaluation.motion.duration
     shown = [one for one in select_machines(evaluation, RANKED) if one.rank <= SHOWN]
+    if spec.path is not None:
+        yield _side(spec, evaluation)
     yield {
         "part": "curves",
         "duration": arrival,
@@ -74,6 +78,18 @@ def _shown(spec: Spec, evaluation: MotionEvaluation) -> Iterator[Part]:
         "margins": [*_margins(spec, evaluation)],
     }
     yield {"part": "animation", "animation": animation(spec, evaluation, shown, arrival).to_json()}
+
+
+def _sketched(spec: Spec) -> Iterator[Part]:
+    """Show about how the load goes over stacks, before the motion is known that all machines can follow."""
+    if spec.path is not None and (places := sketched(spec)) is not None:
+        yield {"part": "sketch", **side_json(spec, places[None])}
+
+
+def _side(spec: Spec, evaluation: MotionEvaluation) -> Part:
+    times = np.linspace(0.0, evaluation.motion.duration, SAMPLES)
+    places = np.asarray(evaluation.swing.bodies(times))[..., ::2]
+    return {"part": "side", **side_json(spec, places)}
 
 
 def _setting(question: Question, spec: Spec) -> Part:

@@ -18,6 +18,7 @@ import attrs
 from gen_profile.delivery.streaming.priority import lower_priority
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import plain
+from gen_profile.support.work import Overtaken, budget
 
 # what can be asked, and what answers it, which only a worker loads
 ANSWERS = {
@@ -28,7 +29,11 @@ ANSWERS = {
     "log": "gen_profile.presentation.studio.logs:log",
 }
 POLITE = {"depth", "files", "log"}  # give way to what a hand waits for
+PURE = {"picture", "depth"}  # which can be left anywhere: they keep and write nothing
+MUCH = 1e6  # s of work, more than any answer takes
 FRAME = 0.015  # s after the curves of a picture, in which the browser has the processor to draw them
+# s after a part, in which a newer question is waited for: while a stack is dragged, one comes every frame
+PAUSES = {"curves": FRAME, "sketch": 0.05}
 PAUSE = 1.0  # s after a worker was taken, in which it has the processor for itself
 BEGUN, ENDED, LOST = "begun", "ended", "lost"
 
@@ -220,13 +225,19 @@ def _answer(connection: Connection, job: Job) -> None:
     if job.kind in POLITE:
         lower_priority()
     connection.send(Message(number=job.number, kind=job.kind, name=BEGUN))
+    with suppress(Overtaken), budget(MUCH, stop=connection.poll if job.kind in PURE else None):
+        _tell(connection, job)
+
+
+def _tell(connection: Connection, job: Job) -> None:
+    """Send the parts of an answer, as long as no newer question is asked."""
     for part in _parts(job):
         file, document = part.get("file"), {**part, "of": job.kind, "serial": job.number}
         if file is not None:
             document["file"] = None
         text = json.dumps(plain(document), separators=(",", ":"))
         connection.send(Message(number=job.number, kind=job.kind, name=part["part"], text=text, file=file))
-        if connection.poll(FRAME if part["part"] == "curves" else 0.0):
+        if connection.poll(PAUSES.get(part["part"], 0.0)):
             return
     connection.send(Message(number=job.number, kind=job.kind, name=ENDED))
 

@@ -258,6 +258,31 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
     )
 
 
+def sketched(spec: Spec) -> Array | None:
+    """Find about where the nominal machine's bodies go, in some hundredths of a second; none if not found.
+
+    Returns
+    -------
+    (samples, bodies, 2) array
+        m, horizontally and above the suspension.
+    """
+    bay = bay_of(spec, RESERVE).alone()
+    planner, lifted = _Planner(bay=bay), partial(bay.lifted, top=bay.top)
+    course: Course | None = None
+    if spec.move.shortest:
+        start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
+        course = planner.quickest(lifted, start, ROUGH)
+    elif (up := lifted(spec.move.duration)) is not None:
+        course = planner.solved(resting(bay, up))
+    if course is None:
+        return None
+    seen = Program(bay=bay, about=course).followed[0].seen[0, :, :-1, :-1]
+    x = seen.reshape(-1, seen.shape[-1])
+    times = np.linspace(0.0, course.up.duration, len(x), endpoint=False)
+    z = bay.hang[0] + course.up.at(times)[:, :1]
+    return np.stack([x, z], axis=2)
+
+
 def _nearest(spec: Spec, motion: Profile) -> Nearest:
     """Look for the least room of machines all over the ranges, on the way and while they swing on."""
     named = machines_of(problem_of(spec, whole=True))

@@ -34,12 +34,16 @@
   }
 
   /** One machine from one side: an SVG and the function that sets its time. */
-  function picture(host, view, moving, colour) {
+  function picture(host, view, moving, colour, obstacles) {
     const [left, bottom, width, height] = view.bounds;
     const [place, swing] = view.units;
     const scale = 1000 / width;
     const toScreen = ([x, y]) => [(x - left) * scale, (bottom + height - y) * scale];
     const svg = element(host, "svg", { viewBox: `0 0 1000 ${height * scale}`, role: "img", "aria-label": view.title });
+    for (const [x, y, w, h] of obstacles) {
+      const [across, up] = toScreen([x, y + h]);
+      element(svg, "rect", { x: across, y: up, width: w * scale, height: h * scale, fill: "#8a949d", "fill-opacity": 0.6 });
+    }
     const shapes = moving.shapes.map((shape) => {
       const line = ["rail", "plumb", "rope", "spring", "frame", "liquid"].includes(shape.kind);
       const look = { fill: "none", "vector-effect": "non-scaling-stroke", "stroke-linejoin": "round", ...LOOKS[shape.kind] };
@@ -103,7 +107,7 @@
       title.append(actor.name);
       const value = title.appendChild(document.createElement("span"));
       const pictures = animation.views.map((view, index) => {
-        const show = picture(host, view, actor.views[index], actor.colour);
+        const show = picture(host, view, actor.views[index], actor.colour, index ? [] : animation.obstacles ?? []);
         if (animation.views.length > 1) host.appendChild(document.createElement("small")).append(view.title);
         return show;
       });

@@ -67,7 +67,8 @@
     const path = svg.appendChild(document.createElementNS(svg.namespaceURI, "path"));
     path.setAttribute("d", "M2 4H26");
     path.setAttribute("stroke", entry.colour);
-    path.setAttribute("stroke-width", entry.dash === "points" ? 5 : 2.5);
+    path.setAttribute("stroke-width", entry.fill ? 8 : entry.dash === "points" ? 5 : 2.5);
+    path.setAttribute("stroke-opacity", entry.fill || 1);
     path.setAttribute("stroke-linecap", entry.dash === "points" ? "round" : "butt");
     path.setAttribute("stroke-dasharray", line);
     return svg;

@@ -2,6 +2,7 @@
 "use strict";
 const cards = (() => {
   const { element } = knobs;
+  const ROUNDING = 1e-6; // of a limit, by which what takes all of it may be off
   // parts of an answer, and where they are shown
   const PLACES = { curves: ["#margins", "#sway", "#motion"], spectrum: ["#spectrum"], robustness: ["#robustness"], comparison: ["#designs"] };
 
@@ -30,7 +31,7 @@ const cards = (() => {
       const share = allowed === null ? null : takes / allowed;
       const name = [phrase(`limits.${quantity}`), phrase(axis)].filter(Boolean).join(", ");
       const bar = element("meter", { min: "0", max: "1", value: String(Math.min(share ?? 0, 1)), "aria-label": name });
-      return element("div", { class: share !== null && share > 1 ? "share bad" : "share" },
+      return element("div", { class: share !== null && share > 1 + ROUNDING ? "share bad" : "share" },
         element("span", {}, name),
         element("span", { class: "amount" }, `${numbers.short(takes)} ${unit}`),
         share === null ? element("span", { class: "hint" }, phrase("unlimited")) : bar,

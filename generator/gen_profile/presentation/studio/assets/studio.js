@@ -205,6 +205,15 @@
       offer(preset);
       restart(preset);
     },
+    sketch: (part) => parts.side(part),
+    side(part) {
+      $("passage").hidden = false;
+      const answered = performance.now();
+      side.show($("side"), part, drawing({ newest: part.serial === serial }));
+      pictured = part.serial;
+      if (pictured === serial) document.body.classList.remove("stale");
+      if (turned.has(part.serial)) paint(part.serial, answered);
+    },
     curves(part) {
       const { motion, sway, margins, duration } = part;
       handles = draggable();
@@ -230,6 +239,7 @@
       else player = playAnimation(host, shown, { play: phrase("play"), pause: phrase("pause"), of: phrase("of"), arrived: phrase("arrived"), number: numbers.local });
     },
     setting(part) {
+      if (!part.knobs.some((knob) => knob.group === "path")) $("passage").hidden = true;
       $("name").textContent = part.name;
       $("summary").textContent = phrase(part.summary);
       titled();
@@ -406,7 +416,7 @@
       return;
     }
     // while a hand is on a knob, curves of a moment ago are welcome, but nothing that would take the knob back
-    if (part.serial < serial && !["hello", "curves", "animation"].includes(part.part)) return;
+    if (part.serial < serial && !["hello", "sketch", "side", "curves", "animation"].includes(part.part)) return;
     latest[part.part] = part;
     if (part.part === "verdict") for (const old of ["failure", "faults"]) delete latest[old];
     if (["failure", "faults"].includes(part.part)) delete latest.verdict;
