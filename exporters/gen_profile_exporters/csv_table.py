@@ -120,7 +120,7 @@ def _motion(
 
 
 def _continuous(position: Array, target: Target, lines: Sequence[int]) -> Array:
-    """Go on where positions of an axis begin anew."""
+    """Unwrap the positions of a modulo axis."""
     position = position.copy()
     for number, (axis, start) in enumerate(zip(target.axes, target.start, strict=True)):
         turn, places = axis.modulo, position[:, number]

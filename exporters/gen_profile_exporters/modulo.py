@@ -1,4 +1,4 @@
-"""Axes that begin anew after a turn: positions within one, and motions read back from them.
+"""Modulo axes: positions wrapped within a turn, and motions read back from them.
 
 Motions are continuous everywhere but in what is written to such an axis and read from it. A turn is measured
 in axis units or in whole counts; in counts it may be all of the 32 bits in which drives hold a position, and
@@ -17,7 +17,7 @@ WHOLE = 1e-4  # of a count
 
 
 def turn_counts(axis: AxisScale) -> int | None:
-    """Tell the counts of a turn; None where the axis never begins anew.
+    """Tell the counts of a turn; None where the axis is no modulo axis.
 
     Raises
     ------

@@ -53,8 +53,8 @@ class Format(NamedTuple):
         Of the artefact's name, such as ``".csv"``.
     may_end_at_speed : bool
         What plays it does not hold the last setpoint: what comes next is not from here.
-    begins_anew : bool
-        Positions of an axis with ``axis.modulo`` begin anew after a turn in it, and are read back.
+    modulo_axes : bool
+        It takes modulo axes: positions wrap after ``axis.modulo``, and are unwrapped where they are read.
     holds_block : bool
         It carries the playback block: its module is a `gen_profile_exporters.exporter.BlockContainer`.
     """
@@ -64,7 +64,7 @@ class Format(NamedTuple):
     proof: Proof
     suffix: str
     may_end_at_speed: bool = False
-    begins_anew: bool = False
+    modulo_axes: bool = False
     holds_block: bool = False
 
 
@@ -117,10 +117,10 @@ def require_targets(exporters: Mapping[str, Exporter], target: Target) -> None:
     from gen_profile.support.units import require_one_way  # noqa: PLC0415  # loads attrs, which lists do without
 
     known = _known(exporters.keys())
-    able = ", ".join(name for name, form in known.items() if form.begins_anew)
+    able = ", ".join(name for name, form in known.items() if form.modulo_axes)
     for name, exporter in exporters.items():
-        for axis in () if known[name].begins_anew else target.axes:
-            require_one_way(axis, f"{name} has no such positions", f"export {able}, or leave axis.modulo out")
+        for axis in () if known[name].modulo_axes else target.axes:
+            require_one_way(axis, f"{name} takes no modulo axes", f"export {able}, or leave axis.modulo out")
         require: Callable[[Target], None] | None = getattr(exporter, "require_target", None)
         if require is not None:
             require(target)

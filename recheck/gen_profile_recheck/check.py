@@ -49,7 +49,7 @@ Progress = Callable[[int, int], None]  # gets how many boxes are done, of how ma
 TRUST = """Trusted: that python-flint (Arb) encloses what it computes, Python runs this program as it is
 written, and SHA-256 has no collisions; that the controller issues the artefact's positions at their
 times (a function block those of its table: its statements are not looked at), and the drives join them
-by straight lines, the shorter way where an axis begins anew after a turn; and that the machine has the
+by straight lines, the shorter way round for a modulo axis; and that the machine has the
 equations in machines.py, with constant parameters.
 Nothing of the program that made the artefact is used."""
 

@@ -125,7 +125,7 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
 
 
 def _unwound(places: Sequence[float], turn: float, near: float) -> list[float]:
-    """Go on where positions of a table begin anew, by the shorter ways, from as near as can be to a place."""
+    """Unwrap positions of a modulo axis by the shorter ways, from as near as can be to a place."""
     low = -turn / 2 if turn == ALL_BITS else 0.0
     require(all(low <= place < low + turn for place in places), "places outside the turn of axis.modulo")
     turns = [round((near - places[0]) / turn)]

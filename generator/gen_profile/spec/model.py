@@ -323,7 +323,7 @@ class CheckSpec(Checked, table="check"):
 
 @attrs.frozen(kw_only=True)
 class AxisSpec(Checked, table="axis"):
-    """What the target's axis counts in, and after how many of these it begins anew."""
+    """What the target's axis counts in, and after how many of these a modulo axis wraps."""
 
     unit: Literal["m", "mm", "um", "deg", "rad", "counts"]
     sign: Literal[1, -1] = 1

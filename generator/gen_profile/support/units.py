@@ -40,7 +40,7 @@ class AxisScale:
     counts_per_si : float
         Drive counts per SI unit, negative likewise.
     modulo : float or None
-        Axis units after which the axis begins anew; None where it does not.
+        Axis units after which a modulo axis wraps; None for any other.
     """
 
     name: str
@@ -56,7 +56,7 @@ def axis_factor(unit: str, counts_per_si: float) -> float:
 
 
 def require_one_way(axis: AxisScale, what: str, cure: str) -> None:
-    """Refuse an axis that begins anew after a turn.
+    """Refuse a modulo axis.
 
     Raises
     ------
@@ -64,6 +64,6 @@ def require_one_way(axis: AxisScale, what: str, cure: str) -> None:
     """
     if axis.modulo is not None:
         raise ExportError(
-            f"axis {axis.name}: it begins anew after axis.modulo = {axis.modulo:.15g} {axis.unit}, and "
+            f"axis {axis.name}: it wraps after axis.modulo = {axis.modulo:.15g} {axis.unit}, and "
             f"{what}; {cure}."
         )

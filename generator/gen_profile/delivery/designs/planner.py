@@ -101,7 +101,9 @@ def deploy_planner(
         Nothing was written.
     """
     for axis in spec.axis_scales():
-        require_one_way(axis, "a planner block does not", "keep its travel within a turn, and leave it out")
+        require_one_way(
+            axis, "planner blocks take no modulo axes", "keep its travel within a turn, and leave it out"
+        )
     progress("finding the modes over the live ranges")
     block = planner_block(spec)
     files = block_files(block, spec, formats)

@@ -308,7 +308,7 @@ def _column(name: str, spec: Spec, where: str) -> _Column | None:
 
 
 def _continuous(position: Array, axis: str, spec: Spec) -> Array:
-    """Go on where an axis begins anew after a turn, from as near as can be to where the move starts."""
+    """Unwrap a modulo axis, from as near as can be to where the move starts."""
     number, scale = next((k, scale) for k, scale in enumerate(spec.axis_scales()) if scale.name == axis)
     if scale.modulo is None:
         return position
