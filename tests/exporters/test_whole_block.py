@@ -6,6 +6,7 @@ import subprocess
 import attrs
 import numpy as np
 import pytest
+from counted_block import CountedBlock, compile_counting
 from driven_block import BAY
 from system_parts import program
 from test_planner_forms import Exported
@@ -16,6 +17,7 @@ from gen_profile.planner.forms import block_files, read_block
 from gen_profile.planner.interface import block_axes, live_inputs
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.planner.blocks.texts import operations
 from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
@@ -146,3 +148,14 @@ def test_a_target_from_rest_is_reached_to_the_last_bit(changes, rope):
     issued = block.call(np.array([list(row.values()) for row in rows]))[-1]
     last = dict(zip(block.outputs, issued.tolist(), strict=True))
     assert (last["bDone"], last["fPosition"], last["bPromise"]) == (1.0, 12.0, 1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", [[], ["planner.live_rate={L1=0.25}"]], ids=["stays", "changes"])
+def test_a_cycle_of_a_millisecond_has_operations_enough(changes):
+    spec = preset_spec("bay-crane", ["export.cycle_time=0.001", *changes])
+    block = CountedBlock(compile_counting(whole_text(spec)), fActPosition=2.0)
+    out = [block.hold(500), block.hold(40_000, bExecute=1.0, fTarget=4.0), block.hold(1)]
+    out.append(block.hold(60_000, bExecute=1.0, fTarget=39.0))
+    assert [part["fPosition"][-1] for part in (out[1], out[3])] == [4.0, 39.0]
+    assert max(part["operations"].max() for part in out) <= operations(planner_constants(spec)[1])

@@ -39,6 +39,8 @@ MACHINES = 16  # that are watched, where there are operations for them:
 SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
+FOLLOWING_WORK = 2_800  # operations of a cycle for each mode of a machine that is followed, at least
+COPYING = 22, 1_800  # operations for each slot of the longest programme, and more, where a motion was found
 
 
 @attrs.frozen(kw_only=True)
@@ -99,16 +101,19 @@ def linear_programme(name: str, *, slots: int, rows: int) -> str:
 
 
 def operations(constants: PlannerConstants) -> int:
-    """Give what a cycle may spend: what is stated, but more for quick machines."""
+    """Give what a cycle may spend: what is stated, but more for quick machines and followed ones."""
     period = min(constants.periods)
     cycles = int(period / (SLOTS_PER_PERIOD * constants.cycle))
-    return max(constants.operations, QUICK_WORK // cycles) if period < QUICK else constants.operations
+    least = FOLLOWING_WORK * constants.modes if constants.rates or constants.sensor else 0
+    return max(constants.operations, least, QUICK_WORK // cycles if period < QUICK else 0)
 
 
 def longest(constants: PlannerConstants) -> int:
     """Give the slots of the longest programme."""
     cycles = int(min(constants.periods) / (SLOTS_PER_PERIOD * constants.cycle))
-    return max(FEWEST, min(LONGEST, operations(constants) * cycles // SLOT_WORK))
+    each, more = COPYING
+    most = min(LONGEST, (operations(constants) - more) // each)
+    return max(FEWEST, min(most, operations(constants) * cycles // SLOT_WORK))
 
 
 def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = None) -> str:
@@ -231,7 +236,8 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cOwnWork": 80,  # operations of every cycle
         # operations where a programme is found, and the next begins
         "cFoundWork": 250 + 8 * slots + 15 * swings,
-        "cReserve": 150 + 11 * plan + 30 * swings,  # operations where a plan was found
+        "cReserve": 150 + 30 * swings,  # operations behind a part of the search
+        "cTakeWork": 11 * plan,  # and more, where a motion was found
         "cSlotWork": 650 + rows * (rows + 10),  # operations of an iteration, for each slot
         # and for each iteration
         "cStepWork": 2_200 * (shown - c.modes) + 2 * rows * (20 + rows * (rows + 14)),
