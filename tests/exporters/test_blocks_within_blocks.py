@@ -10,7 +10,6 @@ from st_interpreter import StError, block_of
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
-from gen_profile_exporters.planner.parameters import buffered_planner
 from gen_profile_exporters.st_to_c import translate
 
 INNERMOST = """
@@ -162,7 +161,3 @@ def test_a_text_is_taken_apart_and_put_together_where_it_is_a_planner_s():
 @pytest.mark.parametrize("text", [TEXT, INNER + INNERMOST])
 def test_other_texts_are_of_one_block(text):
     assert parse_function_block(text).within == ()
-    with pytest.raises(ExportError, match="constants alone"):
-        buffered_planner(
-            parse_function_block(TEXT.replace("FUNCTION_BLOCK Own", "FUNCTION_BLOCK Own_planner"))
-        )

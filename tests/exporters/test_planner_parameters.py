@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from test_planner_sensor import MEASURED
 
-from gen_profile.planner.design import planner_block
+from gen_profile.planner.design import planner_constants
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.planner.block import block_text
+from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.planner.parameters import buffered_planner, constant_planner
 from gen_profile_exporters.playback.buffers import FIRST, LENGTH, WINDOW, buffer_texts
 
@@ -21,13 +23,21 @@ PARTS = {
 }
 
 
-def source_of(*changes, preset="bay-crane"):
-    return parse_function_block(planner_block(preset_spec(preset, [*changes])).text)
+WRITTEN = {"one body": block_text, "blocks within a block": whole_block}
+
+
+def source_of(*changes, written=block_text):
+    return parse_function_block(written(planner_constants(preset_spec("bay-crane", [*changes]))[1]))
+
+
+@pytest.fixture(scope="module", params=WRITTEN)
+def written(request):
+    return WRITTEN[request.param]
 
 
 @pytest.fixture(scope="module")
-def sources():
-    return source_of(), source_of(*CHANGES)
+def sources(written):
+    return source_of(written=written), source_of(*CHANGES, written=written)
 
 
 def kind_of(source):
@@ -37,18 +47,22 @@ def kind_of(source):
 @pytest.mark.parametrize(
     "changes", [*PARTS.values(), pytest.param(MEASURED, marks=pytest.mark.slow)], ids=[*PARTS, "measured"]
 )
-def test_whatever_the_block_holds_it_reads_back_to_its_constants(changes):
-    source = source_of(*changes)
+def test_whatever_the_block_holds_it_reads_back_to_its_constants(written, changes):
+    source = source_of(*changes, written=written)
     block = buffered_planner(source)
-    names = [one.name.lower() for one in block.variables]
-    assert len(names) == len(set(names))
+    for one in (*block.within, block):
+        names = [variable.name.lower() for variable in one.variables]
+        assert len(names) == len(set(names))
     assert constant_planner(block).program() == source.program()
 
 
-def test_blocks_that_differ_in_numbers_only_take_each_others(sources):
+def test_blocks_that_differ_in_numbers_only_take_each_others(sources, written):
     first, second = sources
     assert kind_of(first) == kind_of(second)
-    others = {kind_of(source_of(change)) for change in ("planner.zones=true", "planner.events=true")}
+    others = {
+        kind_of(source_of(change, written=written))
+        for change in ("planner.zones=true", "planner.events=true")
+    }
     assert len({kind_of(first), *others}) == 3
 
 

@@ -82,6 +82,7 @@ KINDS = {
     "zones": ["planner.zones=true", "planner.events=true"],
     "a rope that changes on the way": ["planner.live_rate={L1=0.1}", "planner.events=true"],
     "a load that is measured": [*MEASURED, "planner.events=true"],
+    "numbers as variables": ['export.plc_tables="variables"', "planner.zones=true"],
 }
 
 

@@ -12,13 +12,14 @@ before the load was seen to hang still.
 
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator, Mapping
 from math import ceil
 
 import attrs
 
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
+from gen_profile_exporters.planner import numbers_within as within
 from gen_profile_exporters.planner.block import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.templates import filled, left_open
@@ -38,23 +39,16 @@ _NOTHING = {"LREAL": "0.0", "DINT": "0", "BOOL": "FALSE"}
 
 
 def buffered_planner(source: BlockSource) -> BlockSource:
-    """Put variables in place of a planner block's numbers.
-
-    Raises
-    ------
-    ExportError
-        It has other blocks within it, whose numbers no buffer reaches yet.
-    """
-    if source.within:
-        words = "blocks within a block take their numbers as constants alone"
-        raise ExportError(f'export.plc_tables: {words}; take "constants".')
-    numbers = [one for one in source.variables if _is_number(one)]
-    own, distinct = _own(source, numbers)
-    taken = {one.name for one in numbers}
+    """Put variables in place of a planner block's numbers, and of those of the blocks within it."""
+    own, distinct = _own(source)
+    (table,) = (one.type for one in own if one.name == buffers.TABLE)
+    types = within.with_variables(source.within, _places(source), _statements, table)
+    taken = {one.name for one in within.numbers_of(source)}
     variables = [attrs.evolve(one, section="VAR") if one.name in taken else one for one in source.variables]
-    before, behind = _around(source, numbers, distinct)
+    before, behind = _around(source, types, distinct)
+    body = _ENABLE.sub("bMayEnable", within.given_table(source, types))
     return attrs.evolve(
-        source, variables=(*variables, *own), body=before + _ENABLE.sub("bMayEnable", source.body) + behind
+        source, variables=(*variables, *own), body=before + body + behind, within=tuple(types.values())
     )
 
 
@@ -66,26 +60,25 @@ def constant_planner(source: BlockSource) -> BlockSource:
     ExportError
         The block is none that `buffered_planner` gives.
     """
-    texts = iter(buffers.buffer_texts(source)[len(buffers.HEAD) :])
     there = {one.name for one in source.variables}
     names = [one.name for one in buffers.declared([], 0, 1, _MEMBERS, cKind=0, cLayout=0, cPatience=0)]
     ours = {f"{name}{OURS}" if f"{name}{OURS}" in there else name for name in names}
+    texts = iter(buffers.buffer_texts(source)[len(buffers.HEAD) :])
     try:
-        variables = [
-            _constant(one, [next(texts) for _ in one.values])
-            if one.section == "VAR" and _NUMBER.fullmatch(one.name)
-            else one
-            for one in source.variables
-            if one.name not in ours
+        back = _of_constants(source, texts, ours)
+        inner = {
+            one.name: _of_constants(one, texts, within.ADDED)
+            for one in sorted(source.within, key=lambda one: one.name.lower())
+        }
+        back = attrs.evolve(back, within=tuple(inner[one.name] for one in source.within))
+        places, types = _places(back), {one.name.lower(): one for one in source.within}
+        originals = [
+            _unwrapped(one, within.before(one, types, places[one.name], _statements), within.BEHIND)
+            for one in back.within
         ]
-        back = attrs.evolve(source, variables=tuple(variables))
-        numbers = [one for one in variables if _is_number(one)]
-        before, behind = _around(back, numbers, _own(back, numbers)[1])
-        body = source.body
-        if not body.startswith(before):  # out of a format that has white space of its own
-            body, before, behind = (" ".join(text.split()) for text in (body, before, behind))
-        body = body.removeprefix(before).removesuffix(behind)
-        back = attrs.evolve(back, body=body.replace("bMayEnable", "bEnable"))
+        back = attrs.evolve(back, within=tuple(originals))
+        back = _unwrapped(back, *_around(back, types, _own(back)[1]))
+        back = attrs.evolve(back, body=back.body.replace("bMayEnable", "bEnable"))
         same = buffered_planner(back).program() == source.program()
     except (StopIteration, ValueError, KeyError) as error:
         raise ExportError(buffers.ALTERED) from error
@@ -97,34 +90,59 @@ def constant_planner(source: BlockSource) -> BlockSource:
     return back
 
 
-def _is_number(variable: BlockVariable) -> bool:
-    return variable.section == "VAR CONSTANT" and variable.scalar_type != "BOOL"
+def _of_constants(source: BlockSource, texts: Iterator[str], added: Container[str]) -> BlockSource:
+    """Make constants of a block's variables that are numbers, and leave out what was added."""
+    kept = [one for one in source.variables if one.name not in added]
+    constants = {
+        one.name: attrs.evolve(one, section="VAR CONSTANT")
+        for one in kept
+        if one.section == "VAR" and _NUMBER.fullmatch(one.name)
+    }
+    block = attrs.evolve(source, variables=tuple(constants.get(one.name, one) for one in kept))
+    found = {one.name: _constant(one, [next(texts) for _ in one.values]) for one in within.numbers_of(block)}
+    return attrs.evolve(block, variables=tuple(found.get(one.name, one) for one in block.variables))
 
 
-def _initial(numbers: list[BlockVariable], name: str) -> str:
-    return {one.name: one.initial for one in numbers}[name]
+def _unwrapped(source: BlockSource, before: str, behind: str) -> BlockSource:
+    """Give a block the statements that it had before others were put around them."""
+    body, given = source.body, within.GIVEN
+    if not body.startswith(before):  # out of a format that has white space of its own
+        body, before, behind, given = (" ".join(text.split()) for text in (body, before, behind, given))
+        given += " "
+    return attrs.evolve(source, body=body.removeprefix(before).removesuffix(behind).replace(given, "("))
+
+
+def _places(source: BlockSource) -> dict[str, int]:
+    """Say where the numbers of the blocks within a block stand in a buffer: behind its own."""
+    own = sum(len(one.values) for one in within.numbers_of(source))
+    return within.places_of(source.within, len(buffers.HEAD) + own)
+
+
+def _suffixes(source: BlockSource) -> list[str]:
+    """Give what the names of each axis's outputs end with."""
+    outputs = [one.name for one in source.variables if one.section == "VAR_OUTPUT"]
+    return [name.removeprefix("fPosition") for name in outputs if name.startswith("fPosition")]
 
 
 def _constant(variable: BlockVariable, texts: list[str]) -> BlockVariable:
     if variable.scalar_type == "DINT":
         texts = [text.removesuffix(".0") for text in texts]
-    initial = initialiser(texts) if variable.array else texts[0]
-    return attrs.evolve(variable, section="VAR CONSTANT", initial=initial)
+    return attrs.evolve(variable, initial=initialiser(texts) if variable.array else texts[0])
 
 
-def _own(
-    source: BlockSource, numbers: list[BlockVariable]
-) -> tuple[list[BlockVariable], Callable[[str], str]]:
+def _own(source: BlockSource) -> tuple[list[BlockVariable], Callable[[str], str]]:
     """Declare what is added, and give what renames it in statements where the block has such names."""
-    cycle = float(_initial(numbers, "cCycle"))
+    (cycle,) = (float(one.initial) for one in source.variables if one.name == "cCycle")
+    blocks = [source, *sorted(source.within, key=lambda one: one.name.lower())]
+    numbers = [one for block in blocks for one in within.numbers_of(block)]
     content = [text if "." in text else f"{text}.0" for one in numbers for text in one.values]
     texts = buffers.with_head(content, cycle)
     own = buffers.declared(
         texts,
         len(texts),
-        int(_initial(numbers, "cAxes")),
+        len(_suffixes(source)),
         _MEMBERS,
-        cKind=_kind(source, numbers),
+        cKind=_kind(source),
         cLayout=buffers.LAYOUT_NAMES.index(buffers.PLANNER),
         cPatience=ceil(buffers.CLIENT_TIMEOUT / cycle),
     )
@@ -137,40 +155,60 @@ def _own(
     return [attrs.evolve(one, name=distinct(one.name)) for one in own], distinct
 
 
-def _kind(source: BlockSource, numbers: list[BlockVariable]) -> int:
+def _kind(source: BlockSource) -> int:
     """Hash all of a block but its numbers, which is what two must have in common."""
-    names = {one.name for one in numbers}
+    parts = [_structure(one) for one in (source, *sorted(source.within, key=lambda one: one.name.lower()))]
+    return zlib.crc32(repr(parts if source.within else parts[0]).encode()) >> 1
+
+
+def _structure(source: BlockSource) -> tuple[object, ...]:
+    names = {one.name for one in within.numbers_of(source)}
     variables = sorted(
         (one.section, one.name, one.type, "" if one.name in names else "".join(one.initial.split()))
         for one in source.variables
     )
-    return zlib.crc32(repr((variables, source.body.split())).encode()) >> 1
+    return variables, source.body.split()
 
 
 def _around(
-    source: BlockSource, numbers: list[BlockVariable], distinct: Callable[[str], str]
+    source: BlockSource, types: Mapping[str, BlockSource], distinct: Callable[[str], str]
 ) -> tuple[str, str]:
     """Write what stands ahead of the statements that plan, and behind them."""
-    axes = int(_initial(numbers, "cAxes"))
-    moving = "".join(f" OR (ABS(aVelocity[{axis}]) > cStill[{axis}])" for axis in range(axes))
+    suffixes, whole = _suffixes(source), bool(types)
+    still = [f"cStill{of}" if whole else f"cStill[{k}]" for k, of in enumerate(suffixes)]
+    moving = "".join(f" OR (ABS(fVelocity{of}) > {least})" for of, least in zip(suffixes, still, strict=True))
+    base, counter = map(distinct, ("nBase", "nCheck"))
+    taken, begun = _statements(source, base, counter, len(buffers.HEAD))
+    anew = distinct("bForget")
     values = {
         "moves": f"(bEnable OR (nState <> cDisabled){moving})",
         "plays": "(nState <> cDisabled)",
-        "taken": "\n".join(
-            f"        {line}" for line in _taken(numbers, *map(distinct, ("nBase", "nCheck")))
-        ),
-        "begun": "\n".join(f"            {line}" for line in _begun(source, distinct("nCheck"))),
+        "taken": "\n".join(f"        {line}" for line in (*taken, *within.calls(source, types, anew, base))),
+        "begun": "\n".join(f"            {line}" for line in begun),
+        "unknown": "nLost := cPromiseSway" if whole else "bTakenOver := TRUE",
     }
     # what is put in has the block's names, which are not ours
     text = distinct(left_open("planner/requests.st")).replace("cCycleTime", "cCycle")
-    text = _HOLE.sub(lambda hole: values[hole[1]], text)
-    state = distinct(filled("planner/state.st", last=buffers.state_length(axes) - 1))
+    text = _HOLE.sub(lambda hole: values[hole[1]], text.replace("cAxes", str(len(suffixes))))
+    shown = [
+        (
+            *(f"f{name}{of}" for name in ("Position", "Velocity", "Acceleration")),
+            *((f"fGoal{of}", f"fVelocityCommand{of}") if whole else (f"aGoal[{axis}]", f"aWish[{axis}]")),
+        )
+        for axis, of in enumerate(suffixes)
+    ]
+    state = distinct(filled("planner/state.st", last=buffers.state_length(len(suffixes)) - 1, axes=shown))
     return narrow(with_while_loops(text)), narrow(with_while_loops(state))
 
 
-def _taken(numbers: list[BlockVariable], base: str, counter: str) -> Iterator[str]:
-    """Take the numbers over from the buffer in use."""
-    place = len(buffers.HEAD)
+def _statements(source: BlockSource, base: str, counter: str, first: int) -> tuple[list[str], list[str]]:
+    """Write what takes a block's numbers over from a buffer, and what makes it as after a cold start."""
+    taken = _taken(within.numbers_of(source), base, counter, first)
+    return [*taken], [*_begun(source, counter)]
+
+
+def _taken(numbers: list[BlockVariable], base: str, counter: str, place: int) -> Iterator[str]:
+    """Take the numbers over from the buffer in use, from a place on."""
     for one in numbers:
         convert = "LREAL_TO_DINT({})" if one.scalar_type == "DINT" else "{}"
         count = len(one.values)
@@ -185,7 +223,7 @@ def _taken(numbers: list[BlockVariable], base: str, counter: str) -> Iterator[st
 def _begun(source: BlockSource, counter: str) -> Iterator[str]:
     """Set all that the block knows to what it is after a cold start."""
     for one in source.variables:
-        if one.section not in ("VAR", "VAR_OUTPUT"):
+        if one.section not in ("VAR", "VAR_OUTPUT") or one.scalar_type not in _NOTHING:
             continue
         nothing = _NOTHING[one.scalar_type]
         if not one.array:

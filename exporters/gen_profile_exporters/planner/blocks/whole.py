@@ -24,7 +24,7 @@ from gen_profile_exporters.planner.blocks.texts import (
     planner,
 )
 from gen_profile_exporters.planner.constants import PlannerConstants
-from gen_profile_exporters.playback.structured_text import block_name, literal
+from gen_profile_exporters.playback.structured_text import block_name
 
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command
 SHELL_WORK, ZONES_WORK = 200, 150  # operations of every cycle: of an axis, and where it has zones
@@ -92,8 +92,7 @@ def _of_axis(text: str, number: int, axis: AxisConstants, sensed: str) -> str:
         return part[2] if part[1] == sensed else "" if part[1] in ("sensed", "unsensed") else part[0]
 
     text = WHERE.sub(taken, text)
-    text = text.replace("@axis_number", str(number)).replace("@axis_velocity", literal(axis.velocity))
-    return text.replace("#", axis.suffix)
+    return text.replace("@axis_number", str(number)).replace("#", axis.suffix)
 
 
 def _constants(c: PlannerConstants) -> dict[str, object]:
