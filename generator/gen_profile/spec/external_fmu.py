@@ -1,4 +1,4 @@
-"""The keys of ``[check]`` that name an external FMU, and which of its variables are what."""
+"""An external FMU that judges: the keys of ``[check]`` that name it, and which of its variables are what."""
 
 import hashlib
 from collections.abc import Mapping
@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 import attrs
 
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.model import FED_RATES, ExternalFmu
-from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
-from gen_profile.spec.values import NONE, Pattern, Words
+from gen_profile.spec.structure import MISFIT, Checked, Faults, Structurer, kinds_of
+from gen_profile.spec.values import NONE, Bounds, LoadName, Named, ParameterName, Pattern, Words, example
 from gen_profile.support.bounded_file import read_bounded
 from gen_profile.support.private_folder import agree
 from gen_profile.support.units import units_of
 
 KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "units", "time_limit", "step")
+FED_RATES = {"acceleration": "/s^2", "velocity": "/s", "setpoint": ""}  # of an axis, behind its SI unit
 INPUTS = tuple(FED_RATES)
 TIME_LIMIT = 60.0  # s
 FILE = Annotated[
@@ -23,6 +23,66 @@ FILE = Annotated[
     Pattern(r"(?is).+\.fmu", "the name of an FMU"),
     Words("must name an FMU, such as customer.fmu, found {found}"),
 ]
+VariableName = Annotated[str, Named("variable")]
+
+
+@attrs.frozen(kw_only=True)
+class ExternalFmu(Checked, table="check"):
+    """An external FMU that judges in place of ours.
+
+    Attributes
+    ----------
+    name : str
+        File name, without folders: it lies beside whatever it judged.
+    path : Path
+        Where the file lies now.
+    sha256 : str
+    input : str
+        What its inputs are: ``"acceleration"``, ``"velocity"`` or ``"setpoint"`` of the axes.
+    inputs : tuple of str
+        Its variables, one per axis.
+    sway : mapping of str to str
+        Its variables by load, of those loads that it has.
+    parameters : mapping of str to str
+        Its variables by the plant's parameters.
+    units : mapping of str to str
+        What its variables are in, where that differs from what the FMU declares, if it does.
+    time_limit : float
+        s, for all scenarios together.
+    step : float or None
+        s, the only communication step that it takes; None where it takes any.
+    """
+
+    name: str
+    path: Path = attrs.field(eq=False)
+    sha256: str
+    input: str
+    inputs: tuple[str, ...]
+    sway: Mapping[LoadName, str]
+    parameters: Annotated[Mapping[ParameterName, str], example('L1 = "rope"')]
+    units: Annotated[Mapping[VariableName, str], example('rope = "mm"')] = NONE
+    time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found {found}")]
+    step: Annotated[float, Bounds(least=1e-6, most=1.0, meaning="s (4 ms are 0.004)")] | None = None
+
+    def si_units(self, plant: Plant) -> dict[str, str]:
+        """Name the SI unit of each of its variables."""
+        per = FED_RATES[self.input]
+        fed = {name: f"{axis.unit}{per}" for name, axis in zip(self.inputs, plant.actuated, strict=False)}
+        set_to = {variable: plant.units[name] for name, variable in self.parameters.items()}
+        return {**fed, **dict.fromkeys(self.sway.values(), "m"), **set_to}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Write the keys of ``[check]``."""
+        return {
+            "fmu": self.name,
+            "fmu_sha256": self.sha256,
+            "input": {self.input: list(self.inputs)},
+            "output": {"sway": dict(self.sway)},
+            "parameters": dict(self.parameters),
+            **({"units": dict(self.units)} if self.units else {}),
+            "time_limit": self.time_limit,
+            **({"step": self.step} if self.step is not None else {}),
+        }
 
 
 def external_fmu(

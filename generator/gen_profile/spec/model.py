@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import attrs
@@ -19,6 +18,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.disturbances import PathSpec, WindSpec
+from gen_profile.spec.external_fmu import ExternalFmu
 from gen_profile.spec.planner import PlannerSpec
 from gen_profile.spec.stacks import StacksSpec
 from gen_profile.spec.structure import Checked, kinds_of
@@ -53,7 +53,6 @@ RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longe
 
 ParameterSpan = Annotated[str, Named("parameter", of="span")]
 Span = Annotated[tuple[float, float], Rising()]
-VariableName = Annotated[str, Named("variable")]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("NAME = 0.2")]
 Sway = Annotated[float, Bounds(above=0.0), Words("must be a finite number greater than 0, found {found}")]
@@ -222,68 +221,6 @@ class LimitsSpec(Checked, table="limits"):
             for table, own in tables.items()
             for name in kinds_of(LimitsSpec)
             if name != "axis" and (value := getattr(own, name, None)) is not None
-        }
-
-
-FED_RATES = {"acceleration": "/s^2", "velocity": "/s", "setpoint": ""}  # of an axis, behind its SI unit
-
-
-@attrs.frozen(kw_only=True)
-class ExternalFmu(Checked, table="check"):
-    """An external FMU that judges in place of ours.
-
-    Attributes
-    ----------
-    name : str
-        File name, without folders: it lies beside whatever it judged.
-    path : Path
-        Where the file lies now.
-    sha256 : str
-    input : str
-        What its inputs are: ``"acceleration"``, ``"velocity"`` or ``"setpoint"`` of the axes.
-    inputs : tuple of str
-        Its variables, one per axis.
-    sway : mapping of str to str
-        Its variables by load, of those loads that it has.
-    parameters : mapping of str to str
-        Its variables by the plant's parameters.
-    units : mapping of str to str
-        What its variables are in, where that differs from what the FMU declares, if it does.
-    time_limit : float
-        s, for all scenarios together.
-    step : float or None
-        s, the only communication step that it takes; None where it takes any.
-    """
-
-    name: str
-    path: Path = attrs.field(eq=False)
-    sha256: str
-    input: str
-    inputs: tuple[str, ...]
-    sway: Mapping[LoadName, str]
-    parameters: Annotated[Mapping[ParameterName, str], example('L1 = "rope"')]
-    units: Annotated[Mapping[VariableName, str], example('rope = "mm"')] = NONE
-    time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found {found}")]
-    step: Annotated[float, Bounds(least=1e-6, most=1.0, meaning="s (4 ms are 0.004)")] | None = None
-
-    def si_units(self, plant: Plant) -> dict[str, str]:
-        """Name the SI unit of each of its variables."""
-        per = FED_RATES[self.input]
-        fed = {name: f"{axis.unit}{per}" for name, axis in zip(self.inputs, plant.actuated, strict=False)}
-        set_to = {variable: plant.units[name] for name, variable in self.parameters.items()}
-        return {**fed, **dict.fromkeys(self.sway.values(), "m"), **set_to}
-
-    def to_dict(self) -> dict[str, Any]:
-        """Write the keys of ``[check]``."""
-        return {
-            "fmu": self.name,
-            "fmu_sha256": self.sha256,
-            "input": {self.input: list(self.inputs)},
-            "output": {"sway": dict(self.sway)},
-            "parameters": dict(self.parameters),
-            **({"units": dict(self.units)} if self.units else {}),
-            "time_limit": self.time_limit,
-            **({"step": self.step} if self.step is not None else {}),
         }
 
 

@@ -15,7 +15,8 @@ from gen_profile.dynamics.evaluation.residual_sway import STANDSTILL, observatio
 from gen_profile.dynamics.evaluation.scenarios import TIMING, Scenario
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
-from gen_profile.spec.model import ExternalFmu, Spec
+from gen_profile.spec.external_fmu import ExternalFmu
+from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.support.units import units_of
 from gen_profile_fmu.running.external_fmu import ForeignResult, ForeignRun, run_foreign
