@@ -23,6 +23,7 @@ from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.assurance.proof.sensor_use import sensor_faults
 from gen_profile.assurance.proof.verdict import JudgedHistory
 from gen_profile.assurance.proof.watching import BlockWatch
+from gen_profile.assurance.verification.cosimulation import STEP_PHASE
 from gen_profile.dynamics.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.dynamics.evaluation.simulation import AT_REST
 from gen_profile.motion.metrics import length
@@ -37,7 +38,6 @@ from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, CalledBlock, Hoist, Script
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
-STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
 WATCHED = 2.2  # of the slowest periods in which the residual sway shows
 PATIENCE = 30.0  # of these periods that the axes have to come to rest, and the travel's time beside
 NOISY_ON = 6.0  # of these periods after the last command, in which live parameters go on being noisy

@@ -15,7 +15,7 @@ from gen_profile.assurance.proof.lateness import Promptness
 from gen_profile.assurance.proof.numbering import CORNERS, DRAWS, LONG, RHYTHMS, SEARCH
 from gen_profile.assurance.proof.obedience import LATE, WORDS
 from gen_profile.assurance.proof.promptness import Obeyed
-from gen_profile.assurance.verification.verdict import Examination
+from gen_profile.assurance.verification.verdict import QUANTILES, Examination
 from gen_profile.support.summary import Summarised
 
 GROUPS = {
@@ -26,7 +26,6 @@ GROUPS = {
     LONG: "eight hours of commands",
 }
 HISTORIES = 200  # that a proof takes; fewer are a trial
-QUANTILES = (0.5, 0.9, 0.99)
 RULE_OF_THREE = 3.0
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 LISTED = 10  # of the worst histories

@@ -29,7 +29,7 @@ RANGE_FACTOR = 1.5  # of a parameter's own range, which the curve covers
 WIDEST = 0.9
 FEWEST = 3  # points of a curve
 # rad of the fastest mode between setpoints: linear interpolation errs by some 10⁻⁴ of the sway
-STEP_PHASE = 0.05
+SETPOINT_PHASE = 0.05
 STEPS_PER_MOVE = 300
 
 
@@ -256,7 +256,7 @@ def robustness_of(spec: Spec, motions: Mapping[str, Profile], errors: Mapping[st
     rows = (dict(zip(names, row, strict=True)) for row in machines)
     frequencies = np.array([linearize(plant, one, spec.move.target).frequencies[[0, -1]] for one in rows])
     watch = max(SHORTEST_WATCH, 4.0 * np.pi / float(frequencies[:, 0].min()))
-    step = STEP_PHASE / float(frequencies[:, 1].max())
+    step = SETPOINT_PHASE / float(frequencies[:, 1].max())
     tau = spec.actuator.tau or 0.0
     residuals = {}
     with many_machines(plant) as runs:
