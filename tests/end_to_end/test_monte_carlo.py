@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from gen_profile.assurance.verification.check import _verdict, check_artefact
-from gen_profile.assurance.verification.monte_carlo import standstill
 from gen_profile.assurance.verification.setpoint_path import transmitted
+from gen_profile.assurance.verification.time_scales import standstill
 from gen_profile.assurance.verification.verdict import MOST_LISTED
 from gen_profile.dynamics.evaluation.residual_sway import observation_time
 from gen_profile.dynamics.evaluation.scenarios import further_scenarios, scenarios

@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from gen_profile.assurance.verification import cosimulation
 from gen_profile.assurance.verification.batch import Feed, many_machines, residual_peaks
-from gen_profile.assurance.verification.monte_carlo import watched
 from gen_profile.assurance.verification.setpoint_path import followed_up
+from gen_profile.assurance.verification.time_scales import STEP_PHASE, arrival, watched
 from gen_profile.dynamics.evaluation.scenarios import Scenario
 from gen_profile.dynamics.evaluation.simulation import AT_REST, Response
 from gen_profile.dynamics.problem.linearization import eigenvalues
@@ -103,11 +103,11 @@ def residual_sways(
         return residual_peaks(
             runs,
             spec,
-            followed_up(feed, watched(spec, setpoints, cosimulation.STEP_PHASE), spec.move.final_velocity),
+            followed_up(feed, watched(spec, setpoints, STEP_PHASE), spec.move.final_velocity),
             machines,
             tau=np.full(len(machines), tau),
-            max_step=cosimulation.STEP_PHASE / fastest,
-            since=cosimulation.arrival(spec, setpoints),
+            max_step=STEP_PHASE / fastest,
+            since=arrival(spec, setpoints),
         )
 
 

@@ -23,7 +23,7 @@ from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.assurance.proof.sensor_use import sensor_faults
 from gen_profile.assurance.proof.verdict import JudgedHistory
 from gen_profile.assurance.proof.watching import BlockWatch
-from gen_profile.assurance.verification.cosimulation import STEP_PHASE
+from gen_profile.assurance.verification.time_scales import STEP_PHASE
 from gen_profile.dynamics.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.dynamics.evaluation.simulation import AT_REST
 from gen_profile.motion.metrics import length

@@ -12,10 +12,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.assurance.verification.cosimulation import cosimulate, sample_spacing
+from gen_profile.assurance.verification.cosimulation import cosimulate
 from gen_profile.assurance.verification.judging import verdict
 from gen_profile.assurance.verification.plausibility import implausibilities
 from gen_profile.assurance.verification.setpoint_path import lag_of, path_taken
+from gen_profile.assurance.verification.time_scales import sample_spacing
 from gen_profile.assurance.verification.verdict import Check
 from gen_profile.assurance.verification.worst_machines import worst_machines
 from gen_profile.dynamics.evaluation.scenarios import Scenario, further_scenarios, scenarios

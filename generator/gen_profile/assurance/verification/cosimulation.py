@@ -7,10 +7,16 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.verification.plausibility import implausibilities
+from gen_profile.assurance.verification.time_scales import (
+    TIME_TOLERANCE,
+    arrival,
+    judged_from,
+    max_step,
+    whole_way,
+)
 from gen_profile.assurance.verification.verdict import Check, Finding
 from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.dynamics.evaluation.residual_sway import (
-    RESIDUAL_SAMPLES,
     STANDSTILL,
     modal_amplitudes,
     observation_time,
@@ -19,7 +25,6 @@ from gen_profile.dynamics.evaluation.scenarios import Scenario
 from gen_profile.dynamics.evaluation.simulation import Response, Sway, body_places
 from gen_profile.dynamics.evaluation.static_deflection import in_wind
 from gen_profile.dynamics.problem.dynamics import parameter_rows
-from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.model import Spec
@@ -28,9 +33,6 @@ from gen_profile.support.errors import CosimulationError
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
-LONGEST_STEP = 1e-3  # s, of the FMU's integrator; a quarter changes residuals of four machines by 3e-12 m
-STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
-TIME_TOLERANCE = 1e-12  # of times, relative
 ERROR_FLOOR = 1e-8  # m; covers what both integrations leave
 
 
@@ -116,7 +118,7 @@ def judge(
     after = [_from(response, arrival_time) for response in responses]
     error = _greatest_distance(responses, expected, judged_from(spec, followed or setpoints))
     between = max(above_samples(response.sway) for response in after)
-    if _whole_way(spec):  # until the last setpoint samples are farther apart
+    if whole_way(spec):  # until the last setpoint samples are farther apart
         moving = len(setpoints.times)
         between = max(between, *(above_samples(response.sway[:moving]) for response in responses))
     pairs = zip(machines, responses, strict=True)
@@ -152,16 +154,6 @@ def beyond_equations(
         )
 
 
-def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
-    """Time in s from which sway counts."""
-    return 0.0 if _whole_way(spec) else (1.0 - TIME_TOLERANCE) * arrival(spec, setpoints)
-
-
-def _whole_way(spec: Spec) -> bool:
-    """Whether what loads do on the way is judged, too."""
-    return spec.limits.sway is not None or spec.path is not None
-
-
 def _greatest_distance(responses: Sequence[Sway], expected: Sequence[Sway], since: float) -> float:
     """Greatest difference of sways in m from a time on, at the expected times, which the others have, too."""
     times = expected[0].times
@@ -172,31 +164,9 @@ def _greatest_distance(responses: Sequence[Sway], expected: Sequence[Sway], sinc
     return max(float(np.abs(distance).max()) for distance in apart)
 
 
-def sample_spacing(spec: Spec, setpoints: SampledProfile) -> float:
-    """Choose the spacing in s at which residuals are sampled."""
-    return min(setpoints.cycle_time, observation_time(spec) / (RESIDUAL_SAMPLES - 1))
-
-
 def above_samples(values: Array) -> float:
     """Bound how far a peak between two samples rises above them: h²/8 of the curvature."""
     return float(np.abs(np.diff(values, n=2, axis=0)).max()) / 8.0
-
-
-def arrival(spec: Spec, setpoints: SampledProfile) -> float:
-    """Time in s from which the axes stand still, the drives' lag included."""
-    return float(setpoints.times[-1]) + STANDSTILL * (spec.actuator.tau or 0.0)
-
-
-def max_step(spec: Spec, machine: Scenario) -> float:
-    """Choose the longest integration step in s, where trajectories are to be had."""
-    return min(LONGEST_STEP, longest_step(spec, machine))
-
-
-def longest_step(spec: Spec, machine: Scenario) -> float:
-    """Find the longest integration step in s that a machine's fastest mode permits."""
-    ends = (spec.move.start, spec.move.target)
-    fastest = max(linearize(spec.machine(), machine.parameters, q_a).frequencies[-1] for q_a in ends)
-    return STEP_PHASE / float(fastest)
 
 
 def _from(response: Response, since: float) -> Response:

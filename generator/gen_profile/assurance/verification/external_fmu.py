@@ -6,10 +6,10 @@ from itertools import groupby
 import numpy as np
 
 from gen_profile.assurance.verification.batch import Feed
-from gen_profile.assurance.verification.cosimulation import ERROR_FLOOR, above_samples, arrival
-from gen_profile.assurance.verification.monte_carlo import standstill
+from gen_profile.assurance.verification.cosimulation import ERROR_FLOOR, above_samples
 from gen_profile.assurance.verification.plausibility import implausibilities
 from gen_profile.assurance.verification.setpoint_path import follows_exactly, lag_of, transmitted
+from gen_profile.assurance.verification.time_scales import arrival, standstill
 from gen_profile.assurance.verification.verdict import Check, Finding
 from gen_profile.dynamics.evaluation.residual_sway import STANDSTILL, observation_time
 from gen_profile.dynamics.evaluation.scenarios import TIMING, Scenario

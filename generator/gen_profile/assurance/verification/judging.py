@@ -4,9 +4,10 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
-from gen_profile.assurance.verification.cosimulation import cosimulate, judge, sample_spacing
+from gen_profile.assurance.verification.cosimulation import cosimulate, judge
 from gen_profile.assurance.verification.external_fmu import judge_external
 from gen_profile.assurance.verification.monte_carlo import with_further
+from gen_profile.assurance.verification.time_scales import sample_spacing
 from gen_profile.assurance.verification.verdict import Check
 from gen_profile.dynamics.evaluation.scenarios import Scenario, scenarios
 from gen_profile.dynamics.evaluation.simulation import Response, Sway

@@ -6,34 +6,24 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.verification.batch import Feed, many_machines, residual_peaks
-from gen_profile.assurance.verification.cosimulation import STEP_PHASE, longest_step
 from gen_profile.assurance.verification.setpoint_path import (
-    delay,
     followed_up,
     follows_exactly,
     lag_of,
     transmitted,
 )
+from gen_profile.assurance.verification.time_scales import SAMPLE_PHASE, longest_step, standstill, watched
 from gen_profile.assurance.verification.verdict import Check, Finding
-from gen_profile.dynamics.evaluation.residual_sway import STANDSTILL, observation_time
-from gen_profile.dynamics.evaluation.scenarios import Scenario, scenarios
+from gen_profile.dynamics.evaluation.scenarios import Scenario
 from gen_profile.dynamics.problem.dynamics import parameter_rows
-from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
+from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.running.many_runs import ManyRuns
 
 CHECKING = "checking by co-simulation"
 BATCH = 50  # rows between two signs of life
-SAMPLE_PHASE = 0.02  # rad of the fastest mode between two samples of a residual
 CURVATURE = 1.2  # of a sway between samples, relative to a harmonic one's of the same peak
-
-
-def standstill(spec: Spec, setpoints: SampledProfile) -> float:
-    """Time in s from which the axes stand in all scenarios beyond the machines."""
-    path = spec.check.path
-    lag = max(spec.actuator.tau or 0.0, *(path.lag or (0.0,)))
-    return float(setpoints.times[-1]) + setpoints.cycle_time + delay(path) + STANDSTILL * lag
 
 
 def with_further(
@@ -120,21 +110,6 @@ def _batch(
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
     between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest.max())
     return greatest, float(np.abs(greatest - other).max()) + between
-
-
-def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) -> Array:
-    """Choose times in s after the last setpoint, alike for all rows: no row depends on another.
-
-    Parameters
-    ----------
-    phase : float
-        rad of the fastest mode between two of them.
-    """
-    machines = scenarios(spec)
-    begin = float(setpoints.times[-1]) + setpoints.cycle_time + delay(spec.check.path)
-    spacing = phase / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
-    until = standstill(spec, setpoints) + observation_time(spec)
-    return begin + grid_times(grid_length(until - begin, spacing), spacing)
 
 
 def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:

@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 
 from gen_profile.assurance.verification.batch import Feed, many_machines, residual_peaks
-from gen_profile.assurance.verification.monte_carlo import standstill, watched
 from gen_profile.assurance.verification.setpoint_path import followed_up, follows_exactly, transmitted
+from gen_profile.assurance.verification.time_scales import standstill, watched
 from gen_profile.dynamics.evaluation.scenarios import LAG, SEARCH, Scenario, named
 from gen_profile.dynamics.problem.linearization import eigenvalues_at
 from gen_profile.dynamics.problem.parameter_box import Box, start, worst_places

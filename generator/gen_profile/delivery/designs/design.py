@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from gen_profile.assurance.verification.cosimulation import judged_from
 from gen_profile.assurance.verification.judging import verdict
 from gen_profile.assurance.verification.monte_carlo import CHECKING
+from gen_profile.assurance.verification.time_scales import judged_from
 from gen_profile.assurance.verification.verdict import Check
 from gen_profile.assurance.verification.worst_machines import worst_machines
 from gen_profile.delivery.designs.names import names_of, require_own_names

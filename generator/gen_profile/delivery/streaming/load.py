@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 
-from gen_profile.assurance.verification.cosimulation import max_step
+from gen_profile.assurance.verification.time_scales import max_step
 from gen_profile.dynamics.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.dynamics.evaluation.scenarios import scenarios
 from gen_profile.dynamics.evaluation.simulation import Response
