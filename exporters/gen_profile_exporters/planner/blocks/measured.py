@@ -25,7 +25,7 @@ NAMES = {
 
 
 def observer(c: PlannerConstants, sensor: SensorConstants) -> str:
-    """Write the block of the observer along an axis, which is told which one."""
+    """Write the block of the observer along the axis that it is given."""
     modes, lives, axes = c.modes, c.live or NO_LIVE, len(c.axes)
     one = model_rows(modes)
     model = np.vstack([c.model[: 2 * modes], c.model[-axes * one :]])
