@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from generator.free_swings import inside, swing
+from scipy.integrate import solve_ivp
 
 from gen_profile.plants.registry import find_plant
 from gen_profile.presentation.charts.identification import identification_figure
@@ -11,7 +12,7 @@ from gen_profile.studies.identification import misfit
 from gen_profile.studies.identification.estimation import estimate
 from gen_profile.studies.identification.fit import fit_of
 from gen_profile.studies.identification.identify import identify
-from gen_profile.studies.identification.measurements import Period, SwingLog, parse_reading
+from gen_profile.studies.identification.measurements import Period, SwingLog, cut_swing, parse_reading
 from gen_profile.studies.identification.misfit import Explanation, elsewhere, likeliest, spectrum
 from gen_profile.studies.identification.swing_model import (
     SwingingMachine,
@@ -40,6 +41,30 @@ def test_noise_alone_tells_no_rope(seed, read):
     log = SwingLog(times=times, values=noise, quantity="rate", load="hook")
     with pytest.raises(InfeasibleProblem, match=r"shows no swing of this machine|does not come to rest"):
         identify(preset_spec("bay-crane"), [log, *map(parse_reading, read)], ["L1"])
+
+
+@pytest.mark.parametrize("quantity", ["angle", "rate"])
+@pytest.mark.parametrize("first", [0.0, -4.0])
+def test_a_log_that_begins_while_the_axis_moves_is_refused_with_the_cure(quantity, first):
+    """It was said to be of another machine, or noise."""
+    spec, stops = preset_spec("single-pendulum-crane", ["plant.L0=2.6", "plant.c=0"]), 10.0  # s; the rope has 6.2 m
+
+    def rates(t, x):
+        push = 0.3 * ((t < 4.0) - float(6.0 < t < stops))
+        return [x[1], -(9.81 * np.sin(x[0]) + push * np.cos(x[0])) / 6.2]
+
+    times = np.arange(0.0, 45.0, 0.05)
+    angle, rate = solve_ivp(rates, (0.0, 45.0), [0.0, 0.0], "DOP853", times, max_step=0.05, rtol=1e-9).y
+    values = (angle if quantity == "angle" else rate) + np.random.default_rng(3).normal(0.0, 5e-4, len(times))
+    options = {"quantity": quantity, "load": "payload"}
+    log = cut_swing(times + first, values, "log", after=None, **options)
+    with pytest.raises(InfeasibleProblem, match=r"is one from (\S+) s on: .* \(after \1\)") as refused:
+        identify(spec, [log], ["L0"], (0.0, 1.0))
+    after = float(str(refused.value).split("(after ")[1].rstrip(")."))
+    assert stops <= after - first <= stops + 6.0
+    later = cut_swing(times + first, values, "log", after=after, **options)
+    found = identify(spec, [later], ["L0"], (0.0, 1.0)).estimate
+    assert abs(found.values["L0"] - 5.2) <= found.half_range["L0"] < 0.1
 
 
 def test_a_swing_of_the_size_of_its_noise_tells_the_rope():

@@ -146,6 +146,15 @@ def test_where_no_machine_shows_half_of_a_log_none_is_fitted(monkeypatch):
 
 
 @pytest.mark.slow
+def test_noise_alone_is_no_run():
+    """It was said to show 0.0053 times the rate that the motion leads to."""
+    noise = np.random.default_rng(3).normal(0.0, 1e-3, 600)
+    log = SwingLog(times=0.05 * np.arange(600.0), values=noise, quantity="rate", load="payload")
+    with pytest.raises(InfeasibleProblem, match=r"^9\d% of the log .* or noise alone\.$"):
+        learn(SPEC, PLAYED, [log])
+
+
+@pytest.mark.slow
 def test_a_sway_that_was_seen_excludes_ropes():
     after = np.linspace(LASTS + 0.2, LASTS + 12.0, 2000)
     angles, _ = pendulum(np.concatenate([[0.0], after]))

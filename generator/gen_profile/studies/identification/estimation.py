@@ -134,7 +134,7 @@ def _estimate(
     factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     progress("finding the ranges")
     half_ranges, lefts = around.half_ranges(factor), fit.left(unknowns)
-    _require_swings(fit, lefts, noise, misfit_of_logs)
+    require_swings(fit, lefts, noise, misfit_of_logs)
     if len(lefts) > 1:
         _require_one_machine(fit, lefts)
 
@@ -156,7 +156,7 @@ def _estimate(
     )
 
 
-def _require_swings(
+def require_swings(
     fit: Fit, lefts: Sequence[Array], noise: Array, misfit_of_logs: Sequence[Misfit | None]
 ) -> None:
     """Refuse a log that shows noise alone: some frequency always explains a little of that."""

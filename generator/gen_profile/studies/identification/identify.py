@@ -29,6 +29,7 @@ from gen_profile.studies.identification.measurements import (
     parse_swing,
     signal_units,
 )
+from gen_profile.studies.identification.standing import swings_from
 from gen_profile.studies.identification.swing_model import SwingingMachine, shortened
 from gen_profile.studies.identification.uncertainty import WIDEST
 from gen_profile.support.artefacts.writing import deliver_all
@@ -220,15 +221,38 @@ def identify(
     logs = tuple(shortened(log, machine) for log in measurements if isinstance(log, SwingLog))
     with one_thread:
         names = [q.name for q in plant.parameters if q.name in asked]
-        estimated = estimate(machine, names, readings, logs, progress)
+        try:
+            estimated = estimate(machine, names, readings, logs, progress)
+            identified = _identified(spec, estimated, logs)
+        except InfeasibleProblem as refused:
+            _require_standing(machine, names, readings, logs, refused)
+            raise
     return Identification(
         given=spec,
-        spec=_identified(spec, estimated, logs),
+        spec=identified,
         readings=readings,
         logs=logs,
         estimate=estimated,
         q_a=stood,
     )
+
+
+def _require_standing(
+    machine: SwingingMachine,
+    names: Sequence[str],
+    readings: Sequence[DirectReading | Period],
+    logs: Sequence[SwingLog],
+    refused: InfeasibleProblem,
+) -> None:
+    """Name the cure of a refused log that begins while the axes still move."""
+    for log in logs:
+        if (start := swings_from(machine, names, readings, log)) is not None:
+            template = (
+                "The log of {log.load} is no free swing of this machine at first, but is one from "
+                "{start:.9g} s on: leave out what was logged before the axes stood still "
+                "(after {start:.9g})."
+            )
+            raise InfeasibleProblem(template, log=log, start=start) from refused
 
 
 def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:

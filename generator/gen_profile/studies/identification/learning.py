@@ -122,9 +122,10 @@ def narrowed_by_log(
         _require_unchanged(fit, model, unknowns, certain=excess > IMPOSSIBLE)
     begin, gain, _ = unknowns[-3:].tolist()
     if not SENSOR_GAIN[0] < abs(gain) < SENSOR_GAIN[1]:
+        _require_swing(model, left)
         raise InfeasibleProblem(
-            f"The log of {log.load} shows {abs(gain):.2g} times the {log.quantity} that this motion leads "
-            "to: look at its unit, and at what it is of (signal)."
+            f"The log of {log.load} shows {float(f'{abs(gain):.2g}'):g} times the {log.quantity} that this "
+            "motion leads to: look at its unit, and at what it is of (signal)."
         )
     sigma = noise if lines is None else np.array([lines.widened(float(noise[0]), len(model.log.times))])
     factor = float(ndtri((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
@@ -222,19 +223,26 @@ def _fitted_from(fit: Fit, begun: Sequence[Array], noise: Array) -> Array:
     return min(found, key=lambda unknowns: float(np.std(fit.left(unknowns)[0])))
 
 
+def _require_swing(model: DrivenModel, left: float) -> None:
+    """Refuse a log of which no machine's swing takes off enough."""
+    size = float(np.std(model.log.values))
+    if left > GROSS * size:
+        raise InfeasibleProblem(
+            f"{left / size:.0%} of the log of {model.log.load} is left where the machine that fits best is "
+            "taken off: it is of no whole run of this motion from rest, or of another machine, or noise "
+            "alone."
+        )
+
+
 def _require_unchanged(fit: Fit, model: DrivenModel, unknowns: Array, *, certain: bool) -> None:
     """Refuse a run that machines outside of the ranges explain, and tell which."""
     parameters = fit.parameters(unknowns)
     explained = likeliest(_explained(fit, model, parameters, ())) or likeliest(
         [one for name in taken_as_exact(fit) for one in _explained(fit, model, parameters, (name,))]
     )
-    left, size = float(np.std(fit.left(unknowns)[0])), float(np.std(model.log.values))
-    log = f"the log of {model.log.load}"
-    if left > GROSS * size and not explained:
-        raise InfeasibleProblem(
-            f"{left / size:.0%} of {log} is left where the machine that fits best is taken off: it is of no "
-            "whole run of this motion from rest, or of another machine."
-        )
+    left, log = float(np.std(fit.left(unknowns)[0])), f"the log of {model.log.load}"
+    if not explained:
+        _require_swing(model, left)
     if not (explained or certain):
         return
     others = " or with ".join(one.words for one in explained)

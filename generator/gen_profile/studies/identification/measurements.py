@@ -84,6 +84,8 @@ class SwingLog(Sampled):
         Least step between different values as they were read, as of an encoder that counts.
     logged : int
         Samples that were read, of which `averaged` may have made fewer.
+    start_time : float
+        Time of the first one in s, as it was logged.
     """
 
     times: Array = attrs.field(converter=read_only)
@@ -93,6 +95,7 @@ class SwingLog(Sampled):
     notes: tuple[str, ...] = ()
     resolution: float = attrs.field()
     logged: int = attrs.field()
+    start_time: float = 0.0
 
     @resolution.default
     def _resolution(self) -> float:
@@ -302,7 +305,15 @@ def cut_swing(
         template = "{count} samples that jump aside, the first at {time:.4g} s, are left out"
         notes = (*notes, Phrase(template, count=len(beside), time=float(times[beside[0]])))
         times, values = np.delete(times, beside), np.delete(values, beside)
-    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load, notes=notes)
+    start_time = float(times[0])
+    return SwingLog(
+        times=times - start_time,
+        values=values,
+        quantity=quantity,
+        load=load,
+        notes=notes,
+        start_time=start_time,
+    )
 
 
 def require_angle(values: Array) -> None:
