@@ -1,4 +1,4 @@
-"""Playback blocks of axes that begin anew after a turn: outputs within it, one motion through all turns."""
+"""Playback blocks of modulo axes: outputs within it, one motion through all turns."""
 
 import math
 import subprocess
@@ -193,7 +193,7 @@ def test_all_of_32_bits_lie_around_zero():
     assert structured_text.replay(text.encode(), goal).position[-1, 0] == pytest.approx(2149.0)
 
 
-def test_only_the_axis_that_does_begins_anew():
+def test_of_two_axes_one_is_modulo():
     goal = target("slew", "radius", cycle_time=CYCLE, unit="deg", start=0.0)
     goal = attrs.evolve(goal, axes=(attrs.evolve(goal.axes[0], modulo=360.0), goal.axes[1]))
     text = structured_text.block_text(quintic((6.0, 20.0), (-0.5, 7.0), duration=3.0), goal)

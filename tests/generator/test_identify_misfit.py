@@ -47,7 +47,8 @@ def test_noise_alone_tells_no_rope(seed, read):
 @pytest.mark.parametrize("first", [0.0, -4.0])
 def test_a_log_that_begins_while_the_axis_moves_is_refused_with_the_cure(quantity, first):
     """It was said to be of another machine, or noise."""
-    spec, stops = preset_spec("single-pendulum-crane", ["plant.L0=2.6", "plant.c=0"]), 10.0  # s; the rope has 6.2 m
+    spec = preset_spec("single-pendulum-crane", ["plant.L0=2.6", "plant.c=0"])  # its rope has 6.2 m
+    stops = 10.0  # s
 
     def rates(t, x):
         push = 0.3 * ((t < 4.0) - float(6.0 < t < stops))

@@ -42,13 +42,13 @@ class BlockShape:
     layout : str
         Of its table.
     axes : int
-    begins_anew : bool
-        Whether one of them does, after a turn.
+    has_modulo : bool
+        Whether one of them is a modulo axis.
     """
 
     layout: str
     axes: int
-    begins_anew: bool = False
+    has_modulo: bool = False
 
 
 @attrs.frozen
@@ -150,7 +150,7 @@ def shape_of(source: BlockSource) -> BlockShape:
     """Tell the shape of a block by what it declares."""
     variables = {variable.name: variable for variable in source.variables}
     axes = len(variables["fScale"].values)
-    return BlockShape(layout_of(source.declaration()), axes, begins_anew="cModulo" in variables)
+    return BlockShape(layout_of(source.declaration()), axes, has_modulo="cModulo" in variables)
 
 
 @cache
@@ -180,9 +180,9 @@ def _frame(shape: BlockShape, *, is_buffered: bool = False, is_library: bool = F
     whole = layout == "counts"
     return {
         "has_segments": layout == "segments",
-        "begins_anew": shape.begins_anew,
-        "unwrapped": "fUnwrapped" if shape.begins_anew else "fPosition",
-        "actual": "fActual" if shape.begins_anew else "fActPosition",
+        "has_modulo": shape.has_modulo,
+        "unwrapped": "fUnwrapped" if shape.has_modulo else "fPosition",
+        "actual": "fActual" if shape.has_modulo else "fActPosition",
         "is_buffered": is_buffered,
         "is_library": is_library,
         "columns": len(COLUMNS[layout]),

@@ -337,9 +337,9 @@ def constant_block(values: Mapping[str, Sequence[str]], like: BlockSource, layou
         "start_tolerance": shared["fStartTolerance"],
         "block": like.name,
     }
-    if anew := "cModulo" in shared:
+    if has_modulo := "cModulo" in shared:
         holes |= {"modulo": shared["cModulo"], "modulo_low": shared["cModuloLow"]}
-    shape = BlockShape(layout, axes, begins_anew=anew)
+    shape = BlockShape(layout, axes, has_modulo=has_modulo)
     written = parse_function_block(fill(dict.fromkeys(OF_HEADER, "") | holes, shape))
     return attrs.evolve(written, header=like.header)
 
@@ -394,7 +394,7 @@ def _shown_state(shape: BlockShape, *, library: bool) -> str:
     axes, step = shape.axes, len(AXIS_STATE)
     at, index, indent_ = (f" + {step} * nAxis", "[nAxis]", "    ") if axes > 1 else ("", "", "")
     first = STATE_HEAD - (step if axes > 1 else 0)
-    names = ("Unwrapped" if shape.begins_anew else AXIS_STATE[0], *AXIS_STATE[1:])
+    names = ("Unwrapped" if shape.has_modulo else AXIS_STATE[0], *AXIS_STATE[1:])
     lines = [f"{indent_}aState[{first + number}{at}] := f{name}{index};" for number, name in enumerate(names)]
     lines = ["FOR nAxis := 1 TO cAxes DO", *lines, "END_FOR;"] if axes > 1 else lines
     motion = "DINT_TO_LREAL(nSelected)" if library else "0.0"

@@ -224,7 +224,7 @@ def quantities(table: setpoints.AxisTable | SampledProfile) -> Array:
 
 def shape_for(axes: Sequence[AxisScale], layout: str) -> BlockShape:
     """Give the shape of a block for axes."""
-    return BlockShape(layout, len(axes), begins_anew=any(axis.modulo is not None for axis in axes))
+    return BlockShape(layout, len(axes), has_modulo=any(axis.modulo is not None for axis in axes))
 
 
 def counted_axes(target: Target, layout: str) -> tuple[AxisScale, ...]:
@@ -233,7 +233,7 @@ def counted_axes(target: Target, layout: str) -> tuple[AxisScale, ...]:
     Raises
     ------
     ExportError
-        A turn after which one of them begins anew has no whole counts.
+        A turn of a modulo axis has no whole counts.
     """
     if layout != "counts":
         return target.axes
