@@ -130,6 +130,27 @@ def test_while_it_damps_on_the_way_a_stop_and_a_lower_limit_are_obeyed(compiled,
     require_limits(issued)
 
 
+@pytest.mark.parametrize("speed", [0.2, -1.1])
+def test_a_stick_is_obeyed_though_the_load_swings_and_promises_nothing(compiled, speed):
+    swung = crane(compiled, swing=(0.5, 0.8))
+    swung.run(2.0)  # it is not damped yet
+    begun = len(swung.rows["sway"])
+    issued = swung.run(10.0, bVelocity=1.0, fVelocityCommand=speed)
+    assert np.abs(issued["fVelocity"][-500:] - speed).max() <= 0.05 * abs(speed)
+    assert not issued["bPromise"][begun:].any()
+    require_limits(issued)
+
+
+def test_stated_ends_hold_what_damping_takes(compiled):
+    swung = crane(compiled, swing=(0.5, 2.0))
+    issued = swung.run(24.0, bStop=1.0, noise=0.002, offset=0.005, random=np.random.default_rng(6))
+    ahead = issued["fPosition"][::-1]
+    lowest, highest = np.minimum.accumulate(ahead)[::-1], np.maximum.accumulate(ahead)[::-1]
+    assert np.ptp(ahead) > 0.2
+    assert (issued["fStopLow"] <= lowest + ROUNDING).all()
+    assert (issued["fStopHigh"] >= highest - ROUNDING).all()
+
+
 def test_after_a_quick_stop_the_promise_comes_back_by_itself(compiled):
     swung = crane(compiled)
     swung.run(1.0)

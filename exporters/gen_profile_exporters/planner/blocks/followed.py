@@ -42,8 +42,7 @@ def _of_modes(c: PlannerConstants) -> PlannerConstants:
     errors = c.modes * [c.stated_error * constant]
     sways = [FAST ** (2 * mode) * constant for mode in range(c.modes)]
     model = np.vstack([c.model[: 2 * c.modes], *errors, *(len(c.axes) * sways)])
-    rates = c.rates or dict.fromkeys(c.live, 0.0)  # where it is measured, on a rope that stays
-    return attrs.evolve(c, model=model, sway_share=SHARE * c.sway_limit, rates=rates)
+    return attrs.evolve(c, model=model, sway_share=SHARE * c.sway_limit)
 
 
 def account_texts(c: PlannerConstants) -> str:

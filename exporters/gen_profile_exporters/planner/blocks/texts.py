@@ -33,7 +33,7 @@ LONGEST, FEWEST = (
 SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.15  # times that, on any machine that is watched
-AGAIN = 1.1  # times where damping ends: so much left by what is committed asks for another motion
+LITTLE = 30  # slots in which little is left of what was measured, until it is no more damped
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 MACHINES = 16  # that are watched, where there are operations for them:
 SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
@@ -124,7 +124,11 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
     watched = sizes.of(constants)
     modes, swings = constants.modes, constants.modes * (1 + len(watched))
     name = constants.name.replace("-", "_")
-    parts = ("linear_programme", "account", "modes", "motion_bounds", "decisions", "setpoints", "planner")
+    damping = ("damping",) if constants.sensor else ()
+    parts = (
+        *("linear_programme", "account", "modes", "motion_bounds", "decisions", "setpoints"),
+        *(*damping, "planner"),
+    )
     names = {part: f"{name}_{part}" for part in parts}
     shown = [*range(2 * modes), *range(swings - modes, swings)]  # as given, and both ends of the errors
     rows, slots = 2 * len(shown) + 1, longest(constants)  # those of the swings, and a target's way
@@ -148,13 +152,16 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "most": literal(BETWEEN * _stop_share(constants) * _share(constants)),
         "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
         "modes_constants": constant_lines(_of_modes(constants, watched)),
+        "damping_constants": constant_lines(_damping(constants)),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
     }
     follows: dict[str, str | int] = {
         "follows": int(account is not None),
         "is_measured": int(constants.sensor is not None),
-        "measured": "bMeasured := nQuiet < cQuiet," if constants.sensor else "",
+        "measured": f"bMeasured := damping.nLittle < {LITTLE}," if constants.sensor else "",
         "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
+        "unmeasured": "bUncalm" if constants.rates else "FALSE",
+        "calm_slots": LITTLE,
         "room": ROOM if constants.sensor else "",
         "quiet": "" if account else "bQuiet := table.bQuiet,",
     }
@@ -179,7 +186,7 @@ def _common(part: str, slots: int) -> str:
 
 
 def _stop_share(c: PlannerConstants) -> float:
-    if not c.sway_share or c.rates:
+    if not c.sway_share or c.rates or c.sensor:
         return 1.0
     return max(1.0, STOP_SHARE * c.sway_limit / c.sway_share)
 
@@ -247,7 +254,6 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cStopShare": _stop_share(c),
         "cSwayLimit": c.sway_limit / len(c.axes),
         "cCalmRoom": _calm_room(c),
-        **_damping(c),
     }
 
 
@@ -255,11 +261,7 @@ def _damping(c: PlannerConstants) -> dict[str, object]:
     """Give the sways of the slowest mode between which one that was measured is damped, in m."""
     if c.sensor is None:
         return {}
-    return {
-        "cDampsFrom": c.sensor.again,
-        "cDampsAgain": AGAIN * c.sensor.end,
-        "cDampsTo": c.sensor.end,
-    }
+    return {"cDampsFrom": c.sensor.again, "cDampsTo": c.sensor.end}
 
 
 def _calm_room(c: PlannerConstants) -> float:
