@@ -179,6 +179,36 @@ def bay():
     return spec, compile_counting(played_text(spec))
 
 
+@pytest.mark.parametrize(
+    ("kind", "asked"),
+    [
+        ("target", lambda t, k: 5.0 + 0.001 * (-1) ** k),
+        ("target", lambda t, k: 0.2 * t),
+        ("stick", lambda t, k: min(1.0, 0.5 * t) * (1.0 + 0.05 * (-1) ** k)),
+    ],
+    ids=["trembling target", "creeping target", "trembling stick"],
+)
+def test_a_command_that_changes_every_three_cycles_is_followed(bay, kind, asked):
+    spec, compiled = bay
+    history = History(spec, compiled, np.random.default_rng(3))
+    begin, away = history.place, 1.0 if history.place < 20.0 else -1.0
+    span = 3 * history.cycle
+    for k in range(1000):
+        goal = away * asked(k * span, k)
+        if kind == "target":
+            history.hold(span, bExecute=1.0, fTarget=begin + goal)
+        else:
+            history.hold(span, bVelocity=1.0, fVelocityCommand=goal)
+    way = np.abs(history.all("fPosition") - begin)
+    assert way[int(2.0 / history.cycle)] > 0.001
+    if kind == "target":
+        assert way[-1] > 0.7 * abs(goal)
+        assert history.hold(60.0)["fPosition"][-1] == pytest.approx(begin + goal, abs=1e-9)
+    else:
+        assert abs(history.all("fVelocity")[-1]) > 0.9 * abs(goal)
+    history.keeps()
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_a_prompt_stop_is_never_faster_than_the_axis_was_and_says_what_is_left(bay, seed):
     spec, compiled = bay

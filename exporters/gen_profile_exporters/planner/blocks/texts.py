@@ -240,7 +240,7 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cShown": shown,
         "cPlan": plan,
         "cFuture": plan + 4,
-        "cOwnWork": 80,  # operations of every cycle
+        "cOwnWork": 90,  # operations of every cycle
         # operations where a programme is found, and the next begins
         "cFoundWork": 250 + 8 * slots + 15 * swings,
         "cReserve": 150 + 30 * swings,  # operations behind a part of the search
