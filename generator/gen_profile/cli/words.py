@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from gen_profile.assurance.certificate.document import Certificate
     from gen_profile.assurance.proof.check import BlockJudgement
     from gen_profile.assurance.proof.verdict import JudgedHistory, Proof
-    from gen_profile.assurance.verification.check import JudgedFile, Judgement
+    from gen_profile.assurance.verification.check import Judgement
+    from gen_profile.assurance.verification.origin import JudgedFile
     from gen_profile.assurance.verification.verdict import Check
     from gen_profile.delivery.designs.design import Design
     from gen_profile.delivery.designs.planner import Deployment

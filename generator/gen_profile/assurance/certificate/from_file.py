@@ -19,7 +19,7 @@ from gen_profile.assurance.certificate.in_order import in_order
 from gen_profile.assurance.certificate.rechecking import not_covered
 from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayBounds, limits_of
 from gen_profile.assurance.certificate.theorem import SAME_TIME, Theorem, ranges_of
-from gen_profile.assurance.verification.check import spec_and_manifest
+from gen_profile.assurance.verification.origin import spec_and_manifest
 from gen_profile.assurance.verification.plausibility import another_move
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec

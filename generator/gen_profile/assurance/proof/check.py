@@ -11,14 +11,14 @@ from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.numbering import Numbering
 from gen_profile.assurance.proof.prove import prove, replay
 from gen_profile.assurance.proof.verdict import HISTORIES, Proof
-from gen_profile.assurance.verification.check import JudgedFile, alterations, provenance, spec_and_manifest
+from gen_profile.assurance.verification.origin import JudgedFile, origin_of
 from gen_profile.planner.directions import planned_axes, sensed_directions
 from gen_profile.planner.forms import block_in, refuse_program, refuse_wrapper
 from gen_profile.planner.interface import SENSOR, block_axes, live_inputs, sensed_axes
 from gen_profile.planner.stated import unstated_limits
 from gen_profile.spec.model import Spec
 from gen_profile.support.artefacts.manifest import PLANNER, Manifest
-from gen_profile.support.artefacts.reading import companions_of, read_artefact, strays
+from gen_profile.support.artefacts.reading import read_artefact
 from gen_profile.support.errors import ExportError, OutputError, SpecError
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_exporters.block_source import is_planner, parse_function_block
@@ -111,11 +111,11 @@ def check_block(
     CosimulationError
     """
     content = read_artefact(path)
-    spec, manifest, digest = spec_and_manifest(path, content, spec, planner=True)
+    origin = origin_of(path, content, spec, planner=True)
+    spec, manifest = origin.spec, origin.manifest
     text = block_in(path, content)
     _require_inputs(path, text, spec)
-    agreement, companions = provenance(manifest, content, digest), companions_of(manifest, path, content)
-    known = _record(manifest) if agreement != "none" else {}
+    known = _record(manifest) if origin.agreement != "none" else {}
     count = histories or histories_of(manifest if known else None)
     if history is not None and not 0 <= history < count:
         raise SpecError(f"history {history}: the histories are numbered from 0 to {count - 1}.")
@@ -128,16 +128,13 @@ def check_block(
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec), count, seed, parents)
         replayed = replay(spec, text, numbering, history, progress)
-    check = attrs.evolve(
-        replayed, faults=(*alterations(path, agreement, manifest), *strays(path, companions))
-    )
     return BlockJudgement(
         path=path,
         text=text,
         spec=spec,
-        check=check,
-        manifest=agreement,
-        companions=companions,
+        check=attrs.evolve(replayed, faults=origin.faults),
+        manifest=origin.agreement,
+        companions=origin.companions,
         history=history,
     )
 

@@ -2,11 +2,10 @@
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from io import StringIO
 from itertools import chain
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 import attrs
@@ -14,6 +13,7 @@ import numpy as np
 
 from gen_profile.assurance.verification.cosimulation import cosimulate
 from gen_profile.assurance.verification.judging import verdict
+from gen_profile.assurance.verification.origin import JudgedFile, origin_of, spec_and_manifest
 from gen_profile.assurance.verification.plausibility import implausibilities
 from gen_profile.assurance.verification.setpoint_path import lag_of, path_taken
 from gen_profile.assurance.verification.time_scales import sample_spacing
@@ -23,10 +23,8 @@ from gen_profile.dynamics.evaluation.scenarios import Scenario, further_scenario
 from gen_profile.dynamics.evaluation.simulation import Response, Sway
 from gen_profile.motion.profile import SampledProfile, columns_of
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import received_spec
 from gen_profile.spec.values import require_whole
-from gen_profile.support.artefacts.manifest import FILENAME, Manifest, seal_of, sha256
-from gen_profile.support.artefacts.reading import companions_of, manifest_beside, read_motion, strays
+from gen_profile.support.artefacts.reading import read_motion
 from gen_profile.support.errors import CosimulationError, ExportError, OutputError, SpecError
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.suggestion import finite_number, number_meant, suggestion
@@ -97,36 +95,6 @@ def _axis(option: str, name: str, axes: Sequence[str]) -> str:
     return name
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class JudgedFile:
-    """A file that was judged by a spec, and what the manifest beside it says about it.
-
-    Attributes
-    ----------
-    path : Path
-    spec : Spec
-    manifest : str
-        ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
-    companions : mapping of str to str
-        Of each file that was exported with it, as its wrapper: ``"matches"``, ``"differs"`` or ``"missing"``;
-        and ``"earlier"`` of one that only an earlier export of it had.
-    """
-
-    path: Path
-    spec: Spec
-    manifest: str
-    companions: Mapping[str, str] = attrs.field(factory=dict)
-
-    def identity(self, format_: str) -> dict[str, Any]:
-        """Nest plain values for JSON that tell which file was judged, and by which spec."""
-        artefact = {"format": format_, "path": str(self.path), "manifest": self.manifest}
-        return {
-            "name": self.spec.name,
-            "spec_sha256": self.spec.sha256(),
-            "artefact": {**artefact, "companions": self.companions},
-        }
-
-
 @attrs.frozen(kw_only=True, eq=False, repr=False)
 class Judgement(Drawable, JudgedFile):
     """A check of one file, and what its manifest says about it.
@@ -184,9 +152,9 @@ def check_artefact(
     CosimulationError
     """
     content, format_ = read_motion(path), format_of(path)
-    spec, manifest, digest = spec_and_manifest(path, content, spec)
+    origin = origin_of(path, content, spec)
+    spec = origin.spec
     setpoints = find_exporter(format_).replay(content, target_of(spec))
-    agreement, companions = provenance(manifest, content, digest), companions_of(manifest, path, content)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     asked, played, variant = varied(spec, setpoints, scale, mirror, offset)
@@ -195,15 +163,14 @@ def check_artefact(
         check = _verdict(asked, played, rows, progress)
     except CosimulationError as error:  # as of setpoints that no machine can follow
         raise CosimulationError(" ".join([str(error), *implausibilities(asked, played)])) from error
-    faults = (*check.faults, *alterations(path, agreement, manifest), *strays(path, companions))
-    check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
+    check = attrs.evolve(check, strict=strict, faults=(*check.faults, *origin.faults), searched=searched)
     return Judgement(
         path=path,
         format=format_,
         spec=spec,
         check=check,
-        manifest=agreement,
-        companions=companions,
+        manifest=origin.agreement,
+        companions=origin.companions,
         variant=variant,
     )
 
@@ -308,74 +275,3 @@ def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:
         onward = position[-1:] + setpoints.cycle_time * np.array(spec.move.final_velocity)
         position = np.concatenate([position, onward])
     return SampledProfile(cycle_time=setpoints.cycle_time, position=position, resolution=setpoints.resolution)
-
-
-def spec_and_manifest(
-    path: Path, content: bytes, spec: Spec | None, *, planner: bool = False
-) -> tuple[Spec, Manifest | None, str]:
-    """Take a spec that was named, or else the one in the manifest beside a file.
-
-    Parameters
-    ----------
-    path : Path
-    content : bytes
-    spec : Spec or None
-    planner : bool
-        Whether the file is a planner block.
-
-    Returns
-    -------
-    spec : Spec
-    manifest : Manifest or None
-        None where there is none of this file.
-    spec_sha256 : str
-        Of the spec as the manifest holds it, if it holds this one: a version of the program that knows other
-        keys writes the same spec otherwise.
-
-    Raises
-    ------
-    OutputError
-        No spec was named, and no manifest is of this file.
-    """
-    try:
-        manifest = manifest_beside(path, content, planner=planner)
-    except OutputError as error:
-        if spec is not None:
-            return spec, None, spec.sha256()
-        words = f"{str(error).removesuffix('.')}, or name its spec"
-        raise OutputError(f"{words}: gen-profile check {quote(str(path))} SPEC.toml") from error
-    try:
-        own = received_spec(manifest.spec, path.parent)
-    except (SpecError, OutputError) as error:
-        if spec is not None:
-            return spec, manifest, spec.sha256()
-        if isinstance(error, OutputError):
-            raise
-        version = manifest.versions.get("gen-profile", "of some version")
-        raise OutputError(
-            f"The spec in {path.parent / FILENAME}, which gen-profile {version} wrote, is faulty: {error}"
-        ) from error
-    spec = own if spec is None else spec
-    return spec, manifest, seal_of(manifest.spec) if spec == own else spec.sha256()
-
-
-def provenance(manifest: Manifest | None, content: bytes, spec_sha256: str) -> str:
-    """Tell whether a file is the one of a manifest: it matches, differs, or there is none of this spec."""
-    if manifest is None or seal_of(manifest.spec) != spec_sha256:
-        return "none"
-    if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
-        return "matches"
-    return "differs"
-
-
-def alterations(path: Path, agreement: str, manifest: Manifest | None) -> tuple[str, ...]:
-    """Say that a file is none of those that were exported."""
-    if agreement != "differs" or manifest is None:
-        return ()
-    if path.name in (artefact.path for artefact in manifest.artefacts):
-        found = f"not what {FILENAME} beside it lists by this name"
-    else:
-        found = f"none of the files that {FILENAME} beside it lists, which is of {manifest.words()}"
-    return (
-        f"{path.name} is {found}: it was altered after its export, or comes from another; export it again.",
-    )

@@ -14,11 +14,9 @@ from gen_profile.assurance.proof.prove import prove
 from gen_profile.assurance.proof.verdict import HISTORIES
 from gen_profile.assurance.verification.check import (
     Judgement,
-    alterations,
     check_artefact,
-    provenance,
-    spec_and_manifest,
 )
+from gen_profile.assurance.verification.origin import origin_of
 from gen_profile.delivery.deployment.block_state import BlockState, MotionState, PlannerState
 from gen_profile.motion.profile import Array
 from gen_profile.planner.directions import planned_axes
@@ -30,7 +28,6 @@ from gen_profile.support.artefacts.reading import (
     compared,
     manifest_beside,
     read_artefact,
-    require_companions,
     strays,
 )
 from gen_profile.support.bounded_file import DOCUMENT
@@ -226,11 +223,9 @@ def _played(path: Path, source: BlockSource, specs: Sequence[Spec]) -> tuple[Blo
 
 def _exported_spec(path: Path, content: bytes, *, planner: bool = False) -> Spec:
     """Read the spec that a block was exported with; refuse one that was altered since."""
-    spec, manifest, digest = spec_and_manifest(path, content, None, planner=planner)
-    for fault in alterations(path, provenance(manifest, content, digest), manifest):
-        raise CheckFailed(fault)
-    require_companions(manifest, path, content)
-    return spec
+    origin = origin_of(path, content, planner=planner)
+    origin.require_unaltered()
+    return origin.spec
 
 
 def _listed_specs(path: Path, content: bytes) -> tuple[Spec, ...]:

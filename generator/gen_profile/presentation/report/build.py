@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from gen_profile.assurance.verification.check import provenance, spec_and_manifest
+from gen_profile.assurance.verification.origin import origin_of
 from gen_profile.assurance.verification.verdict import Check
 from gen_profile.delivery.designs.design import Design, design
 from gen_profile.dynamics.evaluation.phrases import move, uncertain
@@ -20,7 +20,7 @@ from gen_profile.presentation.report.sections import facts, sections, verdict
 from gen_profile.spec.model import Spec
 from gen_profile.studies.comparison.compare import Comparison, compare
 from gen_profile.support.artefacts.manifest import sha256
-from gen_profile.support.artefacts.reading import read_motion, require_companions
+from gen_profile.support.artefacts.reading import read_motion
 from gen_profile.support.errors import OutputError
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_exporters.registry import format_of
@@ -137,11 +137,11 @@ def artefact_report(path: Path, **options: Any) -> Report:
         As of `report`; or the file is not what its manifest says, or this version writes another one.
     """
     content = read_motion(path)
-    spec, manifest, digest = spec_and_manifest(path, content, None)
-    if provenance(manifest, content, digest) != "matches":
+    origin = origin_of(path, content)
+    if origin.agreement != "matches":
         raise OutputError(f"{path} was altered after its export: gen-profile check judges it as it is now.")
-    require_companions(manifest, path, content)
-    made = report(spec, [format_of(path)], **options)
+    origin.require_unaltered()
+    made = report(origin.spec, [format_of(path)], **options)
     if sha256(content) not in {artefact.sha256 for artefact in made.design.artefacts}:
         raise OutputError(
             f"{path} comes from another version of gen-profile, and is another file now; export again."
