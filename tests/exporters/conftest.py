@@ -13,6 +13,10 @@ import pytest
 from lxml import etree
 from system_parts import missing
 
+from gen_profile.planner import design
+from gen_profile_exporters.planner.block import block_text
+from gen_profile_exporters.planner.blocks.whole import whole_block
+
 sys.path.insert(0, str(Path(__file__).parent))
 
 COMPILERS = {"IEC2C": "test_compiled_*.py", "STRUCPP": "test_strucpp_*.py"}
@@ -34,3 +38,41 @@ def tc6_schema():
     if path is None:
         missing("PLCopen's tc6_xml_v201.xsd (name it in the environment variable TC6_SCHEMA)")
     return etree.XMLSchema(etree.parse(path))
+
+
+# Texts of the planner block: today's, and that of blocks within a block. Both have to do what these modules
+# ask, but for the tests named, which the second one does not pass yet: one that it passes is to be taken out.
+TEXTS = {"one body": block_text, "blocks": whole_block}
+NOT_YET = {
+    "test_planner_obedience": {
+        # the promise is withdrawn
+        "test_what_an_axis_does_by_hand_is_followed_and_calmed[blocks-8.0-1.0-1]",
+        "test_what_an_axis_does_by_hand_is_followed_and_calmed[blocks-3.0-1.0-1]",
+        # one that is shorter than planning takes moves nothing
+        "test_a_tap_of_the_stick_moves_as_far_as_the_stick_says[blocks-1.1-0.004]",
+        "test_a_tap_of_the_stick_moves_as_far_as_the_stick_says[blocks--1.1-0.1]",
+        "test_a_tap_of_the_stick_moves_as_far_as_the_stick_says[blocks-0.05-0.004]",
+    },
+    "test_planner_signals": set(),
+    "test_planner_takeover": set(),
+}
+
+
+def pytest_generate_tests(metafunc):
+    if metafunc.module.__name__.rpartition(".")[2] in NOT_YET:
+        metafunc.fixturenames.insert(0, "written")
+        metafunc.parametrize("written", TEXTS, scope="module", indirect=True)
+
+
+@pytest.fixture(scope="module")
+def written(request):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(design, "block_text", TEXTS[request.param])
+        yield request.param
+
+
+@pytest.fixture(autouse=True)
+def not_yet(request):
+    named = NOT_YET.get(request.module.__name__.rpartition(".")[2], ())
+    if request.node.name in named:
+        request.node.add_marker(pytest.mark.xfail(strict=True, reason="not of the blocks yet"))
