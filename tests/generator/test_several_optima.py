@@ -29,9 +29,24 @@ def test_the_better_of_two_motions_is_given(rope):
 
 
 @pytest.mark.slow
-def test_what_rest_does_not_lead_to_begins_at_the_optimum_without_limits():
-    wide, narrow = (solution_of("plant.L=11", f"limits.velocity={limit}") for limit in (5.0, 4.9))
-    assert wide.optimum.cost < narrow.optimum.cost < 1.2 * wide.optimum.cost
+def test_narrower_limits_cost_more_and_not_hundreds_of_times_as_much():
+    """From rest none of these is found, and programs for the least cost hardly settle in the last ones."""
+    costs = [
+        solution_of("plant.L=11", f"limits.velocity={limit}").optimum.cost
+        for limit in (5.0, 4.9, 4.7, 4.5, 4.3, 4.2)
+    ]
+    assert costs == sorted(costs)
+    assert costs[1] < 1.1 * costs[0]
+    # on 30 intervals of four points, from its optimum without limits, IPOPT needs 676.5 with 4.7 m/s
+    assert costs[2] == pytest.approx(676.5, rel=2e-3)
+    assert costs[-1] < 7.0 * costs[0]
+
+
+@pytest.mark.slow
+def test_within_limits_two_starts_are_compared_too():
+    found = solution_of("plant.L=11", "limits.velocity=5")
+    assert found.other_costs == pytest.approx((found.optimum.cost,), rel=0.05)
+    assert found.other_costs[0] > 0.999 * found.optimum.cost
 
 
 def test_small_swings_have_one_optimum():
@@ -44,7 +59,8 @@ def test_small_swings_have_one_optimum():
     [
         (["plant.L=8"], "another start led to 4.6", None),
         (["plant.L=9"], None, "one start led to one"),
-        (["plant.L=11", "limits.velocity=5"], None, "one start led to one"),
+        (["plant.L=11", "limits.velocity=5.1"], None, None),  # both led to it
+        (["plant.L=11", "limits.velocity=4.1"], None, "one start led to one"),
     ],
 )
 def test_what_was_tried_is_said(tmp_path, changes, out, err):

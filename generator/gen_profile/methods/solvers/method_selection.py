@@ -28,20 +28,20 @@ from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
 ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
-DIRECTLY = 4.5  # likewise for the direct one
+DIRECTLY = 6.0  # likewise for the direct one
 NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
 KEPT = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
 REFINING = 0.4  # of the work that is left, for finer meshes that keep the limits
-# likewise, for the least cost from two starts, after which the motion of least violation will do
-SETTLING = 0.6, 0.9
+STARTING = 0.85  # likewise, for what begins at rest
+# likewise, for the least cost from two other starts, after which the motion of least violation will do
+SETTLING = 0.4, 0.9
 INEXACT = 1e-3  # share of a limit by which programs may break it for no other reason than their accuracy
 RESERVE, RESERVES = 2.0, 2  # times that share less of the limits is asked for then, and how often
 PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
 LEAST = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
 BLEND = 4.0  # order of the norm by which these times and the period count together
 RANGE = 2.0  # times the work for a whole range
-# rad and iterations of the solver, from which on a motion may be one of several optimal ones; limits, which
-# are begun at rest only, leave it at a warning
+# rad and iterations, from which on a motion may be one of several optimal ones; rad within limits
 FAR, MANY, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
 BETTER = 1.0 - 1e-3  # times the cost of a motion, below which another one is given in its place
 
@@ -70,8 +70,9 @@ def attempt(
         return in_time(partial(_over_a_range, problem, coarse=coarse), DIRECTLY)
     directly = partial(_direct, problem, coarse=coarse, near=near)
     if method == "direct":
-        return in_time(directly, DIRECTLY)
-    solution = in_time(partial(indirect.solve, problem), SOLVING)
+        solution = in_time(directly, DIRECTLY)
+    else:
+        solution = in_time(partial(indirect.solve, problem), SOLVING)
     if method == "auto" and not keeps_limits(solution) and solution.status is not Status.INFEASIBLE:
         other = in_time(directly, DIRECTLY)
         solution = solution if other.optimum is None and solution.optimum is None else other
@@ -81,23 +82,26 @@ def attempt(
 def _compared(problem: Problem, solution: Solution) -> Solution:
     """Where loads swing far, begin once more at another motion, and give the better one."""
     found = solution.optimum
-    if problem.limits.stated():
-        far = found is not None and found.angle > FAR_WITHIN_LIMITS
-        return attrs.evolve(solution, other_costs=()) if far else solution
-    if found is None and solution.status not in (Status.DIVERGED, Status.SWINGS_TOO_FAR):
+    start: Callable[[Problem], ProgramSequence | None] = direct.mirrored
+    if solution.other_costs is not None:  # it took two starts to find it
         return solution
-    if found is not None and (found.angle < FAR or solution.iterations < MANY):
+    if found is None:
+        several = solution.status in (Status.DIVERGED, Status.SWINGS_TOO_FAR) and not problem.limits.stated()
+    elif problem.limits.stated():
+        start, several = direct.without_limits, found.angle > FAR_WITHIN_LIMITS
+    else:
+        several = found.angle > FAR and solution.iterations >= MANY
+    if not several:
         return solution
     settled = problem
     if found is not None:  # so that costs compare
         settled = attrs.evolve(problem, sway_weight=found.sway_weight, sway_scale=found.sway_scale)
-    other = afford(lambda: direct.solve(settled, direct.mirrored(settled)), SOLVING)
-    better = None if other is None else other.optimum
-    if other is None or better is None:
+    other = afford(partial(_begun, settled, start), min(SOLVING, SETTLING[-1] * left()))
+    if other is None or other.optimum is None or not keeps_limits(other):
         return attrs.evolve(solution, other_costs=())
-    if found is None or better.cost < BETTER * found.cost:
+    if found is None or other.optimum.cost < BETTER * found.cost:
         return attrs.evolve(other, problem=problem, other_costs=() if found is None else (found.cost,))
-    return attrs.evolve(solution, other_costs=(better.cost,))
+    return attrs.evolve(solution, other_costs=(other.optimum.cost,))
 
 
 def given_up(problem: Problem) -> Solution:
@@ -109,7 +113,8 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
     """Begin near by, or at rest; where that misleads, at the motion of least violation."""
     cost, _ = direct.resolve_sway_cost(problem)  # once for all motions
     settled = attrs.evolve(problem, sway_weight=cost.beta, sway_scale=cost.gamma)
-    solution = _with_reserve(settled, None if near is None else near.start(problem), coarse=coarse)
+    begin = partial(_begun, settled, lambda _: None if near is None else near.start(problem), coarse=coarse)
+    solution = afford(begin, STARTING * left()) or given_up(problem)
     if problem.limits.stated() and not keeps_limits(solution):
         nearest = least_violation(settled)
         if nearest is not None and nearest.wider > NEARLY:
@@ -136,11 +141,14 @@ def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Soluti
         begun = partial(_begun, problem, start, coarse=coarse)
         solution = afford(begun, share * left()) or given_up(problem)
         if solution.optimum is not None:
-            return solution
-    return nearest.solution if nearest.wider <= 1.0 else solution
+            first = start is not direct.without_limits
+            return solution if first else attrs.evolve(solution, other_costs=())
+    return attrs.evolve(nearest.solution, other_costs=()) if nearest.wider <= 1.0 else solution
 
 
-def _begun(problem: Problem, start: Callable[[Problem], ProgramSequence | None], *, coarse: bool) -> Solution:
+def _begun(
+    problem: Problem, start: Callable[[Problem], ProgramSequence | None], *, coarse: bool = False
+) -> Solution:
     return _with_reserve(problem, start(problem), coarse=coarse)
 
 

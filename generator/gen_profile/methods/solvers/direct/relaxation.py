@@ -19,7 +19,6 @@ from gen_profile.methods.solvers.direct.conic import ConicStatus
 from gen_profile.methods.solvers.direct.refinement import bisected, switching
 from gen_profile.methods.solvers.direct.set_up import Setup, set_up
 from gen_profile.methods.solvers.direct.solver import (
-    ROUGH,
     Goal,
     ProgramSequence,
     begun_at,
@@ -34,6 +33,7 @@ from gen_profile.support.work import OutOfWork, budget, left, spend
 
 # of the effort without limits: ever less sway would take ever more of it
 PRICES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+ROUGH = 0.5  # step to which the motion without limits is found, at which programs begin
 TOLERANCE = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
 KEPT = 2e-4  # by how much it must fall short of it in the shortest motion; ten times that costs 0.2 %
 RESTS = 0.985  # fraction of a load's limit, for the worst machine after the move; 0.95 to 0.999 give the same

@@ -40,13 +40,16 @@ from gen_profile.support.work import OutOfWork, afford, left
 
 METHOD = "direct"
 COARSE = 1e-2  # step after which a motion on even intervals will do to be measured
-ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones end at need not be exact
+# step after which a mesh is refined: what programs on coarse ones end at need not be exact, but programs on
+# finer ones, which take longer, shall settle from there
+ROUGH = 0.1
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
 # solved exactly; they cost their square, and ten times or a tenth of them give the same motions
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
 BELIEVED = 0.03  # least quotient of steps that is taken for how they go on to shrink
 SLOW = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
-BISECTING = 0.7  # fraction of the work that is left, after which a motion on the first mesh will do
+BISECTING = 0.6  # fraction of the work that is left, after which a motion on the first mesh will do,
+SETTLING = 0.6  # and likewise one on the last mesh that is not quite of least cost
 WORTHWHILE = 1e-3  # relative change of the worst case worth another program; 1e-4 changes costs by 4e-7
 LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
@@ -77,6 +80,8 @@ class Goal:
     widened : tuple of str
         Places of limits that the last variable widens; travel by so many times its width, less one, at either
         end.
+    nearest : Iterate, optional
+        Depart from this motion as little as possible, in place of minimising the cost.
     """
 
     setup: Setup
@@ -85,6 +90,7 @@ class Goal:
     effort_price: float | None = None
     worst: float | None = None
     widened: tuple[str, ...] = ()
+    nearest: Iterate | None = None
 
     @property
     def extra(self) -> int:
@@ -108,6 +114,10 @@ class Goal:
             if self.widened:
                 program.at_most(place(-linear[None, None], np.zeros(1, dtype=np.intp)), np.zeros(1))
             quadratic = self.effort_price * setup.effort_form
+        elif self.nearest is not None:
+            quadratic = setup.effort_form
+            pulls = quadratic.values * self.nearest.local.ravel()[quadratic.columns]
+            linear -= np.bincount(quadratic.rows, pulls, program.variables)
         else:
             scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
             expanded, slope = goals.cost(transcription, setup.effort_form, scaled, iterate, maps[0])
@@ -264,7 +274,20 @@ def refined(start: Iterate, goal: Goal) -> ProgramSequence:
     result = afford(lambda: _refined(start, goal, begun), BISECTING * left())
     if result is None and not begun:
         raise OutOfWork
-    return result or sequence(*begun[0])
+    result = result or afford(lambda: sequence(*begun[0]), SETTLING * left())
+    if begun and (result is None or result.verdict is ConicStatus.FAILED):
+        return near_by(*begun[-1])
+    assert result is not None
+    return result
+
+
+def near_by(start: Iterate, goal: Goal) -> ProgramSequence:
+    """Find the motion next to one that does not quite follow the equations yet.
+
+    Programs for the least cost settle slowly, or not at all, where equations bend much and limits bind. Those
+    for the least departure do so in a few steps, and cost hardly more if the motion was nearly the cheapest.
+    """
+    return sequence(start, attrs.evolve(goal, nearest=start))
 
 
 def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> ProgramSequence:
