@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from counted_block import CountedBlock, compile_counting
 from driven_block import BAY
+from generator.planned_machines import GANTRY
 from system_parts import program
 from test_planner_forms import Exported
 
@@ -160,3 +161,17 @@ def test_a_cycle_of_a_millisecond_has_operations_enough(changes):
     out.append(block.hold(60_000, bExecute=1.0, fTarget=39.0))
     assert [part["fPosition"][-1] for part in (out[1], out[3])] == [4.0, 39.0]
     assert max(part["operations"].max() for part in out) <= operations(planner_constants(spec)[1])
+
+
+def test_an_axis_whose_stick_is_at_zero_rests_as_after_a_stop_while_the_other_one_is_led():
+    block = BlockInstance(whole_text(parse_spec(GANTRY, ["export.cycle_time=0.004"])))
+    given = block.inputs | {"bEnable": 1.0, "fActPosition_x": 30.0, "fActPosition_y": 10.0, "fL": 5.0}
+    rows = [given] * 500 + [given | {"bExecute": 1.0}] * 75  # both to 0
+    rows += [given | {"bVelocity": 1.0, "fVelocityCommand_x": -1.0}] * 3000
+    issued = block.call(np.array([list(row.values()) for row in rows]))
+    x, y, low, high = (
+        issued[575:, block.outputs.index(name)]
+        for name in ("fPosition_x", "fPosition_y", "fStopLow_y", "fStopHigh_y")
+    )
+    assert np.ptp(y[1500:]) == 0.0 and x[-1] < x[0] - 5.0
+    assert low[1] - 1e-9 <= y.min() and y.max() <= high[1] + 1e-9
