@@ -169,18 +169,21 @@ def test_a_network_that_is_lost_for_a_moment_loses_nothing(tmp_path):
 @pytest.mark.parametrize(
     ("app", "sentence"),
     [
-        (Phyphox(source="accelerometer"), "measures no rates about three axes: open phyphox's experiment"),
-        (OtherServer(), "but not as phyphox does"),
-        (Stubborn(), "press play in phyphox"),
-        (Dripping(), "but not as phyphox does"),
-        (Absurd(measuring=True), "but not as phyphox does"),
-        (Phyphox(measuring=True, speed=0.0), "no new rates"),
+        (
+            lambda: Phyphox(source="accelerometer"),
+            "measures no rates about three axes: open phyphox's experiment",
+        ),
+        (OtherServer, "but not as phyphox does"),
+        (Stubborn, "press play in phyphox"),
+        (Dripping, "but not as phyphox does"),
+        (lambda: Absurd(measuring=True), "but not as phyphox does"),
+        (lambda: Phyphox(measuring=True, speed=0.0), "no new rates"),
     ],
 )
 def test_what_is_no_gyroscope_is_refused(tmp_path, app, sentence, monkeypatch):
     monkeypatch.setattr("gen_profile.studies.identification.phone.WHOLE", 0.5)
     monkeypatch.setattr("gen_profile.studies.identification.phone.LOST_FOR", 0.5)
-    with served(app) as url:
+    with served(app()) as url:  # its clock runs from here on
         outcome = run_here("log-swing", url, "--out", tmp_path / "swing.csv", "--for", "2")
     assert outcome.code == 2 and sentence in outcome.err
     assert not list(tmp_path.iterdir())
