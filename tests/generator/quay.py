@@ -68,4 +68,8 @@ def shortage(x, z, path, start, target):
                 gap = np.maximum(gap, sideways - np.abs(x - end))
         over = (path.rail + z - height / 2.0) - top - above
         worst = max(worst, float(-np.maximum(gap, over).min()))
+    for left, right, underside in path.overhead:
+        gap = np.maximum(left - (x + width / 2.0), (x - width / 2.0) - right) - sideways
+        below = underside - above - (path.rail + z + height / 2.0)
+        worst = max(worst, float(-np.maximum(gap, below).min()))
     return worst

@@ -15,7 +15,7 @@ from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.dynamics.evaluation.simulation import body_places
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.profile import sample
-from gen_profile.presentation.charts.curves import path_figure, select_machines
+from gen_profile.presentation.charts.side_view import path_figure
 from gen_profile.presentation.report.build import report
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
@@ -92,18 +92,15 @@ class TestMotion:
 
 
 class TestLook:
-    def test_the_picture_shows_ways_that_keep_out_of_what_is_dashed(self, plan):
-        shown = select_machines(plan.evaluation)
-        (panel,) = path_figure(plan.spec, plan.evaluation, shown).panels
-        ways = [line for line in panel.lines if line.name not in ("stacks", "clearance")]
-        kept_out = [line for line in panel.lines if line.name == "clearance"]
-        assert len(ways) == len(shown)
-        assert len(kept_out) == len(STACKS)
-        for zone in kept_out[:-1]:  # the last one is what the load is set down on
-            for way in ways:
-                inside = (way.x > zone.x[0]) & (way.x < zone.x[2])
-                assert inside.any()
-                assert way.y[inside].min() >= zone.y.max() - NEARER
+    def test_the_picture_shows_a_way_that_keeps_out_of_what_is_dashed(self, plan):
+        (panel,) = path_figure(plan.spec, plan.evaluation).panels
+        lines = {str(line.name): line for line in panel.lines}
+        swept, dashed = lines["swept by the payload"], lines["clearance"]
+        x, low = swept.x[: len(swept.x) // 2], swept.y[: len(swept.x) // 2]
+        over = (x > STACKS[0][0]) & (x < STACKS[3][1])  # the last one is what the load is set down on
+        assert over.sum() > 20
+        heights = np.array([dashed.y[np.searchsorted(dashed.x, place) - 1] for place in x[over]])
+        assert (low[over] >= heights - 0.02).all() and (low[over] - heights).min() < 0.1
 
     def test_report_and_picture_tell_of_the_stacks(self, plan, tmp_path):
         spec = attrs.evolve(plan.spec, check=attrs.evolve(plan.spec.check, samples=0))
@@ -178,18 +175,80 @@ class TestCheck:
         )
         assert -judged.check.nearest.room == pytest.approx(worst, abs=1e-3)
 
-    def test_the_compiled_loop_finds_the_same_room(self, plan):
-        spec, setpoints = plan.spec, sample(plan.command, 0.01)
+    def test_a_drawn_machine_tells_where_it_is_nearest(self, folder, plan):
+        found = gp.check_artefact(folder / "quay.csv").check.findings
+        drawn = [one for one in found if one.scenario.group == "samples"]
+        times = np.linspace(0.0, plan.motion.duration + 20.0, 20001)
+        for finding in drawn:
+            x, z, _ = followed(plan.motion, finding.scenario.parameters["L0"], times)
+            then = np.abs(times - finding.nearest.time) < 0.02
+            missing = shortage(x[then], z[then], plan.spec.path, *ends(plan))
+            assert -missing == pytest.approx(finding.room, abs=2e-3)
+        assert len({one.nearest.time for one in drawn}) > 1
+
+    @pytest.mark.parametrize("overhead", [[], [[8.0, 14.0, 15.0]]])
+    def test_the_compiled_loop_finds_the_same_room(self, plan, overhead):
+        path = {"overhead": overhead}
+        spec, setpoints = gp.evolve_spec(plan.spec, path=path), sample(plan.command, 0.01)
         plant, feed = spec.machine(), Feed(times=setpoints.times, position=setpoints.position)
         machines = [{**spec.plant.parameters, "L0": rope * ROPE} for rope in (0.9, 1.0, 1.1)]
         rows = parameter_rows(plant, machines)
         with many_machines(plant) as runs:
             peaks = residual_peaks(runs, spec, feed, rows, tau=np.zeros(3), max_step=1e-3, since=1e9)
         with PlantCosimulation(plant) as fmu:
-            for values, row, found in zip(machines, rows, peaks[:, -1], strict=True):
+            for values, row, (found, time, number) in zip(machines, rows, peaks[:, -3:], strict=True):
                 response = fmu.run(setpoints, values, max_step=1e-3, settle=0.01)
                 bodies = body_places(plant, response.q_u, response.position, row)
-                assert nearest(spec, response.times, bodies).room == pytest.approx(found, abs=1e-6)
+                near = nearest(spec, response.times, bodies)
+                assert near.room == pytest.approx(found, abs=1e-6)
+                assert near.time == pytest.approx(time, abs=0.011)
+                assert near.obstacle == int(number)  # of one body, zones are numbered as obstacles
+                assert (near.obstacle >= len(STACKS)) == bool(overhead)
+
+
+class TestOverhead:
+    @pytest.mark.parametrize(
+        "beam",
+        [
+            [12.0, 17.0, 23.6],  # it is passed below
+            [33.0, 39.0, 23.6],  # over the target
+            [-8.0, -1.76, 12.0],  # behind the start, lower than the load is lifted
+            [37.76, 42.0, 15.0],  # behind the target
+        ],
+    )
+    def test_every_rope_keeps_the_clearance(self, beam):
+        plan = gp.plan(quay(path={"overhead": [beam]}))
+        times = np.linspace(0.0, plan.motion.duration + 20.0, 40001)
+        for rope in (0.9, 0.95, 1.0, 1.05, 1.1):
+            x, z, _ = followed(plan.motion, rope * ROPE, times)
+            assert shortage(x, z, plan.spec.path, 0.0, 36.0) <= NEARER
+
+    def test_it_costs_height_and_so_time(self):
+        free = gp.plan(quay()).motion.duration
+        assert free < gp.plan(quay(path={"overhead": [[12.0, 17.0, 23.6]]})).motion.duration < 1.1 * free
+
+    def test_too_little_height_names_both_and_a_clearance_that_was_tried(self):
+        with pytest.raises(gp.InfeasibleProblem) as refusal:
+            gp.plan(quay(path={"overhead": [[12.0, 17.0, 22.9]]}))
+        sentence = str(refusal.value)
+        assert (
+            "what is overhead from 12 to 17 m, 22.9 m high is in the way: below it the payload is" in sentence
+        )
+        assert "too low to pass the stack from 25 to 27.5 m" in sentence
+        (cure,) = refusal.value.suggestions
+        clearance = list(cure.values["path.clearance"])
+        found = gp.plan(quay(path={"overhead": [[12.0, 17.0, 22.9]], "clearance": clearance}))
+        assert found.passage.nearest.room >= -NEARER
+
+    def test_the_check_names_it(self, folder, plan):
+        spec = quay(path={"overhead": [[12.0, 17.0, 20.0]]}, move={"duration": plan.motion.duration})
+        judged = gp.check_artefact(folder / "quay.csv", spec)
+        assert not judged.passed
+        assert any(
+            "payload at what is overhead from 12 to 17 m, 20 m high" in one for one in judged.check.reasons()
+        )
+        place = judged.to_dict()["check"]["nearest"]
+        assert (place["stack"], place["overhead"]) == (None, 0)
 
 
 @pytest.mark.parametrize(("key", "low", "high"), [("path.rail", 36.0, 33.0), ("path.stacks.1.2", 20.0, 23.0)])

@@ -100,6 +100,11 @@ def test_a_profile_counts_the_higher_end_of_every_piece():
             "move.start: the payload is too near to the stack from 22.5 to 25",
         ),
         ({"move": {"target": [34.0, 28.0]}}, "move.target: the payload is too near to the stack from 34.75"),
+        (
+            {"path": {"overhead": [[-2.0, 2.0, 5.0]]}},
+            "move.start: the payload is too near to what is overhead from -2 to 2 m, 5 m high, by",
+        ),
+        ({"path": {"overhead": [[3.0, 2.0, 5.0]]}}, "path.overhead.0: must begin left of where it ends"),
         ({"solver": {"method": "zvd"}}, "solver.method: knows no stacks"),
         ({"move": {"free": ["hoist"]}}, "move.free: both axes move"),
         (

@@ -89,13 +89,15 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
         components : int
             So many of the last outputs are the components of a vector: its greatest length at any time, also
             before `since`, is one more column.
-        zones : (zones, 9) array
-            Where bodies may not be; the least room to them at any time is one more column. Numbers of the
-            outputs that are a body's place and height; from, to and top; twice where it may be all the same.
+        zones : (zones, 10) array
+            Where bodies may not be; the least room to them at any time, that time in s and the zone's number
+            are three more columns. Numbers of the
+            outputs that are a body's place and height; from, to and a height; 1 where they may not be below
+            it, −1 where not above; twice where it may be all the same.
 
         Returns
         -------
-        (runs, outputs) array, or with one or two columns more
+        (runs, outputs) array, or with more columns
 
         Raises
         ------
@@ -118,7 +120,7 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
             n_zones=len(zones),
         )
         runs = next((len(rows) for rows in given.values() if len(rows) != 1), 1)
-        return self._run(plan, np.empty((runs, len(outputs) + (components > 0) + (len(zones) > 0))))
+        return self._run(plan, np.empty((runs, len(outputs) + (components > 0) + 3 * (len(zones) > 0))))
 
     def _run(self, plan: _Plan, rows: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""

@@ -100,7 +100,7 @@ def residual_sways(
     fastest = np.max([abs(eigenvalues(plant, machines, q_a)).max(axis=-1) for q_a in ends], axis=0)
     feed = Feed(times=setpoints.times, position=setpoints.position)
     with many_machines(plant) as runs:
-        return residual_peaks(
+        peaks = residual_peaks(
             runs,
             spec,
             followed_up(feed, watched(spec, setpoints, STEP_PHASE), spec.move.final_velocity),
@@ -109,6 +109,7 @@ def residual_sways(
             max_step=STEP_PHASE / fastest,
             since=arrival(spec, setpoints),
         )
+    return peaks[:, : len(plant.loads)]
 
 
 def _machines(spec: Spec, parameters: Mapping[str, npt.ArrayLike]) -> Array:

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
 from gen_profile.spec.stacks import MOST_STACKS, StackZone, hanging, trolley_and_hoist, zones
@@ -17,9 +19,10 @@ def stack_faults(spec: Spec, plant: Plant) -> Iterator[Fault]:
     path = spec.path
     if path is None:
         return
-    for number, (low, high, _) in enumerate(path.stacks):
-        if not low < high:
-            yield f"path.stacks.{number}", "must begin left of where it ends: from, to, height"
+    for key, rows in (("stacks", path.stacks), ("overhead", path.overhead)):
+        for number, (low, high, _) in enumerate(rows):
+            if not low < high:
+                yield f"path.{key}.{number}", "must begin left of where it ends: from, to, height"
     if not path.stacks:
         yield (
             "path.stacks",
@@ -95,7 +98,7 @@ def _ends(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for key, bodies in zip(("start", "target"), places, strict=True):
         for zone in zones(path, [bodies, bodies]):
             x, z = bodies[zone.body]
-            if not zone.own and zone.low < x < zone.high and z < zone.top:
+            if not zone.own and zone.within(x) and zone.clear(np.asarray(z)) < 0.0:
                 yield f"move.{key}", _too_near(spec, plant, zone, x, z)
 
 
@@ -103,13 +106,18 @@ def _too_near(spec: Spec, plant: Plant, zone: StackZone, x: float, z: float) -> 
     """Say how far a load is from where it may be: sideways, or upwards."""
     assert spec.path is not None
     template = (
-        "the {body} is too near to the stack from {stack} by {sideways:.3g} m sideways; move it, allow a "
+        "the {body} is too near to {obstacle}, by {sideways:.3g} m sideways; move it, allow a "
         "smaller path.clearance, or begin or end {upwards:.3g} m higher"
     )
+    if zone.overhead:
+        template = (
+            "the {body} is too near to {obstacle}, by {sideways:.3g} m sideways; move it, allow a "
+            "smaller path.clearance, or begin or end {upwards:.3g} m lower"
+        )
     return Phrase(
         template,
         body=plant.bodies[zone.body],
-        stack=spec.path.named(zone.stack),
+        obstacle=spec.path.named(zone.obstacle),
         sideways=min(x - zone.low, zone.high - x),
-        upwards=zone.top - z,
+        upwards=abs(zone.top - z),
     )

@@ -1,7 +1,8 @@
 """What stands under a crane, and how near its loads may come to it: the table ``[path]``.
 
 A load is a box that hangs upright, its middle at the place of the machine's body. It may not come nearer to a
-stack than the clearance: either it is beside it by the one for the sides, or above it by the one for heights.
+stack than the clearance: either it is beside it by the one for the sides, or above it by the one for heights;
+below what is overhead likewise, past which the ropes run.
 A stack that the load stands on, or hangs over, at the start or the target is left upwards: until the load is
 clear of it, it stays within the clearance for the sides of where it stood.
 """
@@ -52,6 +53,8 @@ class StacksSpec(Checked, table="path"):
     ----------
     stacks : tuple of (from, to, height)
         Along the trolley's axis, in its own coordinate.
+    overhead : tuple of (from, to, height)
+        What hangs from above, such as a portal's beams: the height is that of its underside.
     rail : float
         Height of where the load is suspended, from the same level as the stacks' heights.
     load, hook : (width, height)
@@ -64,6 +67,7 @@ class StacksSpec(Checked, table="path"):
     rail: Distance
     load: Size
     hook: Size | None = None
+    overhead: tuple[Stack, ...] = ()
     clearance: NotNegative | tuple[NotNegative, NotNegative] = 0.5
 
     @property
@@ -75,10 +79,13 @@ class StacksSpec(Checked, table="path"):
         """Width and height of one of the machine's bodies in m, the last of which is the load."""
         return self.load if body == bodies - 1 else self.hook or (0.0, 0.0)
 
-    def named(self, stack: int) -> Phrase:
-        """Name a stack by its place."""
-        low, high, height = self.stacks[stack]
-        return Phrase("{low:g} to {high:g} m, {height:g} m high", low=low, high=high, height=height)
+    def named(self, obstacle: int) -> Phrase:
+        """Name a stack by its place, or what is overhead, whose numbers follow."""
+        low, high, height = (*self.stacks, *self.overhead)[obstacle]
+        template = "the stack from {low:g} to {high:g} m, {height:g} m high"
+        if obstacle >= len(self.stacks):
+            template = "what is overhead from {low:g} to {high:g} m, {height:g} m high"
+        return Phrase(template, low=low, high=high, height=height)
 
 
 def stacks_of(table: Mapping[str, Any], folder: Path, structurer: Structurer) -> dict[str, Any]:
@@ -201,25 +208,36 @@ class StackZone:
 
     Attributes
     ----------
-    stack, body : int
-        Numbers of both.
+    obstacle, body : int
+        Numbers of both, as `StacksSpec.named` counts them.
     low, high, top : float
         m, of the body's middle, clearances included.
+    overhead : bool
+        Whether it may not be above that height.
     own : tuple of (float, float)
         Between which places the body may be all the same: it stands there at the start or the target.
     """
 
-    stack: int
+    obstacle: int
     body: int
     low: float
     high: float
     top: float
+    overhead: bool = False
     own: tuple[tuple[float, float], ...] = ()
 
     def beside(self, x: Array) -> Array:
         """Tell by how much more than it must a body is beside the stack, in m; negative where it is not."""
         sides = [self.low - x, x - self.high, *(np.minimum(x - a, b - x) for a, b in self.own)]
         return np.asarray(np.maximum.reduce(sides))
+
+    def clear(self, z: Array) -> Array:
+        """Tell by how much more than it must a body is above the stack, or below what is overhead, in m."""
+        return self.top - z if self.overhead else z - self.top
+
+    def within(self, x: float) -> bool:
+        """Whether a body is neither left nor right of it."""
+        return self.low < x < self.high
 
 
 def zones(path: StacksSpec, ends: Sequence[Sequence[tuple[float, float]]]) -> tuple[StackZone, ...]:
@@ -241,7 +259,13 @@ def zones(path: StacksSpec, ends: Sequence[Sequence[tuple[float, float]]]) -> tu
             level = stack - path.rail + height / 2.0
             over = [x for x, z in places if low < x < high and level - TOUCHING <= z]
             own = tuple(dict.fromkeys((x - sideways, x + sideways) for x in over))
-            found.append(StackZone(stack=number, body=body, low=low, high=high, top=level + above, own=own))
+            found.append(
+                StackZone(obstacle=number, body=body, low=low, high=high, top=level + above, own=own)
+            )
+        for number, (left, right, underside) in enumerate(path.overhead, start=len(path.stacks)):
+            low, high = left - width / 2.0 - sideways, right + width / 2.0 + sideways
+            top = underside - path.rail - height / 2.0 - above
+            found.append(StackZone(obstacle=number, body=body, low=low, high=high, top=top, overhead=True))
     return tuple(found)
 
 

@@ -24,8 +24,9 @@ typedef struct {
     size_t n_zones;
 } Plan;
 
-/* A zone: the outputs that are a body's place and height; from, to and top; twice between which places it may be. */
-enum { X, Z, LOW, HIGH, TOP, OWN, ZONE = OWN + 4 };
+/* A zone: the outputs that are a body's place and height; from, to and a height, 1 where bodies have to be above it
+   and -1 where below; twice between which places it may be. */
+enum { X, Z, LOW, HIGH, TOP, UP, OWN, ZONE = OWN + 4 };
 
 static const double *of_run(const PerRun *numbers, size_t run) { return numbers->values + run * numbers->size; }
 
@@ -43,32 +44,36 @@ static double beside(const double *zone, double x) {
     return most;
 }
 
-/* Least room to all zones in a step, in which bodies go straight: beside a zone or above it. */
-static double room(const Plan *plan, const double *was, const double *is) {
-    double least = HUGE_VAL;
-    for (const double *zone = plan->zones; zone < plan->zones + plan->n_zones * ZONE; zone += ZONE) {
+/* What is kept of the zones: the least room to one, when that is, and the zone's number. */
+enum { ROOM, TIME, NUMBER, NEAREST };
+
+/* Room to all zones in a step, in which bodies go straight: beside a zone or clear of its height. */
+static void look(const Plan *plan, double time, const double *was, const double *is, double *nearest) {
+    for (size_t number = 0; number < plan->n_zones; number++) {
+        const double *zone = plan->zones + number * ZONE;
         const size_t x = (size_t)zone[X], z = (size_t)zone[Z];
         const double first = beside(zone, was[x]), last = beside(zone, is[x]);
-        const double above = was[z] - zone[TOP], later = is[z] - zone[TOP];
-        least = fmin(least, fmin(fmax(first, above), fmax(last, later)));
+        const double above = zone[UP] * (was[z] - zone[TOP]), later = zone[UP] * (is[z] - zone[TOP]);
+        double room = fmin(fmax(first, above), fmax(last, later));
         const double apart = first - above, after = last - later;
-        if (apart * after < 0.0) least = fmin(least, first + (last - first) * apart / (apart - after));
+        if (apart * after < 0.0) room = fmin(room, first + (last - first) * apart / (apart - after));
+        if (room < nearest[ROOM]) nearest[ROOM] = room, nearest[TIME] = time, nearest[NUMBER] = (double)number;
     }
-    return least;
 }
 
 /* What is kept of every run. */
-static size_t columns(const Plan *plan) { return plan->n_outputs + (plan->n_components > 0) + (plan->n_zones > 0); }
+static size_t columns(const Plan *plan) {
+    return plan->n_outputs + (plan->n_components > 0) + (plan->n_zones > 0) * NEAREST;
+}
 
 /* One run; `values` has room for the outputs twice. */
 static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values, double *peaks) {
     const double *times = of_run(&plan->times, run), *input = of_run(&plan->inputs, run);
-    const size_t last = columns(plan) - 1;
-    double *is = values, *was = values + plan->n_outputs;
-    for (size_t i = 0; i <= last; i++) peaks[i] = 0.0;
+    double *is = values, *was = values + plan->n_outputs, *nearest = peaks + columns(plan) - NEAREST;
+    for (size_t i = 0; i < columns(plan); i++) peaks[i] = 0.0;
     int status = begin(fmu, times[0], plan->parameter_references, plan->n_parameters, of_run(&plan->parameters, run));
     if (plan->n_zones > 0) {
-        peaks[last] = HUGE_VAL;
+        nearest[ROOM] = HUGE_VAL;
         if (status == GOOD) status = get(fmu, plan->output_references, plan->n_outputs, is);
     }
     for (size_t k = 0; k < plan->steps && status == GOOD; k++, input += plan->n_inputs) {
@@ -81,7 +86,7 @@ static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values
         status = get(fmu, plan->output_references, plan->n_outputs, is);
         for (size_t i = 0; counts && i < plan->n_outputs; i++) peaks[i] = fmax(peaks[i], fabs(is[i]));
         if (plan->n_components > 0) peaks[plan->n_outputs] = fmax(peaks[plan->n_outputs], length(plan, is));
-        if (plan->n_zones > 0) peaks[last] = fmin(peaks[last], room(plan, was, is));
+        if (plan->n_zones > 0) look(plan, times[k + 1], was, is, nearest);
     }
     return status;
 }

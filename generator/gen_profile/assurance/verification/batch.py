@@ -96,7 +96,8 @@ def residual_peaks(
     Returns
     -------
     (runs, loads) array, or with more columns
-        m; the last one is the least room to stacks, where the spec has some.
+        m. Where the spec has stacks, the last three are the least room to one in m, when that is in s, and
+        which of `zones_of` it is.
 
     Raises
     ------
@@ -119,11 +120,12 @@ def residual_peaks(
                 zone.low,
                 zone.high,
                 zone.top,
+                -1.0 if zone.overhead else 1.0,
                 *np.ravel((*zone.own, *NOWHERE)[:2]),
             ]
             for zone in zones_of(spec)
         ]
-    ).reshape(-1, 9)
+    ).reshape(-1, 10)
     places = [f"position.{body}.{along}" for body in plant.bodies for along in "xz"] if len(zones) else []
     outputs = [*places, *(f"sway.{load}" for load in plant.loads)]
     components = plant.directions if on_the_way else 0

@@ -189,6 +189,5 @@ def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) 
         residual=dict(zip(plant.loads, map(float, peak(after.sway)), strict=True)),
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
         on_the_way=None if spec.limits.sway is None else float(np.abs(end_load).max()),
-        room=None if near is None else near.room,
         nearest=near,
     )

@@ -14,6 +14,7 @@ from gen_profile.assurance.verification.setpoint_path import (
 )
 from gen_profile.assurance.verification.time_scales import SAMPLE_PHASE, longest_step, standstill, watched
 from gen_profile.assurance.verification.verdict import Check, Finding
+from gen_profile.dynamics.evaluation.clearance import Nearest, zones_of
 from gen_profile.dynamics.evaluation.scenarios import Scenario
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.profile import Array, SampledProfile
@@ -108,17 +109,24 @@ def _batch(
         other = peaks(feed.thinned(2), max_step)
     else:
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
-    between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest.max())
-    return greatest, float(np.abs(greatest - other).max()) + between
+    lengths = np.s_[:, : -2 if spec.path is not None else None]  # not when a load was nearest, and to what
+    between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest[lengths].max())
+    return greatest, float(np.abs(greatest - other)[lengths].max()) + between
 
 
 def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:
     """Take the peaks; amplitudes of modes are known of the machines' trajectories only."""
     residual = dict(zip(spec.machine().loads, map(float, peaks), strict=False))
+    near = None
+    if spec.path is not None:
+        room, time, number = peaks[-3:].tolist()
+        zone = zones_of(spec)[int(number)]
+        body = spec.machine().bodies[zone.body]
+        near = Nearest(room=room, time=time, obstacle=zone.obstacle, body=body)
     return Finding(
         scenario=row,
         residual=residual,
         modal=residual,
         on_the_way=None if spec.limits.sway is None else float(peaks[len(residual)]),
-        room=None if spec.path is None else float(peaks[-1]),
+        nearest=near,
     )

@@ -34,33 +34,34 @@ class Finding:
         Sum of the modes' amplitudes at standstill in m: what the sway of every load can ever reach.
     on_the_way : float or None
         Greatest sway of the end load at any time in m, where that is limited.
-    room : float or None
-        Least room to stacks beyond the clearance in m, where the spec has some; negative where it is broken.
     nearest : Nearest or None
-        When and where that is, as far as it is known.
+        Where it has the least room to stacks, if the spec has some.
     """
 
     scenario: Scenario
     residual: Mapping[str, float]
     modal: Mapping[str, float]
     on_the_way: float | None = None
-    room: float | None = None
     nearest: Nearest | None = None
 
+    @property
+    def room(self) -> float | None:
+        """Least room to stacks beyond the clearance in m; negative where it is broken."""
+        return None if self.nearest is None else self.nearest.room
+
     def nearness(self, path: StacksSpec | None) -> Phrase:
-        """Say how near to a stack a load comes, and where as far as that is known."""
-        room = self.room or 0.0
+        """Say how near to a stack a load comes, and where."""
+        assert self.nearest is not None and path is not None
+        room = self.nearest.room
         template = (
             "keeps the clearance with {room:.4g} mm to spare" if room >= 0.0 else "{room:.4g} mm too near"
         )
         kept = Phrase(template, room=1e3 * abs(room))
-        if self.nearest is None or path is None:
-            return kept
         return Phrase(
-            "{kept}: {body} at the stack from {stack}, after {time:.4g} s",
+            "{kept}: {body} at {obstacle}, after {time:.4g} s",
             kept=kept,
             body=self.nearest.body,
-            stack=path.named(self.nearest.stack),
+            obstacle=path.named(self.nearest.obstacle),
             time=self.nearest.time,
         )
 
@@ -322,11 +323,19 @@ class Check(Drawable, Tabled, Examination):
         finding = self.nearest
         if finding is None:
             return None
-        where = finding.nearest
-        place = dict.fromkeys(("time_s", "stack", "body"))
-        if where is not None:
-            place = {"time_s": where.time, "stack": where.stack, "body": where.body}
-        return {"room_m": finding.room, "row": finding.scenario.row, **place}
+        where, path = finding.nearest, self.path
+        assert where is not None and path is not None
+        past = where.obstacle - len(path.stacks)
+        place = (
+            {"stack": None, "overhead": past} if past >= 0 else {"stack": where.obstacle, "overhead": None}
+        )
+        return {
+            "room_m": where.room,
+            "row": finding.scenario.row,
+            "time_s": where.time,
+            **place,
+            "body": where.body,
+        }
 
     def _end_load(self, finding: Finding) -> float:
         return max(finding.residual[load] for load in list(self.limit)[-self.directions :])

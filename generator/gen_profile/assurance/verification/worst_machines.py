@@ -148,7 +148,7 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
         if sway is not None:
             figures.append(peaks[:, len(limits)] / sway)
         if spec.path is not None:
-            figures.append(-peaks[:, -1])
+            figures.append(-peaks[:, -3])
         return np.column_stack(figures)
 
     return worst_places(shares, begun, KEPT_PER_LIMIT)

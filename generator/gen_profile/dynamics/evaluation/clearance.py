@@ -10,7 +10,7 @@ from gen_profile.spec.stacks import StackZone, hanging, zones
 
 @attrs.frozen(kw_only=True)
 class Nearest:
-    """Where a machine has the least room to a stack.
+    """Where a machine has the least room to a stack, or to what is overhead.
 
     Attributes
     ----------
@@ -18,14 +18,14 @@ class Nearest:
         m beyond the clearance; negative where the clearance is not kept.
     time : float
         s.
-    stack : int
-        Its number in ``path.stacks``, from 0.
+    obstacle : int
+        Its number in ``path.stacks``, from 0; those in ``path.overhead`` follow.
     body : str
     """
 
     room: float
     time: float
-    stack: int
+    obstacle: int
     body: str
 
 
@@ -53,7 +53,7 @@ def nearest(spec: Spec, times: Array, bodies: Array) -> Nearest:
     found = []
     for zone in zones_of(spec):
         x, z = bodies[:, zone.body, 0], bodies[:, zone.body, 2]
-        beside, above = zone.beside(x), z - zone.top
+        beside, above = zone.beside(x), zone.clear(z)
         room = np.maximum(beside, above)
         apart = beside - above
         passes = apart[:-1] * apart[1:] < 0.0
@@ -62,5 +62,7 @@ def nearest(spec: Spec, times: Array, bodies: Array) -> Nearest:
         room[:-1] = np.where(passes, np.minimum(room[:-1], between), room[:-1])
         least = int(np.argmin(room))
         body = spec.machine().bodies[zone.body]
-        found.append(Nearest(room=float(room[least]), time=float(times[least]), stack=zone.stack, body=body))
+        found.append(
+            Nearest(room=float(room[least]), time=float(times[least]), obstacle=zone.obstacle, body=body)
+        )
     return min(found, key=lambda one: one.room)

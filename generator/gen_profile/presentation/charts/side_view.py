@@ -14,6 +14,7 @@ from gen_profile.support.phrase import Phrase
 SAMPLES = 400  # of a way
 COLUMNS = 240  # of the region that bodies sweep
 STANDING = Style(colour=FRAME, fill=0.55)
+ROOM = 1.0  # m above the highest that is shown
 KEPT_OUT = Style(colour=LIMIT, dash="dash", width=1.2)
 
 
@@ -41,15 +42,21 @@ def side_view(spec: Spec, places: Array) -> Panel:
     path, bodies = spec.path, spec.machine().bodies
     assert path is not None
     ways = places + np.array([0.0, path.rail])
-    floor = min(0.0, float(ways[..., 1].min()), *(height for *_, height in path.stacks))
+    floor = min(0.0, float(ways[..., 1].min()), *(height for *_, height in _all(path)))
+    ceiling = ROOM + max(float(ways[..., 1].max()) + path.load[1], *(top for *_, top in _all(path)))
     lines = [Line("stacks", *_box(low, high, floor, top), STANDING) for low, high, top in path.stacks]
+    lines += [Line("overhead", *_box(a, b, height, ceiling), STANDING) for a, b, height in path.overhead]
     looks = [
         (path.size(number, len(bodies)), PALETTE[len(bodies) - 1 - number]) for number in range(len(bodies))
     ]
     for number, (body, (size, colour)) in enumerate(zip(bodies, looks, strict=True)):
         name = Phrase("swept by the {body}", body=body)
         lines.append(Line(name, *swept(ways[:, :, number], size), Style(colour=colour, fill=0.2)))
+    sideways, above = path.clearances
     lines.append(Line("clearance", *skyline(path, floor), KEPT_OUT))
+    for low, high, height in path.overhead:
+        around = _box(low - sideways, high + sideways, ceiling, height - above)
+        lines.append(Line("clearance", *around, KEPT_OUT))
     for number, (body, (size, colour)) in enumerate(zip(bodies, looks, strict=True)):
         name = Phrase("middle of the {body}, nominal", body=body)
         lines.append(
@@ -101,6 +108,10 @@ def skyline(path: StacksSpec, floor: float) -> tuple[Array, Array]:
         points += [(low, height), (high, height)]
     xs, zs = np.array([*points, (edges[-1], floor)]).T
     return xs, zs
+
+
+def _all(path: StacksSpec) -> tuple[tuple[float, float, float], ...]:
+    return (*path.stacks, *path.overhead)
 
 
 def _box(left: float, right: float, bottom: float, top: float) -> tuple[Array, Array]:

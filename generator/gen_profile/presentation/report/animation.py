@@ -184,4 +184,6 @@ def _obstacles(spec: Spec) -> Array:
     if path is None:
         return np.zeros((0, 4))
     floor = min(0.0, *(height for *_, height in path.stacks))
-    return np.array([(a, floor - path.rail, b - a, top - floor) for a, b, top in path.stacks])
+    standing = [(a, floor - path.rail, b - a, top - floor) for a, b, top in path.stacks]
+    hanging = [(a, height - path.rail, b - a, path.rail - height) for a, b, height in path.overhead]
+    return np.array([*standing, *(one for one in hanging if one[3] > 0.0)])

@@ -68,6 +68,7 @@ def side_json(spec: Spec, places: Array) -> dict[str, Any]:
             for line in panel.lines
         ],
         "stacks": path.stacks,
+        "overhead": path.overhead,
     }
 
 

@@ -273,5 +273,5 @@ def robustness_of(spec: Spec, motions: Mapping[str, Profile], errors: Mapping[st
                 max_step=np.full(len(machines), cycle),
                 since=since + cycle,
             )
-            residuals[method] = peaks.reshape(*grid[0].shape, -1)
+            residuals[method] = peaks[:, : len(plant.loads)].reshape(*grid[0].shape, -1)
     return Robustness(spec=spec, errors=errors, residual=residuals)

@@ -85,12 +85,19 @@ class Bay:
         """How far the hoist can lift from the start in m."""
         travel, start = self.spec.limits.of(self.hoist).travel, self.spec.move.start[self.hoist]
         least = self.plant.actuated[self.hoist].lower
-        return start - max(least, travel[0] if travel else least)
+        highest = start - max(least, travel[0] if travel else least)
+        return min([highest, *(self.headroom(zone) for zone in self.zones if self.passes(zone))])
+
+    def headroom(self, zone: StackZone) -> float:
+        """How far the hoist can lift from the start in m below what is overhead."""
+        if not zone.overhead:
+            return math.inf
+        return max(zone.top - float(self.hang[:, zone.body].max()), self.rise, 0.0)
 
     @property
     def needed(self) -> float:
         """How far the hoist has to lift from the start in m, so that all loads clear what is between."""
-        passed = filter(self.passes, self.zones)
+        passed = (zone for zone in self.zones if self.passes(zone) and not zone.overhead)
         lifts = [zone.top - float(self.hang[:, zone.body].min()) for zone in passed]
         return max(0.0, self.rise, *lifts)
 
@@ -100,8 +107,9 @@ class Bay:
         return abs(self.target - float(self.begin[0]))
 
     def passes(self, zone: StackZone) -> bool:
-        """Whether a body has to go over a stack."""
-        return len(set(self._sides(zone))) > 1
+        """Whether a body has to go over a stack, or below what is overhead."""
+        sides = self._sides(zone)
+        return len(set(sides)) > 1 or (zone.overhead and sides[0] == (-math.inf, math.inf))
 
     def alone(self) -> "Bay":
         """Leave the nominal machine only."""
@@ -130,9 +138,15 @@ class Bay:
         fine = np.linspace(0.0, up.duration, FINE)
         level = self.hang[machine, body] + up.at(fine)[:, 0]
         for zone in self.zones:
-            if zone.body != body:
+            if zone.body != body or (zone.overhead and (self.passes(zone) or level.max() <= zone.top)):
                 continue
             rises, falls = _crossings(fine, level, zone.top)
+            if zone.overhead:  # while it is too high, it stays where it starts and ends
+                left, right = self._sides(zone)[0]
+                counts = (times >= rises - EDGE) & (times <= falls + EDGE)
+                low[counts] = np.maximum(low[counts], left)
+                high[counts] = np.minimum(high[counts], right)
+                continue
             for (left, right), counts in zip(
                 self._sides(zone), (times <= rises + EDGE, times >= falls - EDGE), strict=True
             ):

@@ -208,11 +208,11 @@ def _none_found(bay: Bay) -> SolverDiverged:
     if len(bay.machines) > 1 and zone is not None and room < allowed:
         assert path is not None
         sentence = Phrase(
-            "move.target: no motion was found after which the {body} keeps its clearance to the stack from "
-            "{stack}, to which it has {room:.3g} m more at the target; move the target away from it, narrow "
-            "the ranges, or allow a smaller path.clearance.",
+            "move.target: no motion was found after which the {body} keeps its clearance to {obstacle}, to "
+            "which it has {room:.3g} m more at the target; move the target away from it, narrow the ranges, "
+            "or allow a smaller path.clearance.",
             body=bay.plant.bodies[zone.body],
-            stack=path.named(zone.stack),
+            obstacle=path.named(zone.obstacle),
             room=room,
         )
     place = sentence.split(":")[0]
@@ -336,24 +336,37 @@ def _to_rest(lengths: Array, jerks: Array, start: float, target: float) -> Piece
 
 
 def _require_height(bay: Bay) -> None:
-    """Refuse stacks that the hoist cannot lift the load over, in any time."""
+    """Refuse stacks that the hoist cannot lift the load over, at its top or below what is overhead."""
     lacking = bay.needed - bay.top
     if lacking <= 0.0:
         return
-    path = bay.spec.path
+    path, passed = bay.spec.path, [zone for zone in bay.zones if bay.passes(zone)]
     assert path is not None
-    highest = max((zone for zone in bay.zones if bay.passes(zone)), key=lambda zone: zone.top)
+    stack = max((zone for zone in passed if not zone.overhead), key=lambda zone: zone.top)
+    beam = next((zone for zone in passed if bay.headroom(zone) <= bay.top), None)
     sideways, above = path.clearances
-    less = rounded_down(max(above - lacking - RESERVE, 1e-9))
+    values = {
+        "stack": path.named(stack.obstacle),
+        "body": bay.plant.bodies[stack.body],
+        "lacking": lacking,
+    }
+    if beam is None:
+        place, less = "path.stacks", above - lacking - RESERVE
+        template = (
+            "path.stacks: {stack} is in the way: at the hoist's top the {body} is {lacking:.3g} m too low to "
+            "pass it with path.clearance."
+        )
+    else:
+        place, less = "path.overhead", above - lacking / 2.0 - RESERVE
+        values["beam"] = path.named(beam.obstacle)
+        template = (
+            "path.overhead: {beam} is in the way: below it the {body} is {lacking:.3g} m too low to pass "
+            "{stack}, with path.clearance to both; a load that passes one before the other goes by two moves."
+        )
+    less = rounded_down(max(less, 1e-9))
     raise InfeasibleProblem(
-        Phrase(
-            "path.stacks: the stack from {stack} is in the way: at the hoist's top the {body} is "
-            "{lacking:.3g} m too low to pass it with path.clearance.",
-            stack=path.named(highest.stack),
-            body=bay.plant.bodies[highest.body],
-            lacking=lacking,
-        ),
-        reasons=[Reason(code=Code.INFEASIBLE, place="path.stacks", found=bay.needed, allowed=bay.top)],
+        Phrase(template, **values),
+        reasons=[Reason(code=Code.INFEASIBLE, place=place, found=bay.needed, allowed=bay.top)],
         suggestions=_tried(bay.spec, {"path.clearance": (sideways, less)}) if less > 1e-3 else (),
     )
 
@@ -366,13 +379,11 @@ def _refusal(planner: _Planner) -> InfeasibleProblem:
     sentence = Phrase("move.duration: the hoist alone takes longer than {asked:g} s.", asked=asked)
     if course is not None:
         zone, missing = _in_the_way(bay, course)
-        template = (
-            "move.duration: in {asked:g} s the {body} is {missing:.3g} m too near to the stack from {stack}."
-        )
+        template = "move.duration: in {asked:g} s the {body} is {missing:.3g} m too near to {obstacle}."
         body, path = bay.plant.bodies[zone.body], bay.spec.path
         assert path is not None
-        stack = path.named(zone.stack)
-        sentence = Phrase(template, asked=asked, body=body, missing=missing, stack=stack)
+        obstacle = path.named(zone.obstacle)
+        sentence = Phrase(template, asked=asked, body=body, missing=missing, obstacle=obstacle)
         if course.miss > max(missing, ENOUGH):
             template = "move.duration: in {asked:g} s the trolley stays {miss:.3g} m away from its target."
             sentence = Phrase(template, asked=asked, miss=course.miss)

@@ -45,10 +45,14 @@ const side = (() => {
     inked(draw(svg, line.fill ? "polygon" : "polyline", { points }), line);
   }
 
-  /** A stack's places on the screen, and what its handles say. */
-  function place({ stack, top }, [from, to, height]) {
+  /** All that a load keeps clear of, with the key of its numbers; what is overhead goes up, not down. */
+  const obstaclesOf = (part) => ["stacks", "overhead"].flatMap((key) => part[key].map((stack, number) => ({ path: `path.${key}.${number}`, number, up: key === "overhead", stack: [...stack] })));
+
+  /** An obstacle's places on the screen, and what its handles say. */
+  function place({ stack, top }, { up, stack: [from, to, height] }) {
     const { x, y, ends } = shown.frame, [left, right] = [x(from), x(to)];
-    for (const [key, value] of Object.entries({ x: left, width: Math.max(right - left, 0), y: y(height), height: Math.max(y(ends[2]) - y(height), 0) })) stack.setAttribute(key, value);
+    const [high, low] = up ? [y(ends[3]), y(height)] : [y(height), y(ends[2])];
+    for (const [key, value] of Object.entries({ x: left, width: Math.max(right - left, 0), y: high, height: Math.max(low - high, 0) })) stack.setAttribute(key, value);
     for (const [key, value] of Object.entries({ x: left, width: Math.max(right - left, 0), y: y(height) - GRIP / 2, height: GRIP })) top.setAttribute(key, value);
     for (const [node, value] of [[stack, from], [top, height]]) {
       node.setAttribute("aria-valuenow", value);
@@ -57,8 +61,9 @@ const side = (() => {
   }
 
   function handles(svg, part, phrase) {
-    return part.stacks.map((_, number) => Object.fromEntries(["stack", "top"].map((kind) => {
-      const look = { class: kind, role: "slider", tabindex: "0", "aria-label": `${phrase(`side.${kind}`)} ${number + 1}`, "data-number": number };
+    return obstaclesOf(part).map(({ number, up }, place) => Object.fromEntries(["stack", "top"].map((kind) => {
+      const name = up ? { stack: "overhead", top: "underside" }[kind] : kind;
+      const look = { class: kind, role: "slider", tabindex: "0", "aria-label": `${phrase(`side.${name}`)} ${number + 1}`, "data-number": place };
       return [kind, draw(svg, "rect", look)];
     })));
   }
@@ -66,12 +71,13 @@ const side = (() => {
   /** Move a stack, or its top, by so much from where it was taken, and tell the spec. */
   function move({ number, kind, from: [low, high, height] }, [across, up]) {
     const next = kind === "top" ? [low, high, round(height + up)] : [round(low + across), round(high + across), height];
-    shown.stacks[number] = next;
-    place(shown.handles[number], next);
-    shown.options.drag(`path.stacks.${number}`, next);
+    const moved = shown.obstacles[number];
+    moved.stack = next;
+    place(shown.handles[number], moved);
+    shown.options.drag(moved.path, next);
   }
 
-  const taken = (target) => (target.dataset.number === undefined ? null : { number: Number(target.dataset.number), kind: target.getAttribute("class"), from: shown.stacks[target.dataset.number] });
+  const taken = (target) => (target.dataset.number === undefined ? null : { number: Number(target.dataset.number), kind: target.getAttribute("class"), from: shown.obstacles[target.dataset.number].stack });
 
   function listen(svg) {
     svg.addEventListener("pointerdown", (event) => {
@@ -105,7 +111,7 @@ const side = (() => {
   /** Show what stands there and how the loads pass over it. */
   function show(host, part, options) {
     const { phrase } = options, width = Math.max(host.clientWidth, 280);
-    const same = shown && host.childElementCount && shown.stacks.length === part.stacks.length && shown.language === options.language;
+    const same = shown && host.childElementCount && shown.obstacles.length === obstaclesOf(part).length && shown.language === options.language;
     const frame = held ? shown.frame : scaled(part, width);
     if (!same) {
       host.replaceChildren();
@@ -115,16 +121,16 @@ const side = (() => {
       listen(svg);
     }
     // a stack stays where a hand has put it until the answer to that comes
-    if (!same || (!held && options.newest && part !== shown.part)) shown.stacks = part.stacks.map((stack) => [...stack]);
+    if (!same || (!held && options.newest && part !== shown.part)) shown.obstacles = obstaclesOf(part);
     Object.assign(shown, { host, part, options, frame, language: options.language });
     shown.svg.setAttribute("viewBox", `0 0 ${frame.width} ${frame.height}`);
     shown.svg.setAttribute("width", frame.width);
     shown.behind.replaceChildren();
     shown.front.replaceChildren();
     axes(shown.behind, frame, part, phrase);
-    const lines = part.lines.filter((line) => line.name !== "stacks");
+    const lines = part.lines.filter((line) => !["stacks", "overhead"].includes(line.name));
     for (const line of lines) curve(shown.front, frame, line);
-    shown.stacks.forEach((stack, number) => place(shown.handles[number], stack));
+    shown.obstacles.forEach((one, number) => place(shown.handles[number], one));
     const named = new Map(lines.map((line) => [phrase(line.name), line]));
     shown.legend.replaceChildren(...[...named].map(([name, line]) => {
       const item = knobs.element("li", {}), sample = draw(item, "svg", { viewBox: "0 0 26 10", "aria-hidden": "true" });
