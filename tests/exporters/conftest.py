@@ -48,10 +48,6 @@ NOT_YET = {
         # the promise is withdrawn
         "test_what_an_axis_does_by_hand_is_followed_and_calmed[blocks-8.0-1.0-1]",
         "test_what_an_axis_does_by_hand_is_followed_and_calmed[blocks-3.0-1.0-1]",
-        # one that is shorter than planning takes moves nothing
-        "test_a_tap_of_the_stick_moves_as_far_as_the_stick_says[blocks-1.1-0.004]",
-        "test_a_tap_of_the_stick_moves_as_far_as_the_stick_says[blocks--1.1-0.1]",
-        "test_a_tap_of_the_stick_moves_as_far_as_the_stick_says[blocks-0.05-0.004]",
     },
     "test_planner_signals": set(),
     "test_planner_takeover": set(),
