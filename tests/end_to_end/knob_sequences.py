@@ -25,7 +25,7 @@ UNDONE = 0.3  # of the turns are taken back by the next one
 SEQUENCES = 25  # of a page before it is closed
 ENDS = ("verdict", "faults", "failure")
 SEARCHING = "Looking for what would help"
-UNHEARD = ("Internal error", "unheard of", "has ended")
+UNHEARD = ("Internal error", "not understood", "has ended")
 
 
 def edits_of(chance: random.Random, knobs: list[dict[str, Any]]) -> dict[str, Any]:

@@ -219,7 +219,7 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(
 
     with once_watched(rival):
         found = run_here("deploy", old, *where, "--watch", "--json")
-    assert found.code == 4 and "has gone over to its other buffer" in found.document["fault"]
+    assert found.code == 4 and "has switched to its other buffer" in found.document["fault"]
     assert f"Error: {found.document['fault']}" in found.err
 
 

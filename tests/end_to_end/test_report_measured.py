@@ -223,7 +223,7 @@ def test_one_rope_s_angle_tells_of_what_hangs_on_it_alone(tmp_path, spec, motion
     (tmp_path / "log.csv").write_text(text, "utf-8")
     _, measured, page = report(tmp_path)
     assert set(measured["angles"]) == {kept}
-    assert "Columns that were left alone: temperature." in page
+    assert "Columns that were not used: temperature." in page
     if kept == "payload":
         assert measured["sways"] == {} and "nor do the angles in it alone: log those of all ropes." in page
     else:

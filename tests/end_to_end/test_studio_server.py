@@ -203,7 +203,7 @@ def test_a_log_is_read_and_forgotten(running):
     assert heard["unread"]["serial"] == 3 and heard["log"]["source"] == "bay.csv"
     faulty = {**reading, "after": "inf"}
     heard = conversation(running, dropped("bay.csv", b""), faulty, {"say": "forget"}, until="failure")
-    assert "unheard of" in heard["failure"]["sentences"][0]
+    assert "not understood" in heard["failure"]["sentences"][0]
 
 
 @pytest.mark.slow

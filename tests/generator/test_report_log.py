@@ -231,7 +231,7 @@ def test_counts_are_as_large_as_is_said():
     ["Zeit", "time_s=", "time_s=1,speed=2", "time_s=1,sway=9", "sway=2", "time_s=1,payload_sway_0mm=2"],
 )
 def test_columns_that_are_not_there(columns):
-    with pytest.raises(OutputError, match=r"(MEANING=COLUMN|nothing of this machine|no column).*[.]$"):
+    with pytest.raises(OutputError, match=r"(MEANING=COLUMN|no quantity of this machine|no column).*[.]$"):
         parse_log(table(["a", "b"], TIMES, TIMES), "log.csv", paper(), columns)
 
 

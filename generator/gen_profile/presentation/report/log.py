@@ -246,7 +246,7 @@ def _required(meaning: str, spec: Spec, where: str) -> _Column:
     if column is None or step == 0.0:
         plant = spec.machine()
         template = (
-            "columns: {meaning!r} is nothing of this machine; write time_s, {axis}_position, "
+            "columns: {meaning!r} is no quantity of this machine; write time_s, {axis}_position, "
             "{load}_sway or {load}_angle, with a unit behind such as _mm or _deg."
         )
         raise OutputError(template, meaning=meaning, axis=plant.actuated[0].name, load=plant.loads[-1])

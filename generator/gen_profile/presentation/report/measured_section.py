@@ -25,11 +25,11 @@ def measured_verdict(measured: Measured) -> Verdict:
     """Say whether the machine did as it should."""
     judged = {load: sway for load, sway in measured.sways.items() if sway.residual is not None}
     if not judged:
-        template = "{source} tells no sway for as long as one slow swing after the arrival."
+        template = "{source} shows no sway for the length of one slow swing after the arrival."
         if measured.angles and not measured.sways:
             template = (
-                "{source} tells no sway for as long as one slow swing after the arrival, nor do the angles "
-                "in it alone: log those of all ropes."
+                "{source} shows no sway for the length of one slow swing after the arrival, nor do the "
+                "angles in it alone: log those of all ropes."
             )
         sentence = Phrase(template, source=measured.log.source)
         return Verdict(word="Measured, not judged.", passed=None, sentences=[sentence])
@@ -59,7 +59,7 @@ def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measure
     words += _likeness(evaluation, measured)
     words += [Phrase("As read: {note}.", note=note) for note in measured.log.notes]
     if ignored := ", ".join(measured.log.ignored):
-        words.append(Phrase("Columns that were left alone: {ignored}.", ignored=ignored))
+        words.append(Phrase("Columns that were not used: {ignored}.", ignored=ignored))
     caption = "Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on."
     figure = Figure(caption, [*_panels(spec, evaluation, measured)])
     return Section(title="What the machine did", words=[" ".join(words)], blocks=[_table(measured), figure])

@@ -244,7 +244,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             answer = "faulty" if isinstance(error, SpecError) else "unanswered"
             self._tell(failure(answer, str(error).splitlines()))
         except (ValueError, KeyError, TypeError, AttributeError):
-            self._tell(failure("unanswered", ["The page said something unheard of."]))
+            self._tell(failure("unanswered", ["The page sent a message that is not understood."]))
 
     def on_close(self) -> None:
         """Let go of the page's workers and files."""

@@ -124,7 +124,7 @@ class Judge(ABC, Generic[State]):
     def _require_table(self, first: State, state: State) -> None:
         if state.checksum != self._checksum or state.buffer != first.buffer:
             raise CheckFailed(
-                "The controller no longer uses {name}: it has gone over to its other buffer, with the "
+                "The controller no longer uses {name}: it has switched to its other buffer, with the "
                 "checksum {there} and not {here}. Find out who switched (deployments.json).",
                 name=self._name,
                 there=state.checksum,
@@ -133,7 +133,7 @@ class Judge(ABC, Generic[State]):
         if state.checked == WRONG:
             raise CheckFailed(
                 "The controller finds the checksum of its table wrong: a value was altered in its memory. It "
-                "starts nothing; deploy the table again, and look after the memory if that recurs."
+                "starts nothing; deploy the table again, and check its memory if that recurs."
             )
 
     def _require_cycle_time(self) -> None:
