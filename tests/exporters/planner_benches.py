@@ -8,11 +8,17 @@ from exporters.st_interpreter import FunctionBlock
 from exporters.vendor_axes import Bench
 
 from gen_profile_exporters import motion_libraries
-from gen_profile_exporters.planner.axis_wrapper import planner_wrapper
+from gen_profile_exporters.planner.axis_wrapper import INTERFACE, planner_wrapper
 
 ON = {"bPower": True, "bEnable": True}
 START = 4.0  # m
 UNITS = -1000.0  # the axis counts mm the other way
+
+
+def interface_of(source):
+    """A planner block without what it does."""
+    declared = tuple(one for one in source.variables if one.section in INTERFACE)
+    return attrs.evolve(source, variables=declared, body="", within=())
 
 
 class Compiled:
@@ -38,8 +44,7 @@ class PlannerBench(Bench):
 
     def __init__(self, vendor, source, units, starts):
         wrapper = planner_wrapper(source, units, vendor.library)
-        interface = attrs.evolve(source, body="")
-        super().__init__(vendor, wrapper, interface, [f"Axis{n}" for n in units], starts)
+        super().__init__(vendor, wrapper, interface_of(source), [f"Axis{n}" for n in units], starts)
         self.wrapper.alter("fbPlanner", None, Compiled(source))
         self.homed = [f"bHomed{n}" for n in units if vendor.library is motion_libraries.CODESYS]
         self.given |= dict.fromkeys(self.homed, True)
@@ -63,7 +68,7 @@ class Converter:
     def __init__(self, source, lag=0.05, slip=0.02):
         self.wrapper = FunctionBlock(
             planner_wrapper(source, {"": 1.0}, motion_libraries.VELOCITY).text(),
-            (attrs.evolve(source, body="").text(),),
+            (interface_of(source).text(),),
         )
         self.wrapper.alter("fbPlanner", None, Compiled(source))
         self.lag, self.slip = lag, slip

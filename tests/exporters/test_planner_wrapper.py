@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
 from exporters.driven_block import ACCELERATION, BAY, CYCLE, JERK, VELOCITY
-from exporters.planner_benches import ON, START, UNITS, Converter, PlannerBench
+from exporters.planner_benches import ON, START, UNITS, Converter, PlannerBench, interface_of
 from exporters.st_interpreter import FunctionBlock
 from exporters.vendor_axes import VENDORS
 
@@ -35,12 +35,12 @@ SPEEDING = 3.0  # s, after which an axis is fast
 
 
 @pytest.fixture(scope="module")
-def bay():
+def bay(written):
     return parse_function_block(planner_block(parse_spec(BAY)).text)
 
 
 @pytest.fixture(scope="module")
-def gantry():
+def gantry(written):
     return parse_function_block(planner_block(parse_spec(GANTRY)).text)
 
 
@@ -369,7 +369,7 @@ class TestVelocity:
         outputs = axis.until(lambda row: row["benabled"], most=20, **ON)
         assert abs(outputs["fspeed"]) < 1e-9
         axis.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=12.0)
-        assert axis.position == pytest.approx(12.0, abs=5e-3)
+        assert axis.position == pytest.approx(12.0, abs=8e-3)  # by its lag
 
     @pytest.mark.parametrize("name", ["fGain", "fCorrection", "fFollowingLimit"])
     def test_it_is_not_guided_without_control_and_supervision(self, bay, name):
@@ -433,7 +433,8 @@ def test_arrays_are_handed_over_element_by_element(bay):
         BlockVariable(section="VAR_OUTPUT", name="aDoubled", type="ARRAY [0..3] OF LREAL"),
     )
     body = "".join(f"aDoubled[{k}] := 2.0 * aPlaces[{k}];\n" for k in range(4))
-    block = attrs.evolve(bay, variables=(*bay.variables, *extra), body=body)
+    block = interface_of(bay)
+    block = attrs.evolve(block, variables=(*block.variables, *extra), body=body)
     wrapper = planner_wrapper(block, {"": 1.0}, motion_libraries.VELOCITY)
     assert "aPlaces :=" not in wrapper.body
     outputs = FunctionBlock(wrapper.text(), (block.text(),)).call(aPlaces=[1.0, 2.0, 3.0, 4.0])

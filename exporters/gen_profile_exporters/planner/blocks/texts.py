@@ -241,6 +241,8 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cPlan": plan,
         "cFuture": plan + 4,
         "cOwnWork": 90,  # operations of every cycle
+        # operations that an axis has for programmes in a cycle in the mean, where all of them plan
+        "cCycleWork": max(500, operations(c) // len(c.axes) - 340 - 5 * slots),
         # operations where a programme is found, and the next begins
         "cFoundWork": 250 + 8 * slots + 15 * swings,
         "cReserve": 150 + 30 * swings,  # operations behind a part of the search
