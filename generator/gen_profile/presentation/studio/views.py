@@ -149,6 +149,7 @@ def _verdict(planned: Plan) -> Part:
     peaks = np.array([peak(one.sway) for one in evaluation.swing.at(times)])
     worst, load = np.unravel_index((peaks / limits).argmax(), peaks.shape)
     figures = planned.figures
+    passage = planned.passage
     inside = load in range(*spec.machine().end_load.indices(len(limits)))
     return {
         "part": "verdict",
@@ -163,6 +164,8 @@ def _verdict(planned: Plan) -> Part:
         "sway_worst": figures["sway_transient_worst_m"],
         "sway_allowed": spec.limits.sway,
         "point": point(own_method(spec), figures),
+        "one_by_one": None if passage is None else passage.one_by_one,
+        "room": None if passage is None else passage.nearest.room,
         "solver_time": planned.solver_time,
         "iterations": None if planned.solution is None else planned.solution.iterations,
     }

@@ -265,6 +265,8 @@
         ["residual", mm(part.residual)],
         ["margin", mm(part.allowed - part.residual)],
       ];
+      if (part.one_by_one) facts.splice(1, 0, ["over.one_by_one", `${numbers.local(numbers.digits(part.one_by_one, 4))} s`]);
+      if (part.room !== null) facts.push(["over.room", mm(part.room)]);
       $("facts").replaceChildren(...facts.map(([key, value]) => element("div", {}, element("dt", {}, filled(key, { load: phrase(part.load) })), element("dd", {}, value))));
       listDesigns();
     },
