@@ -75,6 +75,7 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
             7001,
             490,
         ),  # no fault: a slow interval's limit holds three slots before it, where the target was
+        (100, 1, 81),  # 0.6 m beyond the stated ends, of an axis whose stick was at 0 beside another's
     ],
     "slow": [
         (100, 3, 45),  # 25 s against its stick, as pulses alone turned it round
@@ -103,6 +104,7 @@ FORMER = {  # of each of `mutants.MACHINES`: how many histories are drawn, seed,
     "bridge": [
         (600, 1032155232, 160),  # 14 s backwards, as the rest of a plan that was removed in part was a stop
         (600, 1032155232, 22),  # 234 s to a target, as what is left broke each rise of the pulses off
+        (100, 1, 56),  # 0.2 m beyond the stated ends, of an axis whose stick was at 0 beside another's
     ],
     "damped": [
         (300, 5, 16),  # never ready again: a kernel sought as a plan that was dropped while it was unfolded

@@ -13,9 +13,14 @@ from gen_profile.assurance.proof.habits import Change
 from gen_profile.assurance.proof.histories import Histories, History
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
+from gen_profile.spec.reading import preset_spec
 
 pytestmark = pytest.mark.slow
 
+FAST = (
+    "{x={velocity=2.2, acceleration=0.72, jerk=4.9, travel=[0.0, 60.0]}, "
+    "y={velocity=0.77, acceleration=0.23, jerk=0.6, travel=[0.0, 30.0]}}"
+)
 AXIS = "aActualVelocity[nAxis]"
 WRONG = {  # of a machine, what a block does that is right where an input is 0, and wrong where it is 1
     "followed": {
@@ -90,3 +95,27 @@ def test_an_axis_comes_to_rest_where_there_is_no_room_to_calm_its_load():
     with ClosedLoop(spec, text_of("followed"), Histories.of(spec)) as loop:
         run = loop.run(history)
         assert 0 < run.stands * loop.cycle < 120.0
+
+
+@pytest.mark.parametrize(("after", "first"), [(0.1, ""), (0.6, ""), (0.6, " OR bStopsFirst")])
+def test_an_axis_whose_stick_is_at_zero_is_stopped_where_another_takes_over(after, first):
+    """Its trolley went on for 3 m: what led to the target was removed as it would have been executed."""
+    changes = [f"limits.axis={FAST}", "planner.live={L=[3.0, 9.0]}", "export.cycle_time=0.004"]
+    spec = preset_spec("gantry-crane", changes)
+    text, histories = planner_block(spec).text, Histories.of(spec)
+    assert first in text
+    sticks = Command(time=5.0 + after, command="velocity", values=(2.2, 0.0), live={})
+    history = History(
+        live={"L": 5.5},
+        parameters=dict(spec.plant.parameters) | {"L": 5.5},
+        places=(30.0, 15.0),
+        axes=histories.axes,
+        commands=(
+            Command(time=5.0, command="position", values=(0.0, 0.0), live={}),
+            sticks,
+            Command(time=35.0, command="stop", values=(), live={}),
+        ),
+    )
+    [(_, one)] = judged(spec, text.replace(first, ""), histories, [history])
+    found = kinds_of(spec, one)
+    assert found == ({"an axis that is to stop goes farther than any stop need"} if first else set())

@@ -30,6 +30,9 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import UNPROVEN, BlockAxis
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
+# of the allowed sway, too little to be seen: stated bounds of sway and stops may be left by so much
+NOTHING = 0.01
+MISJUDGED = 0.1  # of the greatest velocity, which an operator takes for the stick's own, or for standing
 
 LATENESS = 1.5  # times what is possible, that any machine may take where its spec does not say otherwise
 PLANNING = 1.0  # s, beside that, as a motion has to be planned first

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_profile.assurance.proof import statements
+from gen_profile.assurance.proof import statements, stopping
 from gen_profile.assurance.proof.followed import (
     EXACT,
+    MISJUDGED,
     SLOT,
     Allowance,
     Followed,
@@ -21,7 +22,6 @@ from gen_profile.assurance.proof.followed import (
 from gen_profile.assurance.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
 from gen_profile.assurance.proof.promptness import lost
 
-MISJUDGED = 0.1  # of the greatest velocity, which an operator takes for the stick's own, or for standing
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
 _LINES = (Path(__file__).parents[2] / "lists" / "obedience.txt").read_text("utf-8").splitlines()
@@ -53,7 +53,7 @@ def measured(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[All
         without the order; None for none at all.
     """
     own = (lost, _directions, _velocity_limits, _sticks, _quick_stops)
-    for judge in (*own, *statements.JUDGES):
+    for judge in (*own, *stopping.JUDGES, *statements.JUDGES):
         yield from judge(run)
     yield from _reactions(run, reactions)
 

@@ -9,6 +9,7 @@ import numpy as np
 from gen_profile.assurance.proof.followed import (
     EXACT,
     IN_VELOCITY,
+    NOTHING,
     SLOT,
     Allowance,
     Followed,
@@ -25,12 +26,10 @@ from gen_profile.assurance.proof.orders import (
     NO_MOTION,
     POSITION,
     QUICK_STOP,
-    STOP,
     VELOCITY,
     Flags,
     TimedOrder,
 )
-from gen_profile.motion.profile import Array
 from gen_profile.planner.events import KEPT_EVENTS
 
 BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
@@ -38,12 +37,8 @@ FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis w
 NOTICED = 0.2  # periods, in which the end of a motion is
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
-# of the allowed sway, too little to be seen: stated bounds of sway and stops may be left by so much
-NOTHING = 0.01
 LEFT, OVERSTATED = "left by errors", "overstated"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
-ACTS = 2.0  # slots, in which what a stick asked for is led to
-CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 TAKEN_UP = 2  # cycles, in which a blocked interval is
 SHOWN = (10, 20, 21, 22, *range(50, 60), *range(60, 67), 70)  # codes of events that other outputs show, too
 COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
@@ -233,125 +228,6 @@ def _moves_as_stated(run: Followed, order: TimedOrder) -> bool:
     return all(gap < BARELY * own.velocity for gap, own in zip(apart.tolist(), run.limits, strict=True))
 
 
-def stops(run: Followed) -> Iterator[Allowance]:
-    """Judge where a stop leads by the ends that are stated in every cycle."""
-    low, high = run.of("fStopLow"), run.of("fStopHigh")
-    applies = run.guided & ~_fenced(run)
-    up, down = (high - run.position) * applies, (run.position - low) * applies
-    apart = np.abs(run.of("fStopDistance") - np.maximum(high - run.position, run.position - low))
-    yield from greatest("stop distance", apart, EXACT)
-    yield from greatest("ends", -np.minimum(up, down), NOTHING * run.sway_limit)
-    widest = max(limits.margin for limits in run.limits) + EXACT
-    apart = np.maximum(high - run.position, run.position - low) * ~run.guided
-    yield from greatest("loose", apart, widest)
-    targets = list[tuple[float, ...]]()
-    for order in run.orders:
-        if order.kind in (POSITION, VELOCITY) and not run.reserve:  # else it may be calmed beyond
-            yield from _within_travel(run, slice(order.begin, order.end), low, high)
-        # the ends that an interlock saw as it stopped the axis
-        begin = max(0, order.begin - (order.kind in (STOP, VELOCITY)))
-        own = slice(begin, order.end)
-        if order.kind == POSITION:
-            targets.append(order.values)
-        let_go = order.kind == VELOCITY and not any(order.values)
-        if not let_go and order.kind not in (STOP, QUICK_STOP):
-            continue
-        place = run.position[:, own]
-        lowest, highest = (
-            most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
-        )
-        if not (run.reserve and _just_taken_over(run, order.begin)):  # else what swings then is calmed
-            leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own]
-            calms = CALMS * max(limits.margin for limits in run.limits)
-            yield from greatest(
-                "ends", leaves - _asked(run, order, own), NOTHING * run.sway_limit + calms, begin
-            )
-        if let_go:
-            continue
-        if order.kind == QUICK_STOP:
-            # it brakes on when another order comes, unless it is let go
-            after = begin + np.flatnonzero(run.stands[begin:] | ~run.guided[begin:])[:1]
-            last = [*after, order.end - 1][0]
-            rest = run.position[:, last][:, None]
-            highest, lowest = np.maximum(highest, rest), np.minimum(lowest, rest)
-            wide = np.maximum(high[:, own] - highest, lowest - low[:, own]) * applies[own] * run.guided[last]
-            margin = max(limits.margin for limits in run.limits)
-            yield from greatest("loose", wide, margin + EXACT, begin)
-        known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
-        yield from _no_wider(run, order, own, known, np.maximum(up, down))
-
-
-def _no_wider(run: Followed, order: TimedOrder, own: slice, known: Array, wide: Array) -> Iterator[Allowance]:
-    """Judge how wide the ends of a stop are, as it begins and once the axes rest.
-
-    Parameters
-    ----------
-    known : (axes,) array
-        m, to the farthest target so far: a stop that is not planned yet may end beyond it.
-    wide : (axes, cycles) array
-        m, from the axes to the farther ends.
-    """
-    takes = in_time(run, to_speeds(run, _while_it_reacts(run, own.start)))
-    rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
-    for k, limits in enumerate(run.limits):
-        leads = known[k] + limits.velocity * takes
-        yield Allowance("loose", own.start, wide[k, order.begin], leads)
-        yield from greatest("loose", wide[k, own] * rests, limits.margin + EXACT, own.start)
-
-
-def _while_it_reacts(run: Followed, cycle: int) -> Array:
-    """Tell how fast axes may become before a block has taken up a command, (axes,)."""
-    fastest = np.array([own.velocity for own in run.limits])
-    gained = run.reaction * np.array([own.acceleration for own in run.limits])
-    return np.asarray(np.minimum(np.abs(run.velocity[:, cycle]) + gained, fastest))
-
-
-def _just_taken_over(run: Followed, cycle: int) -> bool:
-    """Whether the axes have not stood since they were taken over, but for the cycle before."""
-    begun = max(at for at in run.enabled if at <= cycle)
-    return not run.stands[begun : max(begun, cycle - 1)].any()
-
-
-def _asked(run: Followed, order: TimedOrder, own: slice) -> Array:
-    """Tell how far a stick that is let go of may lead on, by what it asked for last, (axes, cycles)."""
-    lasts = ACTS * SLOT * run.period
-    since, until = (order.begin + sign * run.after(lasts) for sign in (-1, 1))
-    asked = np.zeros((len(run.axes), own.stop - own.start))
-    for last in run.orders:
-        if order.kind == last.kind == VELOCITY and since < last.end and last.begin < order.begin:
-            speeds = np.minimum(np.abs(last.values), last.tops)
-            np.maximum(asked, lasts * speeds[:, None], out=asked)
-    asked[:, max(0, until - own.start) :] = 0.0
-    return asked
-
-
-def _within_travel(run: Followed, own: slice, lows: Array, highs: Array) -> Iterator[Allowance]:
-    """Measure how far stated ends of a stop lie beyond the travel, and axes beyond the targets' range."""
-    since = slice(max(0, own.start - 1), own.stop)
-    for k, (low, high, limits) in enumerate(zip(lows, highs, run.limits, strict=True)):
-        first, last = limits.targets[0] - limits.margin, limits.targets[1] + limits.margin
-        place, beyond = run.position[k, own], np.maximum(first - low[since], high[since] - last)
-        beyond *= beyond[0] <= EXACT  # else it is on its way back from there
-        yield from greatest("loose", beyond, EXACT, own.start)
-        first, last = limits.targets
-        damps = run.damped[since].any()
-        if first <= place[0] <= last and run.stands[own.start - 1] and not damps:
-            beyond = np.maximum(first - place, place - last)
-            yield from greatest("outside", beyond, limits.margin + EXACT, own.start)  # room to damp in
-
-
-def _fenced(run: Followed) -> Flags:
-    """Tell when an axis is within an interval that was blocked where it was, or beyond its travel."""
-    fenced = np.zeros(run.cycles, dtype=bool)
-    for place, limits in zip(run.position, run.limits, strict=True):
-        low, high = limits.targets
-        fenced |= (place < low - limits.margin) | (place > high + limits.margin)
-    for zone in run.zones:
-        own, place = slice(zone.begin, zone.end), run.position[zone.axis, zone.begin : zone.end]
-        fenced[own] |= (not zone.limit) & (place > zone.low) & (place < zone.high)
-    return fenced
-
-
 def blocked(run: Followed) -> Iterator[Allowance]:
     """Judge that no axis goes into a blocked interval, nor says that a stop may lead there."""
     low, high = run.of("fStopLow"), run.of("fStopHigh")
@@ -494,4 +370,4 @@ def _swings_on(run: Followed) -> Iterator[Allowance]:
     yield Allowance("understated", after, left - float(stated[after]), NOTHING * run.sway_limit)
 
 
-JUDGES = (truths, velocities, stops, numbers, promises, remains, events, blocked, slowed, taken_over)
+JUDGES = (truths, velocities, numbers, promises, remains, events, blocked, slowed, taken_over)
