@@ -227,6 +227,22 @@ def test_a_prompt_stop_is_never_faster_than_the_axis_was_and_says_what_is_left(b
     assert stop["bPromise"][-1] == (stop["fSwayLeft"][-1] <= min(spec.check.residual_sway.values()))
 
 
+@pytest.mark.parametrize("seed", [21, 68])
+def test_after_a_prompt_stop_that_leaves_too_much_a_far_target_begins_and_brings_the_promise_back(bay, seed):
+    spec, compiled = bay
+    random = np.random.default_rng([5, seed])
+    history = History(spec, compiled, random)
+    away = 2.0 if history.place > 20.0 else 38.0
+    history.hold(random.uniform(1.0, 14.0), bExecute=1.0, fTarget=away)
+    stop = history.hold(20.0, bStop=1.0, bPrompt=1.0)
+    assert not stop["bPromise"][-1]
+    far = 38.0 if stop["fPosition"][-1] < 20.0 else 2.0
+    moves = history.hold(60.0, bStop=0.0, bPrompt=0.0, bExecute=1.0, fTarget=far)
+    assert moves["fVelocity"][int(1.0 / history.cycle)] != 0.0
+    assert moves["fPosition"][-1] == pytest.approx(far, abs=1e-9) and moves["bPromise"][-1]
+    history.keeps()
+
+
 def test_no_speed_is_above_a_limit_however_little_that_falls(bay):
     """Neither the ramp to it, nor one that is kept, nor the stop behind it."""
     spec, compiled = bay
