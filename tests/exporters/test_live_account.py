@@ -14,7 +14,7 @@ LOAD = 1400.0
 ORDERS = {
     "nOrder": "DINT", "fTaken": "LREAL", "nBefore": "DINT", "nSlots": "DINT", "nMet": "DINT", "nGap": "DINT",
     "fAfter": "LREAL", "fPart": "LREAL", "bRests": "BOOL", "fRope": "LREAL",
-    "fSwing": "LREAL", "fSwingRate": "LREAL",
+    "fSwing": "LREAL", "fSwingRate": "LREAL", "bTaken": "BOOL",
 }  # fmt: skip
 BUDGET = 9000
 SENSOR = 'planner.sensor={quantity="angle", of="theta1", noise=0.002, offset=0.005, delay=[0.05, 0.15]}'
@@ -241,7 +241,7 @@ def test_a_machine_with_a_sensor_is_followed_on_the_rope_that_it_has():
     spec = preset_spec("bay-crane", changes)
     account = Account(spec)
     account.call(5)
-    account.call(23, fSwing=0.2, fSwingRate=0.1)
+    account.call(23, bTaken=1.0, fSwing=0.2, fSwingRate=0.1)
     for coefficient in (0.1, -0.2, 0.3):
         account.call(1, fTaken=coefficient)
     _, left, *_ = account.call(22)
@@ -325,7 +325,7 @@ def test_a_measured_mode_takes_the_place_of_what_the_axis_alone_caused(spec, acc
     ends = []
     for swing, rate in ((None, None), (0.3, -0.1), (0.0, 0.0)):
         if swing is not None:
-            account.call(23, fSwing=swing, fSwingRate=rate)
+            account.call(23, bTaken=1.0, fSwing=swing, fSwingRate=rate)
         account.call(1)
         *_, values, _rows = account.call(2, nSlots=3, nMet=2)
         ends.append(2.0 * SLOT * np.hypot(values[0:4:2], values[1:4:2]))
