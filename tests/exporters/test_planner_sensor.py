@@ -336,9 +336,8 @@ TANK = [
 ]
 
 
-def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
-    text = planner_block(preset_spec("flexible-joint", JOINT)).text
-    assert "cWork : DINT := 18364;" in text  # it swings in a third of a second, and waits for plans
+def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault(written):
+    text = written(preset_spec("flexible-joint", JOINT))
     compiled = compile_counting(text)
     random, sound = np.random.default_rng(0), {"noise": 0.0002, "offset": -0.001, "delay": 0.002}
     arm = MeasuredJoint(CountedBlock(compiled), inertia=0.003368, swing=(0.03, -0.864))
@@ -352,8 +351,8 @@ def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
     assert np.abs(issued["sway"][-500:]).max() < 0.005
 
 
-def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes():
-    compiled = compile_counting(planner_block(preset_spec("slosh-tank", TANK)).text)
+def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes(written):
+    compiled = compile_counting(written(preset_spec("slosh-tank", TANK)))
     random = np.random.default_rng(0)
     tank = MeasuredTank(CountedBlock(compiled), fill=0.26, swing=(0.02, 1.0))
     tank.run(1.0, noise=0.0002, delay=0.005, random=random, fTarget=1.0, bExecute=1.0)

@@ -21,7 +21,7 @@ from gen_profile.planner.machine import (
     second_order_sway,
     sway_model,
 )
-from gen_profile.planner.sensor import between, sensor_constants
+from gen_profile.planner.sensor import between, modal_model, sensor_constants
 from gen_profile.planner.stated import LEAST_RATE, quick_limits, target_range, unstated_limits
 from gen_profile.spec.model import Spec
 from gen_profile.spec.stack_rules import refuse_stacks
@@ -158,9 +158,7 @@ def _sway(spec: Spec, modes_of_live: LiveModes) -> SwayConstants | None:
     """Find how the loads sway on any ropes, where the block follows them."""
     if not spec.planner.live_rate and spec.planner.sensor is None:
         return None
-    found = sway_model(spec, modes_of_live.interpolant)
-    if found is None:
-        return None
+    found = sway_model(spec, modes_of_live.interpolant) or modal_model(spec, modes_of_live.interpolant)
     return SwayConstants(
         curvatures=found.curvatures, exponents=found.exponents, coefficients=found.coefficients
     )

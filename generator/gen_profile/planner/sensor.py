@@ -22,7 +22,7 @@ from gen_profile.planner.directions import (
     sensed_directions,
     shown_of_modes,
 )
-from gen_profile.planner.machine import DEGREES, MOST_TERMS, frequency_errors
+from gen_profile.planner.machine import DEGREES, MOST_TERMS, SYMMETRIC, frequency_errors
 from gen_profile.planner.stated import damping_room
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
@@ -185,6 +185,24 @@ def _constants(
         room=damping_room(spec),
         estimation_error=estimation_error(spec),
     )
+
+
+def modal_model(spec: Spec, known: Interpolant) -> Interpolant:
+    """Find how the modes of a measured machine swing whose loads do not hang on ropes.
+
+    The squares of their frequencies, as they swing while they decay, as `sway_model` gives them; then the
+    diagonal matrix of these, decays, and what an acceleration does to the load that each makes sway most.
+    `known` are the same frequencies, whose degree and bends are taken.
+    """
+    direction = next(iter(sensed_directions(spec).values()))
+
+    def rows(point: Sequence[float]) -> Array:
+        one = _sensed(spec, point, direction)
+        squares = one.frequencies**2 - one.decays**2
+        invariants = [squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares
+        return np.array([*invariants, *np.diag(squares).ravel(), *one.decays, *one.push])
+
+    return interpolate(rows, known.curvatures, int(known.exponents.max(initial=0)))
 
 
 def estimation_error(spec: Spec) -> float:

@@ -26,7 +26,8 @@ def target_range(spec: Spec, axis: int) -> tuple[float, float]:
     """Least and greatest target of an axis, where its travel is stated: with room for calming and damping."""
     travel = spec.limits.of(axis).travel
     assert travel is not None
-    margin = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else damping_room(spec)
+    calming = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else 0.0
+    margin = max(calming, damping_room(spec))
     return travel[0] + margin, travel[1] - margin
 
 

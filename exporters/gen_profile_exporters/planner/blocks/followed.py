@@ -53,14 +53,15 @@ def account_texts(c: PlannerConstants) -> str:
         "live": max(1, len(c.live)), "swing": swings, "mode": modes, "entry": rows * slots, "row": rows,
         "pair": rows // 2, "plan": plan, "power": max(1, len(c.live)) * _degrees(c), "matrix": modes**2,
         "turn": machines * modes**2, "push": 4 * swings, "state": 2 * swings, "sweep": 2 * modes * swings,
-        "sum": 2 * swings, "model_row": modes + modes**2, "step": max(3, 2 * modes), "machine": machines,
-        "part": 6 * terms(c, _longest_slot(c)),
+        "sum": 2 * swings, "model_row": len(_sway(c).coefficients), "step": max(3, 2 * modes),
+        "machine": machines, "part": 6 * terms(c, _longest_slot(c)),
     }  # fmt: skip
     of_account = _of_account(c)
     values: dict[str, str | int] = {
         "follow_work": str(of_account.pop("cFollowWork")),
         "account": f"{name}_account",
         "rope_model": f"{name}_rope_model",
+        "is_modal": int(len(_sway(c).coefficients) > modes + modes**2),
         **{f"last_{array}": length - 1 for array, length in lengths.items()},
         "swings": swings,
         "mode_count": modes,

@@ -294,10 +294,12 @@ def filled(part: str, **values: str | int) -> str:
 
     What stands between ``@where_follows`` and ``@end`` is for a rope that changes on the way, where
     ``follows`` is given and not 0; between ``@where_stays`` and ``@end`` for one that does not; and
-    between ``@where_measured`` and ``@end`` for a load that is measured, where ``is_measured`` is not 0.
+    between ``@where_measured`` and ``@end`` for a load that is measured, where ``is_measured`` is not 0,
+    and likewise ``@where_modal`` for loads that do not hang on ropes.
     """
     follows = bool(values.get("follows"))
-    stated = {"follows": follows, "stays": not follows, "measured": bool(values.get("is_measured"))}
+    stated = {"follows": follows, "stays": not follows}
+    stated |= {part: bool(values.get(f"is_{part}")) for part in ("measured", "modal")}
     text = WHERE.sub(
         lambda some: some[2] if stated.get(some[1], True) else "", (FOLDER / f"{part}.st").read_text("ascii")
     )
