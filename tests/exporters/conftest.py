@@ -51,6 +51,7 @@ NOT_YET = {
     },
     "test_planner_signals": set(),
     "test_planner_takeover": set(),
+    "test_planner_forms": set(),
     "test_planner_wrapper": set(),
     "test_planner_axes": {
         # each axis arrives as soon as it can

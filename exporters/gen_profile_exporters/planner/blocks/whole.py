@@ -77,7 +77,8 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     body = WHERE.sub(lambda part: part[2] if stated[part[1]] else "", EACH.sub(of_axes, body))
     given = {
         **values,
-        "stands_moving": " OR (nState = cStanding)" if c.sensor else "",  # to damp
+        # where a sensor is, it stands to damp
+        "goes_on": "(nState = cMoving) OR (nState = cStanding)" if c.sensor else "nState = cMoving",
         "first_suffix": c.axes[0].suffix,
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
         "shell_constants": constant_lines(_constants(c)),
