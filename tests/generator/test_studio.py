@@ -327,5 +327,6 @@ class TestOverStacks:
         spec = quay()
         shown = {(one.path, one.index): one.value for one in knobs(spec, spec.to_dict(), spec)}
         assert shown["path.rail", None] == 36.0
+        assert ("move.final_velocity", 0) not in shown  # which a path over stacks refuses
         assert [shown["path.load", 0], shown["path.load", 1]] == [2.5, 2.6]
         assert [shown["path.clearance", 0], shown["path.clearance", 1]] == [0.5, 1.0]

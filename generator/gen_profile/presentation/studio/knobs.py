@@ -179,7 +179,7 @@ def _bounds(bounds: Bounds) -> dict[str, Any]:
 def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
     """Tell ways in the unit of each axis, and the duration."""
     ways = ("distance",) if "target" not in stated else ("start", "target")
-    for key in (*ways, "final_velocity"):
+    for key in (*ways, *(["final_velocity"] if spec.path is None else [])):
         for column, axis in enumerate(spec.machine().actuated):
             unit, factor = place_unit(spec, column)
             speed = key == "final_velocity"
