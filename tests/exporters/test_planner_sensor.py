@@ -141,9 +141,17 @@ def test_a_stick_is_obeyed_though_the_load_swings_and_promises_nothing(compiled,
     require_limits(issued)
 
 
-def test_stated_ends_hold_what_damping_takes(compiled):
-    swung = crane(compiled, swing=(0.5, 2.0))
-    issued = swung.run(24.0, bStop=1.0, noise=0.002, offset=0.005, random=np.random.default_rng(6))
+@pytest.mark.parametrize("quickly", [False, True])
+def test_stated_ends_hold_what_damping_takes(compiled, quickly):
+    swung, sound = crane(compiled, swing=(0.3, 2.0)), {"noise": 0.002, "random": np.random.default_rng(6)}
+    swung.run(0.1, **sound)
+    swung.run(8.0 * quickly, **sound, bVelocity=1.0, fVelocityCommand=1.0)
+    begun = len(swung.rows["sway"])
+    swung.run(0.1, **sound, bVelocity=0.0, bStop=1.0, bQuickStop=float(quickly))
+    issued = {name: values[begun:] for name, values in swung.run(20.0, **sound, bQuickStop=0.0).items()}
+    assert (
+        issued["bDamping"].any() and not (issued["bDamping"] * np.abs(issued["fAcceleration"]) > 0.31).any()
+    )
     ahead = issued["fPosition"][::-1]
     lowest, highest = np.minimum.accumulate(ahead)[::-1], np.maximum.accumulate(ahead)[::-1]
     assert np.ptp(ahead) > 0.2

@@ -43,10 +43,7 @@ MACHINES = {
     "a level probe": lambda: preset_spec("slosh-tank", TANK),
 }
 FIRST = {"wide errors": 9}  # histories of each, 30 else, and those that were refused
-KNOWN = {  # a stick that begins late from the end of travel, and a stop that damps beyond its ends
-    "a sensor": (0,),
-    "two sensors": (26,),
-}
+KNOWN = {"a sensor": (0,), "two sensors": (4,)}  # a stick from the end of travel is late, one damps once more
 FORMER = {
     "bay": (157, 222),  # stated ends of a stop as far as an axis had been beyond its travel
     "zones": (6, 56),  # a slot of rounding behind the end of a motion, where its target came again
