@@ -351,6 +351,16 @@ def test_columns_are_chosen_by_their_names(tmp_path):
     assert log.values == pytest.approx(rates, abs=1e-5)
 
 
+def test_a_column_of_names_or_channels_is_none_of_values(tmp_path):
+    """Of InfluxDB's and of CAN loggers the first column beside the times was taken."""
+    times, angles, _ = swing()
+    names = [["", "_result", "0"]] * len(times)
+    path = written(tmp_path, *zip(*names, strict=True), times, angles, head=",result,table,_time,_value")
+    log = read_swing(path, SPEC, unit="rad")
+    assert "the times are those of column 4, the values those of column 5" in notes(log)
+    assert log.values == pytest.approx(angles, abs=1e-5)
+
+
 @pytest.mark.parametrize(
     "drift", [lambda x: 8.0 * x, lambda x: 20.0 * x**2 - 5.0 * x, lambda x: 12.0 * np.sin(2.0 * x)]
 )

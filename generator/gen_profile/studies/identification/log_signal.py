@@ -24,6 +24,7 @@ NAMES = {  # what columns are called that hold a quantity
     "acceleration": re.compile(r".*(acc|beschl).*", re.IGNORECASE),
 }
 ALONE = 0.9  # of a swing, which a sensor shows about one axis where the load swings in one direction
+LOOKED_AT = 100  # rows all over a log, by which a column of values is told from one of names and channels
 NEIGHBOURS = 51  # samples, among which one that jumps stands out
 JUMP = 12.0  # times as far beside the middle of its neighbours as most are around it
 ROUNDS = 3
@@ -32,7 +33,10 @@ STEPS = 10.0  # of a sensor's resolution, which no jump is less than
 
 
 def likely_columns(table: LogTable, quantity: str) -> tuple[str, str]:
-    """Choose the columns of times and of values by their names, or else the first two; numbers from 1."""
+    """Choose the columns of times and of values by their names, or else by what they hold; numbers from 1.
+
+    Of several columns that may hold the values the first one is taken whose numbers change.
+    """
     head = table.head(("1", "2"))
     names = list(table.rows[head]) if table.is_head(head) else []
     clocks = [place for place, name in enumerate(names) if _TIME.fullmatch(name)]
@@ -43,8 +47,15 @@ def likely_columns(table: LogTable, quantity: str) -> tuple[str, str]:
     time = next(iter(running or readable or clocks or counts), 0)
     others = [place for place in range(len(names)) if place not in {*clocks, *counts, time}]
     named = [place for place in others if NAMES[quantity].fullmatch(names[place])]
-    value = next(iter(named or others), 1)
+    swinging = (place for place in others if _changes(table, place, range(first, last + 1)))
+    value = named[0] if named else next(swinging, next(iter(others), 1))
     return str(time + 1), str(value + 1)
+
+
+def _changes(table: LogTable, place: int, rows: range) -> bool:
+    """Tell whether a column holds different numbers in some rows all over a log, and no name or channel."""
+    some = rows[:: max(len(rows) // LOOKED_AT, 1)]
+    return len({number for row in some if not math.isnan(number := table.number(row, place))}) > 1
 
 
 def same_sensor(table: LogTable, head: int, place: int) -> tuple[int, ...]:
