@@ -143,6 +143,12 @@ def test_from_rest_what_swings_is_left_where_it_cannot_be_calmed(blocks):
     assert slower["bQuiet"] and slower["nLater"] == 25
     again = table.ask(CHOOSE)
     assert again["nRamp"] == 30 and again["fRamp"] == pytest.approx(0.3)
+    for _ in range(20):  # and where none is found, it ends in this slot, whatever speed was kept before
+        tried = table.ask(CHOOSE, fKeptNow=1.5)
+        if not tried["nKind"]:
+            break
+        later = table.fails({**tried, "nKind": DECLINE, "nLength": 62}, nOfBefore=32)["nLater"]
+    assert not tried["nKind"] and later < 200
     assert not table.ask(FOUND, nOfKind=DECLINE)["bQuiet"]
 
 
