@@ -24,7 +24,7 @@ NAMES = {  # what columns are called that hold a quantity
     "acceleration": re.compile(r".*(acc|beschl).*", re.IGNORECASE),
 }
 ALONE = 0.9  # of a swing, which a sensor shows about one axis where the load swings in one direction
-LOOKED_AT = 100  # rows all over a log, by which a column of values is told from one of names and channels
+LOOKED_AT = 100  # rows all over a log, by which a column of values differs from one of names and channels
 NEIGHBOURS = 51  # samples, among which one that jumps stands out
 JUMP = 12.0  # times as far beside the middle of its neighbours as most are around it
 ROUNDS = 3
