@@ -39,7 +39,7 @@ MACHINES = 16  # that are watched, where there are operations for them:
 SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
 QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
 QUICK_WORK = 600_000  # for so many in a slot
-FOLLOWING_WORK = 2_800  # operations of a cycle for each mode of a machine that is followed, at least
+FOLLOWING_WORK = 2_800  # operations of a cycle for each mode and axis of a machine that is followed, at least
 COPYING = 22, 1_800  # operations for each slot of the longest programme, and more, where a motion was found
 
 
@@ -104,7 +104,8 @@ def operations(constants: PlannerConstants) -> int:
     """Give what a cycle may spend: what is stated, but more for quick machines and followed ones."""
     period = min(constants.periods)
     cycles = int(period / (SLOTS_PER_PERIOD * constants.cycle))
-    least = FOLLOWING_WORK * constants.modes if constants.rates or constants.sensor else 0
+    follows = constants.rates or constants.sensor
+    least = FOLLOWING_WORK * constants.modes * len(constants.axes) if follows else 0
     return max(constants.operations, least, QUICK_WORK // cycles if period < QUICK else 0)
 
 
