@@ -129,6 +129,15 @@ def test_a_decline_that_fails_is_sought_longer_and_then_behind_a_ramp_to_less(bl
     assert table.ask(CHOOSE)["fRamp"] == 0.5
 
 
+@pytest.mark.parametrize(("command", "next_"), [(SPEED, RAMP), (TARGET, THERE)])
+def test_a_motion_that_leads_beyond_the_places_of_now_is_stopped_first(blocks, command, next_):
+    table = Table(blocks)
+    table.command(command, 0.5, fPlace=0.0)
+    tried = table.ask(CHOOSE, nNow=40, bOutside=1.0)
+    assert (tried["nKind"], tried["nLength"]) == (REST, 20)
+    assert table.ask(CHOOSE, nNow=20, bOutside=0.0)["nKind"] == next_
+
+
 def test_from_rest_what_swings_is_left_where_it_cannot_be_calmed(blocks):
     table = Table(blocks)
     table.command(SPEED, 0.5, fPlace=20.0, bStands=1.0)
