@@ -14,12 +14,12 @@ M1, L2 = 350.0, 1.5
 
 
 @pytest.fixture(scope="module")
-def text():
+def text(written):
     return planner_block(preset_spec("bay-crane")).text
 
 
 @pytest.fixture(scope="module")
-def quiet():
+def quiet(written):
     return planner_block(preset_spec("bay-crane", ["planner.sway_share=0"])).text
 
 
