@@ -200,6 +200,35 @@ def test_a_sensor_that_fails_is_left_out_and_the_axis_comes_to_rest(compiled, nu
         assert swung.run(1.0, bReset=1.0)["nSensorFault"][-1] in SOUND
 
 
+WORSENING = {
+    "reversed": lambda swung: -swung.shown[-26],
+    "late": lambda swung: swung.shown[-151],  # 0.6 s, where 0.05 to 0.15 s are stated
+    "of twice the scale": lambda swung: 2.0 * swung.shown[-26],
+}
+
+
+@pytest.mark.parametrize("name", WORSENING)
+def test_a_sensor_that_becomes_wrong_while_it_damps_makes_little_worse(compiled, name):
+    swung, random = crane(compiled, swing=(0.5, 0.5)), np.random.default_rng(7)
+    swung.run(4.5, noise=0.002, random=random)
+    assert swung.rows["bDamping"][-1]
+    issued = swung.run(60.0, sensor=lambda *_: WORSENING[name](swung) + 0.002 * random.standard_normal())
+    assert np.abs(issued["sway"]).max() <= 0.5 + 2.0 * 1.25 * 0.5  # as the proof allows
+    swings = np.abs(issued["sway"][-2000:]).max()
+    assert swings <= ALLOWED or not issued["bPromise"][-1]
+    require_limits(issued)
+
+
+def test_a_target_that_comes_while_it_damps_is_reached(compiled):
+    swung, sound = crane(compiled, swing=(0.5, 0.5)), {"noise": 0.002, "random": np.random.default_rng(8)}
+    swung.run(5.0, **sound)
+    assert swung.rows["bDamping"][-1]
+    issued = swung.run(30.0, **sound, fTarget=STANDS - 8.0, bExecute=1.0)
+    assert issued["bDone"][-1] and issued["bPromise"][-1] and issued["fPosition"][-1] == STANDS - 8.0
+    assert np.abs(issued["sway"][-500:]).max() < ALLOWED
+    require_limits(issued)
+
+
 def test_a_sensor_that_fails_before_it_showed_anything_withdraws_the_promise(compiled):
     swung = crane(compiled, swing=(0.4, 0.5))
     issued = swung.run(2.0, sensor=lambda _, value: np.nan)
