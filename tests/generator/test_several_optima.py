@@ -69,3 +69,13 @@ def test_what_was_tried_is_said(tmp_path, changes, out, err):
     assert done.code == 0
     assert (out or "") in done.out and ("another start" in done.out) == (out is not None)
     assert (err or "") in done.err and ("several optimal motions" in done.err) == (err is not None)
+
+
+@pytest.mark.slow
+def test_a_second_start_is_made_where_limits_bind():
+    """From the quintic IPOPT finds 8580 on 24 even intervals, from the other side 8854."""
+    move = ["move.distance=6.38", "move.duration=5.483", "robustness.order=1", "cost.sway_weight=0"]
+    spec = preset_spec("bay-crane", [*move, "limits={}", "limits.velocity=3.456", "plant.L1=4.41"])
+    found = attempt(problem_of(spec))
+    assert found.optimum.cost < 8700.0
+    assert found.other_costs == pytest.approx((8854.0,), rel=1e-3)

@@ -28,7 +28,8 @@ from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
 ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
-DIRECTLY = 6.0  # likewise for the direct one
+DIRECTLY = 6.0  # likewise for the direct one,
+COMPARING = 3.0  # and for a second start
 NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
 KEPT = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
 REFINING = 0.4  # of the work that is left, for finer meshes that keep the limits
@@ -96,7 +97,7 @@ def _compared(problem: Problem, solution: Solution) -> Solution:
     settled = problem
     if found is not None:  # so that costs compare
         settled = attrs.evolve(problem, sway_weight=found.sway_weight, sway_scale=found.sway_scale)
-    other = afford(partial(_begun, settled, start), min(SOLVING, SETTLING[-1] * left()))
+    other = afford(partial(_begun, settled, start), min(COMPARING, SETTLING[-1] * left()))
     if other is None or other.optimum is None or not keeps_limits(other):
         return attrs.evolve(solution, other_costs=())
     if found is None or other.optimum.cost < BETTER * found.cost:

@@ -48,8 +48,9 @@ ROUGH = 0.1
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
 BELIEVED = 0.03  # least quotient of steps that is taken for how they go on to shrink
 SLOW = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
-BISECTING = 0.6  # fraction of the work that is left, after which a motion on the first mesh will do,
-SETTLING = 0.6  # and likewise one on the last mesh that is not quite of least cost
+BISECTING = 0.6  # fraction of the work that is left, after which a motion on the first mesh will do
+# likewise, for one that is not quite of least cost on the last mesh, and for one that is on the first
+NEXT_TO_IT, SETTLING = 0.4, 0.9
 WORTHWHILE = 1e-3  # relative change of the worst case worth another program; 1e-4 changes costs by 4e-7
 LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
@@ -269,16 +270,29 @@ def resolve_sway_cost(problem: Problem, near: ProgramSequence | None = None) -> 
 
 
 def refined(start: Iterate, goal: Goal) -> ProgramSequence:
-    """Solve programs on a mesh that is bisected as long as that pays and the work reaches."""
+    """Solve programs on a mesh that is bisected as long as that pays and the work reaches.
+
+    Where it does not reach, or the programs do not settle, the cheaper one is taken of the motion of least
+    cost on the first mesh and the one next to the last, which is not quite of least cost.
+    """
     begun: list[tuple[Iterate, Goal]] = []
     result = afford(lambda: _refined(start, goal, begun), BISECTING * left())
-    if result is None and not begun:
+    if result is not None and (result.verdict is not ConicStatus.FAILED or not begun):
+        return result
+    if not begun:
         raise OutOfWork
-    result = result or afford(lambda: sequence(*begun[0]), SETTLING * left())
-    if begun and (result is None or result.verdict is ConicStatus.FAILED):
-        return near_by(*begun[-1])
-    assert result is not None
-    return result
+    others = (
+        afford(lambda: near_by(*begun[-1]), NEXT_TO_IT * left()),
+        afford(lambda: sequence(*begun[0]), SETTLING * left()),
+    )
+    ends = [end for end in (*others, result) if end is not None]
+    if not ends:
+        raise OutOfWork
+
+    def rank(end: ProgramSequence) -> tuple[bool, float]:
+        return end.verdict is not ConicStatus.SOLVED, end.setup.cost(end.iterate, goal.sway_cost)
+
+    return min(ends, key=rank)
 
 
 def near_by(start: Iterate, goal: Goal) -> ProgramSequence:
