@@ -44,12 +44,12 @@ MACHINES = {
     "a level probe": lambda: preset_spec("slosh-tank", TANK),
 }
 FIRST = {
-    "wide errors": 9,
+    "wide errors": 3,
     "two sensors at 1 ms": 8,
 }  # histories of each, 30 else, and those that were refused
 KNOWN = {"a sensor": (0,), "two sensors": (4,)}  # a stick from the end of travel is late, one damps once more
 FORMER = {
-    "bay": (157, 181, 222),  # stated ends of a stop as far as an axis had been beyond its travel
+    "bay": (157, 181, 222),  # an axis that comes back from beyond its travel: ends of a stop, braking
     "zones": (6, 56),  # a slot of rounding behind the end of a motion, where its target came again
     "gantry": (97, 114),  # a stop 0.9 mm beyond its stated ends, a target from rest lost
     "wide errors": (2, 90, 122, 145, 217),  # from rest nothing was found for seconds
