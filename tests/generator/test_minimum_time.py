@@ -259,6 +259,7 @@ LIMITED = {
         "limits.axis.hoist.velocity=0.5",
     ],
     "gantry-crane": ["limits.velocity=1.5", "limits.acceleration=0.4", "limits.jerk=1.0"],
+    "hall-crane": ["limits.velocity=1.0", "limits.acceleration=0.35"],
     "tower-crane": ["limits.axis.slew.acceleration=0.01", "limits.axis.trolley.acceleration=0.2"],
     "flexible-joint": ["limits.velocity=6", "limits.acceleration=60"],
     "mass-spring-chain": ["limits.velocity=0.8", "limits.acceleration=2.0"],
