@@ -509,5 +509,5 @@ def test_a_stack_is_dragged_and_the_way_follows(tmp_path):
         window.find("#undo").click()
         was = ",".join(f"{height:g}" for height in before)
         window.wait(f"{TOPS.replace('[', 'String([', 1)}) === arguments[0]", was)
-        window.wait("return !document.body.matches('.busy, .stale')")
+        window.wait(f"{FRONT} === arguments[0] && !document.body.matches('.busy, .stale')", way)
         assert window.violations() == [] and window.complaints() == []
