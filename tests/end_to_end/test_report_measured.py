@@ -170,7 +170,7 @@ def test_a_log_that_ends_at_the_arrival_is_drawn_and_not_judged(tmp_path, spec, 
     outcome, measured, page = report(tmp_path)
     assert outcome.code == 0 and measured["passed"] is None
     assert measured["sways"]["payload"]["residual_m"] is None
-    assert "for as long as one slow swing after the arrival" in page
+    assert "for the length of one slow swing after the arrival" in page
 
 
 def test_a_log_without_the_move_is_refused(tmp_path, spec, motion):
