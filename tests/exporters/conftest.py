@@ -97,7 +97,6 @@ NOT_YET = {
         "test_a_new_target_on_the_way_brings_all_axes_to_rest_together[blocks-8000-4.0]",
         # the fewest operations that may be stated are too few for two axes
         "test_short_slots_leave_no_cycle_more_work[blocks]",
-        "test_a_long_way_is_held_against_slow_intervals_in_no_more_operations[blocks]",
         # less is left on the way there
         "test_a_far_target_is_approached_where_pulses_are_refused[blocks]",
     },

@@ -23,13 +23,15 @@ def quiet(written):
     return planner_block(preset_spec("bay-crane", ["planner.sway_share=0"])).text
 
 
-def left(velocity, rope, load):
-    """Sway in m that hook or payload is left with at most: two point masses on a rope, little swing."""
+def stiffness(rope, load):
+    """Matrix of two point masses on a rope that swing little: sway'' = -acceleration - matrix sway."""
     ratio = load / M1
-    matrix = np.array(
-        [[(1.0 + ratio) * G / rope + ratio * G / L2, -ratio * G / L2], [-G / L2, G / L2]]
-    )  # sway'' = -acceleration - matrix sway
-    squares, shapes = np.linalg.eig(matrix)
+    return np.array([[(1.0 + ratio) * G / rope + ratio * G / L2, -ratio * G / L2], [-G / L2, G / L2]])
+
+
+def left(velocity, rope, load):
+    """Sway in m that hook or payload is left with at most."""
+    squares, shapes = np.linalg.eig(stiffness(rope, load))
     driven = np.linalg.solve(shapes, np.ones(2))
     times = CYCLE * np.arange(len(velocity))
     waves = [np.trapezoid(velocity * np.exp(1j * np.sqrt(square) * times), dx=CYCLE) for square in squares]
@@ -127,6 +129,19 @@ def test_a_rope_that_changes_while_a_stick_holds_the_axis_at_its_end_keeps_the_p
     assert out["fVelocity"].min() < -0.4
     assert out["nPromise"][-1] == 0
     assert left(out["fVelocity"][begin:], 3.5, 1000.0) < 1e-9
+
+
+@pytest.mark.parametrize(("rope", "longer"), [(4.0, 7.4), (3.0, 9.0), (8.0, 5.0)])
+def test_what_swings_at_rest_goes_on_with_the_same_action_on_another_rope(text, rope, longer):
+    """An oscillator that changes slowly keeps its energy by its frequency: sway goes with 1 / sqrt(omega)."""
+    driver = standing(text, rope, 1000.0).hold(20.0, bExecute=1, fTarget=21.0)
+    before = driver.outputs["fSwayLeft"][-1]
+    after = driver.hold(4.0, fL1=longer).outputs["fSwayLeft"][-1]
+    rates = [np.sqrt(np.sort(np.linalg.eigvals(stiffness(of, 1000.0)))) for of in (rope, longer)]
+    grows = np.sqrt(rates[0] / rates[1])
+    assert before > 0.1 * LIMIT
+    assert 0.999 * grows.min() <= after / before <= 1.001 * grows.max()
+    assert abs(grows - 1.0).max() > 0.08
 
 
 def test_a_stop_on_a_rope_that_stands_takes_as_long_as_planned_where_it_might_change():
