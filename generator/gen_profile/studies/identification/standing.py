@@ -52,8 +52,8 @@ def _later(log: SwingLog, part: int) -> SwingLog:
 def _swings(
     machine: SwingingMachine, names: Sequence[str], readings: Sequence[DirectReading | Period], log: SwingLog
 ) -> bool:
-    fit = fit_of(machine, names, readings, [swing_model(machine, log)])
     try:
+        fit = fit_of(machine, names, readings, [swing_model(machine, log)])
         unknowns, noise = fit.solve()
         if any(misfits(fit, unknowns)):
             return False
