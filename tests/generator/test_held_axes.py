@@ -107,7 +107,7 @@ def test_a_free_axis_keeps_a_narrow_travel(travel):
     move = {"distance": [12.0, 0.0], "duration": "minimum", "free": ["hoist"]}
     limits = {"acceleration": 1.0, "axis": {"hoist": {"travel": travel}}}
     motion = plan(pendulum("minimum", move=move, limits=limits)).motion
-    assert excursion(motion, 1) <= (1.0 + 1e-6) * (travel[1] - travel[0])
+    assert excursion(motion, 1) <= travel[1] - travel[0] + 1e-9  # m: no drive resolves a nanometre
 
 
 def test_a_refused_move_with_an_axis_that_has_no_room_is_answered():
