@@ -291,6 +291,22 @@ def test_a_lower_limit_is_come_to_on_the_way_and_a_place_that_is_closed_too_late
         assert is_void or (stop["fPosition"][-1] - end) * sign <= 0.0
 
 
+@pytest.mark.parametrize(
+    ("rope", "load", "seconds", "room"),
+    [(7.5, 1578.0, 1.5, 0.3), (6.5, 1578.0, 1.5, 0.4), (5.0, 1000.0, 1.0, 0.4), (8.0, 500.0, 1.0, 0.6)],
+)
+def test_a_stop_before_a_place_that_is_closed_may_take_longer_than_the_motion(bay, rope, load, seconds, room):
+    """There is none in fewer slots than were committed; in more the load is calmed as the axis comes back."""
+    cycle = bay[0].export.cycle_time
+    block = CountedBlock(bay[1], fActPosition=20.0, fL1=rope, fm2=load)
+    block.hold(200)
+    end = block.hold(round(seconds / cycle), bExecute=1.0, fTarget=22.2)["fPosition"][-1] + room
+    stop = block.hold(round(16.0 / cycle), bStop=1.0, fHighest=end)
+    assert not stop["bVoid"].any() and stop["bPromise"].all()
+    assert stop["fPosition"].max() <= end + 1e-9
+    assert stop["fVelocity"][-1] == 0.0
+
+
 @pytest.mark.slow
 def test_the_interpreter_issues_the_same_bits():
     spec = preset_spec("paper", list(PAPER))
