@@ -63,7 +63,7 @@ NOT_YET = {
         "test_no_cycle_takes_more_operations_on_the_way_either[blocks]",
         "test_planning_takes_27_cycles_of_3000_operations_at_most[blocks]",
         "test_three_modes_are_left_at_rest_in_little_more_than_the_shortest_time[blocks]",
-        # more operations than are stated, as these machines are quick
+        # refuses the operations that are stated, as these machines are quick
         "test_no_machine_takes_more_operations[blocks-mass-spring-chain]",
         "test_no_machine_takes_more_operations[blocks-paper]",
         "test_no_machine_takes_more_operations[blocks-slosh-tank]",

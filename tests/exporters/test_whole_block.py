@@ -17,6 +17,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block
 from gen_profile.planner.interface import block_axes, live_inputs
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile.support.errors import SpecError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.blocks.texts import operations
 from gen_profile_exporters.planner.blocks.whole import whole_block
@@ -161,6 +162,27 @@ def test_a_cycle_of_a_millisecond_has_operations_enough(changes):
     out.append(block.hold(60_000, bExecute=1.0, fTarget=39.0))
     assert [part["fPosition"][-1] for part in (out[1], out[3])] == [4.0, 39.0]
     assert max(part["operations"].max() for part in out) <= operations(planner_constants(spec)[1])
+
+
+QUICK = [
+    "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
+    "planner.live={L1=[0.3, 0.6]}",
+]
+
+
+@pytest.mark.parametrize(
+    ("preset", "changes"),
+    [("paper", QUICK), ("bay-crane", ["planner.live_rate={L1=0.25}", "export.cycle_time=0.001"])],
+    ids=["quick", "followed"],
+)
+def test_fewer_operations_than_a_machine_needs_are_refused_and_the_least_are_the_default(preset, changes):
+    least = operations(planner_constants(preset_spec(preset, changes))[1])
+    with pytest.raises(SpecError, match=f"operations: at least {least} for this machine, found {least - 1}"):
+        whole_text(preset_spec(preset, [*changes, f"planner.operations={least - 1}"]))
+    stated = preset_spec(preset, [*changes, f"planner.operations={least}"])
+    assert f"cOperations : DINT := {least};" in whole_text(stated)
+    more = preset_spec(preset, [*changes, f"planner.operations={least + 500}"])
+    assert operations(planner_constants(more)[1]) == least + 500
 
 
 def test_an_axis_whose_stick_is_at_zero_rests_as_after_a_stop_while_the_other_one_is_led():

@@ -61,6 +61,8 @@ class PlannerConstants:
         Whether blocked and slow intervals of the travel are inputs.
     operations : int
         That a cycle may spend.
+    states_operations : bool
+        Whether the spec states them: they are not to be more.
     periods : sequence of float
         s, of the slowest mode at the corners of the live ranges.
     sway_share : float
@@ -106,6 +108,7 @@ class PlannerConstants:
     events: bool
     zones: bool
     operations: int
+    states_operations: bool
     periods: Sequence[float]
     sway_share: float
     stated_error: float

@@ -125,6 +125,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         events=spec.planner.events,
         zones=spec.planner.zones,
         operations=operations,
+        states_operations=spec.planner.operations is not None,
         periods=tuple(
             2.0 * np.pi / _rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live)
         ),

@@ -8,6 +8,8 @@ import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
+from gen_profile.support.errors import SpecError
+from gen_profile.support.phrase import Phrase, placed
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE
 from gen_profile_exporters.planner.constants import PlannerConstants
@@ -101,12 +103,23 @@ def linear_programme(name: str, *, slots: int, rows: int) -> str:
 
 
 def operations(constants: PlannerConstants) -> int:
-    """Give what a cycle may spend: what is stated, but more for quick machines and followed ones."""
+    """Give what a cycle may spend; by default no less than quick machines and followed ones need.
+
+    Raises
+    ------
+    SpecError
+        Less is stated than this machine needs.
+    """
     period = min(constants.periods)
     cycles = int(period / (SLOTS_PER_PERIOD * constants.cycle))
     follows = constants.rates or constants.sensor
     least = FOLLOWING_WORK * constants.modes * len(constants.axes) if follows else 0
-    return max(constants.operations, least, QUICK_WORK // cycles if period < QUICK else 0)
+    least = max(least, QUICK_WORK // cycles if period < QUICK else 0)
+    if constants.states_operations and constants.operations < least:
+        template = "at least {least} for this machine, found {found}"
+        problem = Phrase(template, least=least, found=constants.operations)
+        raise SpecError(placed("planner.operations", problem))
+    return max(constants.operations, least)
 
 
 def longest(constants: PlannerConstants) -> int:
