@@ -63,13 +63,16 @@ NOT_YET = {
         "test_no_cycle_takes_more_operations_on_the_way_either[blocks]",
         "test_planning_takes_27_cycles_of_3000_operations_at_most[blocks]",
         "test_three_modes_are_left_at_rest_in_little_more_than_the_shortest_time[blocks]",
-        # refuses the operations that are stated, as these machines are quick
+        # refuses the operations that are stated, as these machines are quick, or followed
+        "test_a_rope_that_never_stands_still_is_taken_over[blocks]",
+        "test_a_stop_in_a_long_motion_ends_long_before_it[blocks]",
+        "test_it_computes_what_the_text_says[blocks-changes1-orders1]",
         "test_no_machine_takes_more_operations[blocks-mass-spring-chain]",
         "test_no_machine_takes_more_operations[blocks-paper]",
         "test_no_machine_takes_more_operations[blocks-slosh-tank]",
     },
     "test_planner_far": {
-        # never moves
+        # refuses the operations that are stated
         "test_a_slow_drive_reaches_its_share_of_full_speed_where_the_rope_may_change_on_the_way[blocks]",
         # all at 3,000 operations a cycle, the fewest that may be stated
         "test_a_slow_drive_that_goes_to_a_target_is_stopped_by_a_stick_the_other_way[blocks]",
@@ -102,6 +105,7 @@ NOT_YET = {
         "test_a_new_target_on_the_way_brings_all_axes_to_rest_together[blocks-8000-4.0]",
         # the fewest operations that may be stated are too few for two axes
         "test_short_slots_leave_no_cycle_more_work[blocks]",
+        "test_a_long_way_is_held_against_slow_intervals_in_no_more_operations[blocks]",
         # less is left on the way there
         "test_a_far_target_is_approached_where_pulses_are_refused[blocks]",
     },
@@ -120,8 +124,7 @@ def written(request):
         yield getattr(request, "param", None)
 
 
-@pytest.fixture(autouse=True)
-def not_yet(request):
-    named = NOT_YET.get(request.module.__name__.rpartition(".")[2], ())
-    if request.node.name in named:
-        request.node.add_marker(pytest.mark.xfail(strict=True, reason="not of the blocks yet"))
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.name in NOT_YET.get(item.path.stem, ()):
+            item.add_marker(pytest.mark.xfail(strict=True, reason="not of the blocks yet"))
