@@ -79,6 +79,7 @@ END_FUNCTION_BLOCK
     def follow(self, accelerations, ropes):
         for acceleration, rope in zip(accelerations, ropes, strict=True):
             self.rope = rope
+            self.call(14)
             self.call(21, fTaken=acceleration)
 
 
@@ -253,6 +254,25 @@ def test_a_machine_with_a_sensor_is_followed_on_the_rope_that_it_has():
         for s in stretches(account)
     ]
     assert left == pytest.approx(max(due), rel=1e-4)
+
+
+def test_a_machine_between_both_ends_of_wide_errors_is_left_with_no_more_than_is_stated():
+    """Of two pushes far apart, those halfway to an end are left with more than ends and that as given."""
+    changes = ["planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}", SENSOR, DISTURBANCE]
+    spec = preset_spec("bay-crane", [*changes, "check.uncertain={L1=0.2}"])
+    account = Account(spec)
+    account.call(5)
+    account.call(1)
+    machines = 1.0 + account.constants.stated_error * np.linspace(-1.0, 1.0, 41)
+
+    trial = np.r_[0.02, np.zeros(95), -0.02]
+    coefficients, ropes = np.r_[0.0, 0.0, 0.0, trial, 0.0, 0.0], (len(trial) + 3) * [6.0]
+    left = [shown(spec, 6.0, ahead(spec, np.zeros(4), coefficients, ropes, s), s).sum() for s in machines]
+    account.call(3, trial, nSlots=len(trial), fPart=1.0)
+    account.call(4)
+    account.call(6)
+    assert max(left) > 1.1 * max(left[0], left[20], left[-1])
+    assert account.call(22)[1] == pytest.approx(max(left), rel=0.03)
 
 
 def test_plans_are_weighed_committed_foreseen_and_calm_or_not(spec, account):

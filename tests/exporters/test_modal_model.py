@@ -9,7 +9,7 @@ from gen_profile.planner.design import planner_constants
 from gen_profile.planner.directions import driven_modes, linearized
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.followed import ENDS, LEFT_OUT, account_texts, terms
+from gen_profile_exporters.planner.blocks.followed import ENDS, LEFT_OUT, account_texts, between, terms
 
 MACHINES = {"flexible-joint": [*JOINT, "plant.c=0.04"], "slosh-tank": TANK}
 CALLED = """FUNCTION_BLOCK Called
@@ -43,7 +43,7 @@ def over_a_slot(frequency, decay, time):
 def test_modes_turn_fade_and_are_pushed_as_they_are(machine):
     spec = preset_spec(machine, MACHINES[machine])
     constants = planner_constants(spec)[1]
-    n, machines, at = constants.modes, 1 + len(ENDS), linearized(spec, [])
+    n, machines, at = constants.modes, 1 + len(ENDS) + len(between(constants)), linearized(spec, [])
     sizes = {"turn": machines * n * n - 1, "push": 4 * machines * n - 1, "matrix": n * n - 1, "mode": n - 1}
     name, time = constants.name.replace("-", "_"), constants.periods[0] / 20.0
     sizes["terms"] = terms(constants, time)
