@@ -182,6 +182,9 @@ FAULTS = {
         with_output("fStopHigh", STOPPED, obedient().issued["fPosition"][-1] - 0.01), sway_limit=0.05
     ),
     "loose": with_output("fStopHigh", STOPPED, 100.0),
+    "far": with_orders(
+        REST, attrs.evolve(MOVE, end=350), order(350, CYCLES, STOP), periods=(0.1,), reaction=0.1
+    ),
     "outside": attrs.evolve(obedient(), limits=[attrs.evolve(LIMITS, targets=(-100.0, 4.9))]),
     "fast": with_orders(
         REST,
