@@ -225,7 +225,16 @@ def identify(
             estimated = estimate(machine, names, readings, logs, progress)
             identified = _identified(spec, estimated, logs)
         except InfeasibleProblem as refused:
-            _require_standing(machine, names, readings, logs, refused)
+            for index, log in enumerate(logs):
+                later = swings_from(machine, names, readings, log)
+                if later is None:
+                    continue
+                kept = (*logs[:index], later, *logs[index + 1 :])
+                try:
+                    _identified(spec, estimate(machine, names, readings, kept, progress), kept)
+                except InfeasibleProblem:  # no cure
+                    continue
+                raise _begins_later(later) from refused
             raise
     return Identification(
         given=spec,
@@ -237,22 +246,13 @@ def identify(
     )
 
 
-def _require_standing(
-    machine: SwingingMachine,
-    names: Sequence[str],
-    readings: Sequence[DirectReading | Period],
-    logs: Sequence[SwingLog],
-    refused: InfeasibleProblem,
-) -> None:
+def _begins_later(log: SwingLog) -> InfeasibleProblem:
     """Name the cure of a refused log that begins while the axes still move."""
-    for log in logs:
-        if (start := swings_from(machine, names, readings, log)) is not None:
-            template = (
-                "The log of {log.load} is no free swing of this machine at first, but is one from "
-                "{start:.9g} s on: leave out what was logged before the axes stood still "
-                "(after {start:.9g})."
-            )
-            raise InfeasibleProblem(template, log=log, start=start) from refused
+    template = (
+        "The log of {log.load} is no free swing of this machine at first, but is one from {start:.9g} s on: "
+        "leave out what was logged before the axes stood still (after {start:.9g})."
+    )
+    return InfeasibleProblem(template, log=log, start=log.start_time)
 
 
 def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:

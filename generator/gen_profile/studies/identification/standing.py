@@ -17,8 +17,8 @@ FIRST = 4  # of them that is: an end that is no swing makes the others not worth
 
 def swings_from(
     machine: SwingingMachine, names: Sequence[str], readings: Sequence[DirectReading | Period], log: SwingLog
-) -> float | None:
-    """Find from when on a log leaves nothing but noise of the machine's swing; None where it never does.
+) -> SwingLog | None:
+    """Find the part of a log that leaves nothing but noise of the machine's swing; None where there is none.
 
     Parameters
     ----------
@@ -31,14 +31,13 @@ def swings_from(
 
     Returns
     -------
-    float or None
-        s, as the log counts them.
+    SwingLog or None
+        What is left from its ``start_time`` on.
     """
     if not _swings(machine, names, readings, _later(log, FIRST)):
         return None
     earlier = (part for part in range(1, FIRST) if _swings(machine, names, readings, _later(log, part)))
-    later = _later(log, next(earlier, FIRST))
-    return later.start_time
+    return _later(log, next(earlier, FIRST))
 
 
 def _later(log: SwingLog, part: int) -> SwingLog:
