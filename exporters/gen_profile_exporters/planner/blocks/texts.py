@@ -168,8 +168,24 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "modes_constants": constant_lines(_of_modes(constants, watched)),
         "damping_constants": constant_lines(_damping(constants)),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),
+        **_following(constants, account),
     }
-    follows: dict[str, str | int] = {
+    return "\n".join(
+        [
+            linear_programme(names["linear_programme"], slots=slots, rows=rows),
+            *([account] if account else (filled(part, **values) for part in ("modes", "account"))),
+            *(
+                filled(part, motion_constants=_common(part, slots), **values)
+                for part in parts
+                if part not in ("linear_programme", "account", "modes")
+            ),
+        ]
+    )
+
+
+def _following(constants: PlannerConstants, account: str | None) -> dict[str, str | int]:
+    """Fill what depends on whether an account follows the machine, and on whether the load is measured."""
+    return {
         "follows": int(account is not None),
         "is_measured": int(constants.sensor is not None),
         "measured": f"bMeasured := damping.nLittle < {LITTLE}," if constants.sensor else "",
@@ -179,17 +195,6 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "room": ROOM if constants.sensor else "",
         "quiet": "" if account else "bQuiet := table.bQuiet,",
     }
-    return "\n".join(
-        [
-            linear_programme(names["linear_programme"], slots=slots, rows=rows),
-            *([account] if account else (filled(part, **values) for part in ("modes", "account"))),
-            *(
-                filled(part, motion_constants=_common(part, slots), **follows, **values)
-                for part in parts
-                if part not in ("linear_programme", "account", "modes")
-            ),
-        ]
-    )
 
 
 def _common(part: str, slots: int) -> str:
