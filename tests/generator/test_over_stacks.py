@@ -240,6 +240,15 @@ class TestOverhead:
         found = gp.plan(quay(path={"overhead": [[12.0, 17.0, 22.9]], "clearance": clearance}))
         assert found.passage.nearest.room >= -NEARER
 
+    @pytest.mark.parametrize("lower", [4.0, 10.0, 25.0])  # the target hangs higher than the last two let it
+    def test_as_much_height_is_missing_as_a_beam_is_lower(self, lower):
+        def missing(height):
+            with pytest.raises(gp.InfeasibleProblem) as refusal:
+                gp.plan(quay(path={"overhead": [[12.0, 17.0, height]]}))
+            return float(re.search(r"is ([\d.]+) m too low", str(refusal.value))[1])
+
+        assert missing(22.0 - lower) == pytest.approx(missing(22.0) + lower, abs=0.1)
+
     def test_the_check_names_it(self, folder, plan):
         spec = quay(path={"overhead": [[12.0, 17.0, 20.0]]}, move={"duration": plan.motion.duration})
         judged = gp.check_artefact(folder / "quay.csv", spec)

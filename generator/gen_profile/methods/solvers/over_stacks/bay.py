@@ -86,13 +86,14 @@ class Bay:
         travel, start = self.spec.limits.of(self.hoist).travel, self.spec.move.start[self.hoist]
         least = self.plant.actuated[self.hoist].lower
         highest = start - max(least, travel[0] if travel else least)
-        return min([highest, *(self.headroom(zone) for zone in self.zones if self.passes(zone))])
+        below = min((self.headroom(zone) for zone in self.zones if self.passes(zone)), default=math.inf)
+        return min(highest, max(below, self.rise, 0.0))
 
     def headroom(self, zone: StackZone) -> float:
         """How far the hoist can lift from the start in m below what is overhead."""
         if not zone.overhead:
             return math.inf
-        return max(zone.top - float(self.hang[:, zone.body].max()), self.rise, 0.0)
+        return zone.top - float(self.hang[:, zone.body].max())
 
     @property
     def needed(self) -> float:

@@ -343,7 +343,10 @@ def _require_height(bay: Bay) -> None:
     path, passed = bay.spec.path, [zone for zone in bay.zones if bay.passes(zone)]
     assert path is not None
     stack = max((zone for zone in passed if not zone.overhead), key=lambda zone: zone.top)
-    beam = next((zone for zone in passed if bay.headroom(zone) <= bay.top), None)
+    lowest = min(passed, key=bay.headroom)
+    beam = lowest if bay.headroom(lowest) <= bay.top else None
+    if beam is not None:
+        lacking = bay.needed - bay.headroom(beam)  # the top is no lower than start and target
     sideways, above = path.clearances
     values = {
         "stack": path.named(stack.obstacle),
