@@ -4,7 +4,6 @@ import json
 
 import attrs
 import pytest
-from tests.recheck.test_recheck import motion
 
 import gen_profile as gp
 from gen_profile.assurance.certificate.rechecking import not_covered
@@ -28,12 +27,17 @@ EXPORTS = [
 ]
 
 
+@pytest.fixture(scope="module")
+def motion():
+    return gp.plan(gp.preset_spec("paper", ["export.cycle_time=0.02"])).command
+
+
 @pytest.mark.parametrize(("format_", "export"), EXPORTS)
-def test_the_files_that_it_reads_are_those_that_are_said_to_be_covered(format_, export):
+def test_the_files_that_it_reads_are_those_that_are_said_to_be_covered(format_, export, motion):
     if export.get("csv_dialect") in ("sew", "kollmorgen", "lenze"):
         export = {**export, "csv_columns": ["position"]}
     spec = evolve_spec(gp.preset_spec("paper", ["export.cycle_time=0.02"]), export=export)
-    first, *_ = find_exporter(format_).encode(motion("paper"), target_of(spec))
+    first, *_ = find_exporter(format_).encode(motion, target_of(spec))
     try:
         read_setpoints(first.content, json.loads(json.dumps(spec.to_dict())), ["cart"])
     except NotProvedError:
