@@ -18,3 +18,6 @@ The calls follow the vendors' public manuals; they were not tried on a controlle
 
 TWINCAT, CODESYS, SIEMENS = "libraries/twincat.st", "libraries/codesys.st", "libraries/siemens.st"
 VELOCITY = "libraries/velocity.st"  # velocity setpoints, with a position control of our own
+# Whose positions of a modulo axis are known: NC axes count on through all turns (Beckhoff, Tc2_MC2, notes on
+# modulo positioning), and of our own position control the wrapper itself decides.
+OF_MODULO_AXES = (TWINCAT, VELOCITY)

@@ -142,11 +142,11 @@ def test_a_cam_that_is_interpolated_never_begins_anew(dialect):
 
 
 def test_formats_and_blocks_that_never_begin_anew_refuse(tmp_path):
-    able = "export can, csv, plc, plcopen-xml, or"
+    able = "export can, csv, plc, plcopen-xml, siemens-scl, twincat, or"
     with pytest.raises(
-        ExportError, match=rf"axis\.modulo = 360 deg, and twincat takes no modulo axes; {able}"
+        ExportError, match=rf"axis\.modulo = 360 deg, and codesys takes no modulo axes; {able}"
     ):
-        design(ring(), ["csv", "twincat"], tmp_path)
+        design(ring(), ["csv", "codesys"], tmp_path)
     with pytest.raises(ExportError, match="planner blocks take no modulo axes"):
         deploy_planner(ring(), ["plc"], tmp_path)
     assert not any(tmp_path.iterdir())

@@ -10,14 +10,18 @@ import numpy as np
 import pytest
 from motions import quintic, target
 from playing import checked, column, play, start
+from st_interpreter import FunctionBlock
+from vendor_axes import VENDORS, PlaybackBench
 
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters import st_to_c
 from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.motion_libraries import VELOCITY
 from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.axis_wrapper import axis_wrapper
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
-from gen_profile_exporters.registry import find_exporter
+from gen_profile_exporters.registry import find_container, find_exporter, require_targets
 
 CYCLE, COUNTS = 0.02, 65536
 FOR_LONG = [{}] * 2000
@@ -288,3 +292,86 @@ def test_what_no_axis_could_follow_is_refused():
         structured_text.block_text(motion_of((0.0, 7200.0), duration=0.5), goal_of((0.0, 7200.0)))
     with pytest.raises(ExportError, match="counts, which are not whole"):
         text_of((0.0, 90.0), "counts", counts_per_si=1000.0)
+
+
+@pytest.mark.parametrize("tables", ["constants", "variables"])
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("name", ["twincat", "siemens-scl"])
+def test_vendors_forms_are_read_back_and_have_no_cam(name, layout, tables):
+    exporter, goal = find_exporter(name), goal_of((350.0, 1070.0), layout, tables)
+    files = exporter.encode(motion_of((350.0, 1070.0)), goal)
+    back = exporter.replay(files[0].content, goal).position[:, 0]
+    assert back[[0, -1]] == pytest.approx(np.radians([350.0, 1070.0]), abs=1e-4)
+    assert not [file.filename for file in files if "cam" in file.filename or "GVL" in file.filename]
+    assert b"MC_MOTIONINPOSITION" not in b"".join(file.content for file in files)
+    (axis,) = goal.axes
+    with pytest.raises(ExportError, match="export "):
+        exporter.replay(files[0].content, attrs.evolve(goal, axes=(attrs.evolve(axis, modulo=None),)))
+
+
+@pytest.mark.parametrize("turn", [0, 3, -2])
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("move", MOVES)
+def test_an_nc_axis_counts_on_from_the_turn_in_which_it_stands(move, layout, turn):
+    full, source = turn_of(layout), parse_function_block(text_of(move, layout))
+    begin, end = (place / 360.0 * full + turn * full for place in move)
+    slack = 1.0 if layout == "counts" else 1e-6
+    bench = PlaybackBench(VENDORS["twincat"], source, [begin])
+    bench.given["fStartTolerance"] = slack
+    for _ in range(40):
+        bench.cycle(bExecute=True)
+    bench.until(lambda row: row["baborted"], bAbort=True)
+    for _ in range(10):  # let go, and taken again for the rest of the way
+        bench.cycle(bExecute=False, bAbort=False)
+    outputs = bench.until(lambda row: row["bdone"] or row["berror"], bContinue=True)
+    assert outputs["bdone"], outputs
+    way = np.array(bench.commanded)[:, 0]
+    assert way[0] == pytest.approx(begin, abs=slack) and way[-1] == pytest.approx(end, abs=slack)
+    assert np.abs(np.diff(way)).max() <= abs(end - begin) * 1.875 / 3.0 * CYCLE * 1.001 + 2.0 * slack
+    bench.cycle(bContinue=False)
+    bench.bring([begin - 5.0 * full])  # by hand, five turns back
+    bench.until(lambda row: row["bdone"], bExecute=True)
+    assert bench.commanded[-1][0] == pytest.approx(end - 5.0 * full, abs=slack)
+
+
+def test_of_two_nc_axes_one_is_modulo():
+    goal = target("slew", "radius", cycle_time=CYCLE, unit="deg", start=0.0)
+    goal = attrs.evolve(goal, axes=(attrs.evolve(goal.axes[0], modulo=360.0), goal.axes[1]))
+    move = quintic((6.0, 20.0), (-0.5, 7.0), duration=3.0)
+    begin, end = (np.degrees(place).tolist() for place in (move.start, move.target))
+    bench = PlaybackBench(
+        VENDORS["twincat"],
+        parse_function_block(structured_text.block_text(move, goal)),
+        [begin[0] + 720.0, begin[1]],
+    )
+    bench.until(lambda row: row["bdone"], bExecute=True)
+    assert bench.commanded[-1] == pytest.approx([end[0] + 720.0, end[1]])
+    bench.cycle(bExecute=False)
+    bench.bring([begin[0], begin[1] + 720.0])
+    assert bench.until(lambda row: row["berror"], bExecute=True)["nerrorid"] == 2
+
+
+@pytest.mark.parametrize("wraps", [True, False])
+@pytest.mark.parametrize("move", [(350.0, 460.0), (20.0, -95.0)])
+def test_a_converter_s_axis_may_wrap_or_count_on(move, wraps):
+    source = parse_function_block(text_of(move))
+    wrapper = FunctionBlock(axis_wrapper(source, 1, VELOCITY).text(), (source.text(),))
+    given = {"fCycleTime": CYCLE, "fGain": 2.0, "fCorrection": 20.0, "fFollowingLimit": 10.0}
+    given |= {"bRunning": True, "fStartTolerance": 0.1}
+    place = move[0] + 720.0
+    for cycle in range(260):
+        shown = place % 360.0 if wraps else place
+        outputs = wrapper.call(**given, fActPosition=shown, bExecute=cycle > 60)
+        place += CYCLE * outputs["fspeed"]
+    assert outputs["bdone"] and not outputs["berror"]
+    assert place == pytest.approx(move[1] + 720.0, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["codesys", "rockwell-l5x"])
+def test_what_is_not_known_of_a_vendor_s_axes_is_refused(name):
+    source, goal = parse_function_block(text_of(MOVES[0])), goal_of(MOVES[0])
+    with pytest.raises(ExportError, match=rf"{name} takes no modulo axes; export can, csv, plc, plcopen-xml"):
+        require_targets({name: find_exporter(name)}, goal)
+    if name == "codesys":  # through whichever door the block comes
+        with pytest.raises(ExportError, match="write the block by plc or plcopen-xml"):
+            find_container(name).wrap(source, goal)

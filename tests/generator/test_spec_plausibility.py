@@ -28,6 +28,7 @@ def test_presets_are_in_no_doubt(name):
         ("gantry-crane", ("move.distance=[12.0, 0.3]",)),
         ("tower-crane", ("limits.axis.slew.velocity=0.1", "move.duration=200")),
         ("flexible-joint", ("move.distance=12", "move.duration=1", "limits.velocity=60")),
+        ("flexible-joint", ("move.distance=14", "move.duration=6", "axis.unit=deg", "axis.modulo=360")),
         ("mass-spring-chain", ("move.distance=0.01", "check.residual_sway=0.0001")),
     ],
 )
@@ -70,6 +71,7 @@ def test_what_cannot_be_meant_is_refused(name, override, place, cure):
         (CRANE, "move.distance=800", "move.duration", "did you mean 0.8 m?"),
         (CRANE, "move.duration=14000", "move.duration", "did you mean 14?"),
         ("flexible-joint", "move.distance=90", "move.duration", "did you mean 1.571 rad?"),
+        ("flexible-joint", "move={ distance=14, duration=6 }", "move.distance", "did you mean 0.2443 rad?"),
         ("paper", "limits.acceleration=800", "limits.acceleration", "did you mean 0.8?"),
         ("paper", "actuator={ type='first-order', tau=67 }", "actuator.tau", "did you mean 0.067?"),
         ("paper", "can.start_tolerance=1", "can.start_tolerance", "did you mean 0.001?"),

@@ -6,8 +6,9 @@ stop on the path, and nothing goes on before another rising edge and the check o
 The calls follow the vendors' public manuals; they were not tried on a controller.
 """
 
+from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
-from gen_profile_exporters.motion_libraries import VELOCITY
+from gen_profile_exporters.motion_libraries import OF_MODULO_AXES, VELOCITY
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE
 from gen_profile_exporters.templates import filled
 
@@ -24,8 +25,19 @@ def axis_wrappers(block: BlockSource, axes: int, library: str) -> tuple[BlockSou
 
 
 def axis_wrapper(block: BlockSource, axes: int, library: str) -> BlockSource:
-    """Write the block around a playback block, with the same inputs and outputs but the axes' own."""
-    several = axes > 1
+    """Write the block around a playback block, with the same inputs and outputs but the axes' own.
+
+    Raises
+    ------
+    ExportError
+        An axis is a modulo axis, and what the library's axes expect at the end of a turn is not known.
+    """
+    several, turns = axes > 1, turns_of(block, axes)
+    if turns and library not in OF_MODULO_AXES:
+        raise ExportError(
+            f"{block.name} has a modulo axis, whose end of a turn no block of this vendor's axes is known to "
+            "take; write the block by plc or plcopen-xml, and join it to the axis by hand."
+        )
     inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name not in {ACTUAL, *MAILBOX}]
     outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS | MAILBOX]
     text = filled(
@@ -34,8 +46,16 @@ def axis_wrapper(block: BlockSource, axes: int, library: str) -> BlockSource:
         block=block,
         name=f"{block.name}_{'Velocity' if library == VELOCITY else 'Axis'}",
         axes=[(f"{n}" * several, f"[{n}]" * several) for n in range(1, axes + 1)],
+        turns=turns,
         inputs=inputs,
         outputs=outputs,
         triggers=[key for key in TRIGGERS if key in {v.name for v in inputs}],
     )
     return parse_function_block(text)
+
+
+def turns_of(block: BlockSource, axes: int) -> dict[str, str]:
+    """Tell after how much each modulo axis wraps, by its number, as the text of a playback block has it."""
+    values = next((v.values for v in block.variables if v.name == "cModulo"), [])
+    numbers = [f"{n}" * (axes > 1) for n in range(1, axes + 1)]
+    return {n: value for n, value in zip(numbers, values, strict=False) if float(value) > 0.0}

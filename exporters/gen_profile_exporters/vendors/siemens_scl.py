@@ -26,7 +26,7 @@ from gen_profile_exporters.block_source import (
 )
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.motion_libraries import SIEMENS, VELOCITY
-from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
+from gen_profile_exporters.playback.axis_wrapper import axis_wrappers, turns_of
 from gen_profile_exporters.playback.block import BlockShape, layout_of, variable_names
 from gen_profile_exporters.playback.buffers import REPLY, REQUEST, STATE, is_buffered
 from gen_profile_exporters.playback.structured_text import block_text, literal, replays
@@ -59,6 +59,8 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     """
     source = parse_function_block(block_text(profile, target))
     blocks = wrap(source, target)
+    if any(axis.modulo for axis in target.axes):
+        return blocks  # a cam's positions are those of one turn
     cams = _cams(source.name, profile, target)
     return (*blocks, File(f"{target.name}_cam.scl", cams.encode("ascii")))
 
@@ -88,13 +90,17 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
             f"siemens-scl: the block's numbers take {size / 1e6:.2f} MB, an optimised data block "
             f"of an S7-1500 holds {MOST_BYTES / 1e6:g} MB; take {cure}."
         )
-    wrappers, others = [axis_wrappers(source, len(target.axes), one) for one in (SIEMENS, VELOCITY)], []
+    axes, others = len(target.axes), []
+    libraries = (VELOCITY,) if turns_of(source, axes) else (SIEMENS, VELOCITY)
+    wrappers = {one: axis_wrappers(source, axes, one) for one in libraries}
     if is_buffered(source):
-        wrappers = [tuple(_wired(wrapper, source) for wrapper in own) for own in wrappers]
+        wrappers = {one: tuple(_wired(wrapper, source) for wrapper in own) for one, own in wrappers.items()}
         others = [_mailbox(source)]
-    on_axes, on_converters = (list(map(_scl, own)) for own in wrappers)
-    text = "\n".join([*map(_scl, (*source.within, source)), *on_axes, *others])
-    converters = (File(f"{target.name}_velocity.scl", one.encode("ascii")) for one in on_converters)
+    on_axes = wrappers.get(SIEMENS, ())
+    text = "\n".join([*map(_scl, (*source.within, source, *on_axes)), *others])
+    converters = (
+        File(f"{target.name}_velocity.scl", _scl(one).encode("ascii")) for one in wrappers[VELOCITY]
+    )
     return (File(f"{target.name}.scl", text.encode("ascii")), *converters)
 
 
@@ -126,7 +132,8 @@ def _portable(match: re.Match[str], text: str, target: Target) -> BlockSource:
     section = "VAR" if is_buffered(source) else "VAR CONSTANT"  # of arrays, which SCL has no constants of
     constants = [attrs.evolve(variable, section=section) for variable in tables]
     back = attrs.evolve(source, variables=(*others, *constants))
-    names = variable_names(BlockShape(layout_of(text), len(target.axes)))
+    has_modulo = any(variable.name == "cModulo" for variable in source.variables)
+    names = variable_names(BlockShape(layout_of(text), len(target.axes), has_modulo=has_modulo))
     plays = {name.lower() for name in names} <= {variable.name.lower() for variable in others + tables}
     return ordered(back, names) if plays else back
 
@@ -162,7 +169,7 @@ def _mailbox(source: BlockSource) -> str:
     lines = "\n".join(f"    {one.name} : {one.type.replace('ARRAY ', 'Array')};" for one in arrays)
     return (
         f"(* Of gen-profile deploy by S7, with this block's number as --db. Call {source.name} with\n"
-        f"    {_wires(source)}\n   as {source.name}_Axis does. Permit PUT/GET in the controller. *)\n"
+        f"    {_wires(source)}\n   as the blocks around it do. Permit PUT/GET in the controller. *)\n"
         f"DATA_BLOCK \"{mailbox_name(source.name)}\"\n{{ S7_Optimized_Access := 'FALSE' }}\nVERSION : 0.1\n"
         f"NON_RETAIN\nSTRUCT\n{lines}\nEND_STRUCT;\nBEGIN\nEND_DATA_BLOCK\n"
     )

@@ -28,10 +28,11 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         As for Structured Text.
     """
-    source = parse_function_block(block_text(profile, target))
-    points = quintic_points(profile, target)
+    files = wrap(parse_function_block(block_text(profile, target)), target)
+    if any(axis.modulo for axis in target.axes):
+        return files  # a cam's positions are those of one turn
     name = f"GVL_{block_name(target.name).removeprefix('FB_')}"
-    return (*wrap(source, target), _variable_list(name, points))
+    return (*files, _variable_list(name, quintic_points(profile, target)))
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:

@@ -28,7 +28,8 @@ FAST = {
     ("rad", "acceleration"): (1e4, 1e6),
 }
 LONG_WAY = 1000.0  # m, longer than the runways of cranes
-MANY_TURNS = 4.0 * math.pi  # rad
+MANY_TURNS = 4.0 * math.pi  # rad, of an axis that is not stated to wrap (axis.modulo)
+MOST_TURNS = 10.0 * math.pi  # rad, of any: 31.4 is less than most angles in degrees
 SHORT_IN_SMALL_UNITS = {"m": 100.0, "rad": 10.0}  # moves that may be in mm, or in degrees
 HASTE = 0.1  # s, within which no crane moves: a duration that lost a factor of 1000
 LONG_TIME, SLOW = 1000.0, 5e-3  # s, and m/s (or rad/s): a duration in ms rather than so slow a move
@@ -129,7 +130,8 @@ def _move(spec: Spec) -> Iterator[Implausibility]:
     """Question distances, the duration, and speeds that follow from them."""
     move, axes = spec.move, spec.machine().actuated
     ways, speeds = map(abs, move.distance), map(abs, move.final_velocity)
-    for axis, distance, speed in zip(axes, ways, speeds, strict=True):
+    scales = spec.axis_scales()
+    for axis, scale, distance, speed in zip(axes, scales, ways, speeds, strict=True):
         unit = axis.unit
         cure = _move_meant(distance, move.duration, unit)
         said = Phrase("{name} moves {distance:g} {unit}", name=axis.name, distance=distance, unit=unit)
@@ -144,7 +146,7 @@ def _move(spec: Spec) -> Iterator[Implausibility]:
         if unit == "m" and distance > LONG_WAY:
             template = "{said}, farther than any crane's runway; {cure}"
             yield _odd("move.distance", template, said=said, cure=cure)
-        elif unit == "rad" and distance > MANY_TURNS:
+        elif unit == "rad" and distance > (MOST_TURNS if scale.modulo else MANY_TURNS):
             turns = distance / (2.0 * math.pi)
             template = "{said}, which are {turns:.3g} turns; {cure}"
             yield _odd("move.distance", template, said=said, turns=turns, cure=cure)

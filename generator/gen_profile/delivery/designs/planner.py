@@ -102,7 +102,9 @@ def deploy_planner(
     """
     for axis in spec.axis_scales():
         require_one_way(
-            axis, "planner blocks take no modulo axes", "keep its travel within a turn, and leave it out"
+            axis,
+            "planner blocks take no modulo axes",
+            "leave axis.modulo out, and keep the axis within one turn by limits.travel",
         )
     progress("finding the modes over the live ranges")
     block = planner_block(spec)
