@@ -10,7 +10,7 @@ VAR_IN_OUT aLive : ARRAY [0..@last_live] OF LREAL; END_VAR
 VAR_OUTPUT
     fPosition : LREAL; fVelocity : LREAL; fAcceleration : LREAL; bReady : BOOL; bMoving : BOOL; bLeads : BOOL;
     bSteady : BOOL; fTimeToGo : LREAL; fSwayLeft : LREAL; bPromise : BOOL; fStopLow : LREAL;
-    fStopHigh : LREAL; bVoid : BOOL; fFastest : LREAL; nSpent : DINT;
+    fStopHigh : LREAL; bVoid : BOOL; fFastest : LREAL; nSpent : DINT; fSpanLow : LREAL; fSpanHigh : LREAL;
 END_VAR
 VAR nWait : DINT; fMost : LREAL; fWay : LREAL; fSpeed : LREAL; fStop : LREAL; END_VAR
 VAR CONSTANT cCycle : LREAL := @cycle; cSlowing : LREAL := @slowing; cFull : LREAL := @full; END_VAR
@@ -56,6 +56,8 @@ fTimeToGo := 0.5 * ABS(fVelocity) / cSlowing;
 fStopLow := fPosition;
 fStopHigh := fPosition;
 IF fVelocity > 0.0 THEN fStopHigh := fPosition + fStop; ELSE fStopLow := fPosition - fStop; END_IF;
+fSpanLow := fStopLow;
+fSpanHigh := fStopHigh;
 bVoid := (fStopHigh > fHighest + 0.01) AND (fVelocity > 0.0)
     OR (fStopLow < fLowest - 0.01) AND (fVelocity < 0.0);
 nSpent := 10;

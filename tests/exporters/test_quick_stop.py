@@ -32,7 +32,9 @@ def braked(rows):
     issued = block.call(given.reshape(-1, len(BEGIN))).reshape(len(rows), CYCLES, -1)
     columns = {name: issued[:, :, number] for number, name in enumerate(block.outputs)}
     end, time = columns["fEnd"][:, 0], columns["fTimeToGo"][:, 0] + CYCLE
-    before = dict(zip(columns, [*rows[:, :3].T, end, time], strict=True))
+    before = dict(
+        zip(columns, [*rows[:, :3].T, end, columns["fLow"][:, 0], columns["fHigh"][:, 0], time], strict=True)
+    )
     return {name: np.column_stack([before[name], column]) for name, column in columns.items()}
 
 
@@ -73,6 +75,19 @@ def test_limits_are_kept_and_every_state_ends_at_rest_where_it_was_said(played):
     assert np.all(np.abs(np.diff(issued["fAcceleration"])) <= (jerk * CYCLE * (1.0 + 1e-9) + 1e-12)[:, None])
     reached = np.abs(velocity) + 0.5 * acceleration**2 / jerk  # what no jerk within J could avoid
     assert np.all(np.abs(issued["fVelocity"]) <= (reached * (1.0 + 1e-12))[:, None])
+
+
+def test_it_says_between_which_places_it_stays(played):
+    """One that comes back had its turn beyond both its beginning and its end."""
+    rows, issued = played
+    low, high = issued["fPosition"].min(axis=1), issued["fPosition"].max(axis=1)
+    said = issued["fLow"][:, 1], issued["fHigh"][:, 1]
+    assert np.all(said[0] <= low + 1e-12) and np.all(said[1] >= high - 1e-12)
+    ends = np.sort([rows[:, 0], issued["fEnd"][:, 0]], axis=0)
+    turned = said[1] - said[0] > ends[1] - ends[0] + 1e-9
+    assert turned.sum() > 100
+    a = np.abs(rows[:, 2]) + rows[:, 3] + rows[:, 4] * CYCLE  # between cycles by less than these leave
+    assert np.all(low - said[0] <= a * CYCLE**2) and np.all(said[1] - high <= a * CYCLE**2)
 
 
 def test_setpoints_are_one_motion(played):
