@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,11 +15,12 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import InputFile, Number, PathType, SpecChoice, option
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.cli.progress import draw, progress
-from gen_profile.support.errors import GenProfileError, SpecError
+from gen_profile.support.errors import GenProfileError, OutputError, SpecError
 
 if TYPE_CHECKING:
     from gen_profile.spec.model import Spec
     from gen_profile.studies.identification.measurements import SwingLog
+    from gen_profile.support.progress import Progress
 
 
 def log_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -111,7 +113,7 @@ def identify(
     with progress() as tell:
         if logs:
             tell("reading the log")
-            swings = [read(log, spec, after=after) for log in logs]
+            swings = [_read(log, picture, tell, lambda log: read(log, spec, after=after)) for log in logs]
             measurements += swings
         try:
             identified = run(spec, measurements, free, None if at is None else _positions(at), tell)
@@ -122,6 +124,18 @@ def identify(
         draw(identified, picture, tell)
         write_spec(identified.spec, out, rewritten(identified.spec))
     print_outcome({**identified.to_dict(), "path": str(out)}, identification(identified, out))
+
+
+def _read(log: Path, picture: Path | None, tell: Progress, read: Callable[[Path], SwingLog]) -> SwingLog:
+    """Read a log; draw the columns of one that is refused."""
+    from gen_profile.studies.identification.log_table import read_table, read_text
+
+    try:
+        return read(log)
+    except OutputError:
+        with suppress(OutputError):  # of what is no table
+            draw(read_table(read_text(log, "swing"), str(log)), picture, tell)
+        raise
 
 
 def _to_change(chosen: SpecChoice) -> tuple[Spec, Callable[[Spec], str]]:

@@ -22,7 +22,11 @@ from gen_profile.presentation.charts.curves import (
     sway_figure,
 )
 from gen_profile.presentation.charts.figure import PLAIN, Bars, Figure
-from gen_profile.presentation.charts.identification import identification_figure, log_figure
+from gen_profile.presentation.charts.identification import (
+    identification_figure,
+    log_figure,
+    table_figure,
+)
 from gen_profile.presentation.charts.machine import draw_machine
 from gen_profile.presentation.charts.picture import require_drawable, save
 from gen_profile.presentation.charts.proof import draw
@@ -32,6 +36,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.studies.comparison.compare import Comparison
 from gen_profile.studies.comparison.robustness import Robustness
 from gen_profile.studies.identification.identify import Identification
+from gen_profile.studies.identification.log_table import LogTable
 from gen_profile.studies.identification.measurements import SwingLog
 from gen_profile.support.errors import OutputError, SpecError
 from gen_profile.support.suggestion import found
@@ -60,6 +65,7 @@ Drawn = (
     | Robustness
     | Identification
     | SwingLog
+    | LogTable
     | Deployment
 )
 
@@ -122,6 +128,8 @@ def _figures(result: object, every: bool) -> tuple[list[Figure], str, str]:
             raise OutputError("There is nothing to draw: no log was identified from.")
         case SwingLog(load=load):
             return [log_figure(result)], load, f"Log of {load}"
+        case LogTable(source=source):
+            return [table_figure(result)], source, source
         case Identification(spec=spec):
             names = ", ".join(result.estimate.values)
             return [identification_figure(result)], spec.name, f"{spec.name}: {names} identified"

@@ -6,16 +6,19 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
 
 from gen_profile.motion.profile import Array
 from gen_profile.studies.identification.log_table import LogTable
-from gen_profile.support.phrase import Phrase
+from gen_profile.support.errors import OutputError
+from gen_profile.support.phrase import AND, Phrase, joined
 
 _TIME = re.compile(
     r".*(time|zeit|temps|tempo|tiempo|stamp|elapsed|millis|micros|seconds|date|datum|uhr|epoch).*"
     r"|t([ _\[(].*)?",
     re.IGNORECASE,
 )
+_FREQUENCY = re.compile(r"#?\s*(freq|frequency|frequenz|fréquence|frecuencia)\b.*", re.IGNORECASE)
 _COUNT = re.compile(r"#|no\.?|nr\.?|num|index|samples?|records?", re.IGNORECASE)  # of rows, and no time
 NAMES = {  # what columns are called that hold a quantity
     "angle": re.compile(r".*(angle|winkel|angol|ángulo|tilt|incl|pitch|roll).*", re.IGNORECASE),
@@ -29,6 +32,7 @@ NEIGHBOURS = 51  # samples, among which one that jumps stands out
 JUMP = 12.0  # times as far beside the middle of its neighbours as most are around it
 ROUNDS = 3
 GAP = 3.5  # usual steps, over which nothing tells where a swing would be
+PEAK = 0.1  # of a spectrum's greatest peak, by which a resonance stands out
 STEPS = 10.0  # of a sensor's resolution, which no jump is less than
 
 
@@ -50,6 +54,38 @@ def likely_columns(table: LogTable, quantity: str) -> tuple[str, str]:
     swinging = (place for place in others if _changes(table, place, range(first, last + 1)))
     value = named[0] if named else next(swinging, next(iter(others), 1))
     return str(time + 1), str(value + 1)
+
+
+def refuse_spectrum(table: LogTable, head: int, time: int) -> None:
+    """Refuse a table over frequencies, such as Klipper's resonances, and tell the periods of its peaks.
+
+    Raises
+    ------
+    OutputError
+    """
+    name = table.cell(head, time)
+    if not (table.is_head(head) and (_FREQUENCY.fullmatch(name) or table.unit(head, time) == "Hz")):
+        return
+    rows = range(head + 1, len(table.rows))
+    cells = [[table.number(row, place) for place in range(len(table.rows[head]))] for row in rows]
+    values = np.array([row for row in cells if math.isfinite(row[time])] or [[0.0]])
+    frequencies, power = values[:, min(time, values.shape[1] - 1)], np.zeros(len(values))
+    for column in np.nan_to_num(np.delete(values, time, axis=1)).T if values.shape[1] > 1 else ():
+        power = max(power, column, key=np.ptp)
+    peaks, _ = find_peaks(power, prominence=PEAK * max(float(power.max()), 1e-300))
+    found = [(float(frequencies[at]), float(np.ptp(frequencies[at - 1 : at + 2]) / 4.0)) for at in peaks]
+    cure: str = "log a swing over the time"
+    if found := [(hertz, apart) for hertz, apart in found if hertz > 0.0 and apart > 0.0]:
+        template = "state the periods of what swings by itself, such as {periods}"
+        periods = [
+            f"--period {f'{mode}:' * (mode > 1)}{1.0 / hertz:.4g}±{apart / hertz**2:.2g}"
+            for mode, (hertz, apart) in enumerate(found, 1)
+        ]
+        cure = Phrase(template, periods=" ".join(periods))
+    shown = joined(AND, [f"{hertz:.4g}" for hertz, _ in found]) if found else ""
+    peaked: str = Phrase(" with peaks at {hertz} Hz", hertz=shown) if found else ""
+    template = "{source}: over {name!r} this is a spectrum{peaked}, and no swing over the time; {cure}."
+    raise OutputError(template, source=table.source, name=name, peaked=peaked, cure=cure)
 
 
 def _changes(table: LogTable, place: int, rows: range) -> bool:

@@ -19,6 +19,7 @@ from gen_profile.studies.identification.log_signal import (
     axis_note,
     jumps,
     likely_columns,
+    refuse_spectrum,
     resolution,
     same_sensor,
 )
@@ -220,6 +221,7 @@ def parse_swing(
     chosen = likely_columns(cells, quantity) if columns is None else columns
     head = cells.head(chosen)
     time, place = (cells.place(head, column) for column in chosen)
+    refuse_spectrum(cells, head, time)
     per_second = per_second or _per_stated(cells, head, time, "time", TIME_UNITS)
     per_unit = per_unit or _per_stated(cells, head, place, quantity, signal_units(quantity)) or 1.0
     sensor = one_direction and quantity in OF_SENSORS
