@@ -97,12 +97,6 @@ NOT_YET = {
     },
     "test_planner_wrapper": set(),
     "test_planner_axes": {
-        # each axis arrives as soon as it can
-        "test_all_axes_arrive_together_as_soon_as_the_slowest_can[blocks-target0]",
-        "test_all_axes_arrive_together_as_soon_as_the_slowest_can[blocks-target1]",
-        "test_all_axes_arrive_together_as_soon_as_the_slowest_can[blocks-target2]",
-        "test_a_new_target_on_the_way_brings_all_axes_to_rest_together[blocks-6000-12.0]",
-        "test_a_new_target_on_the_way_brings_all_axes_to_rest_together[blocks-8000-4.0]",
         # the fewest operations that may be stated are too few for two axes
         "test_short_slots_leave_no_cycle_more_work[blocks]",
         "test_a_long_way_is_held_against_slow_intervals_in_no_more_operations[blocks]",

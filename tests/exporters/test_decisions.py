@@ -4,11 +4,14 @@ import re
 
 import numpy as np
 import pytest
+from generator.planned_machines import GANTRY
 from played_planner import played_text
 from scipy.interpolate import BSpline
 
+from gen_profile.planner.design import planner_constants
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.spec.reading import preset_spec
+from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile_exporters.planner.blocks.whole import whole_block
 
 BEGIN, COMMAND, CHOOSE, FAILED, FOUND, SLOT, AGAIN = range(7)
 STOP, TARGET, SPEED, PROMPT = 1, 2, 3, 4
@@ -18,10 +21,17 @@ SLOTS = 64
 
 @pytest.fixture(scope="module")
 def blocks():
-    text = played_text(preset_spec("bay-crane", []))
-    found = re.findall(r"(?s)FUNCTION_BLOCK bay_crane_(\w+)\n.*?END_FUNCTION_BLOCK\n", text)
-    whole = re.findall(r"(?s)FUNCTION_BLOCK bay_crane_\w+\n.*?END_FUNCTION_BLOCK\n", text)
-    return dict(zip(found, whole, strict=True))
+    return blocks_of(played_text(preset_spec("bay-crane", [])))
+
+
+@pytest.fixture(scope="module")
+def two():
+    return blocks_of(whole_block(planner_constants(parse_spec(GANTRY))[1]))
+
+
+def blocks_of(text):
+    whole = re.findall(r"(?s)FUNCTION_BLOCK \w+\n.*?END_FUNCTION_BLOCK\n", text)
+    return {block.split(maxsplit=2)[1].rpartition("_")[2]: block for block in whole}
 
 
 class Table:
@@ -188,3 +198,48 @@ END_FUNCTION_BLOCK
             time = (at + tick / cycles) * slot
             due = place(time), spline(time), spline.derivative()(time)
             assert np.allclose(issued[:3], due, rtol=0, atol=1e-9)
+
+
+def test_axes_that_go_to_targets_are_led_there_in_as_many_slots_as_the_slowest_needs(two):
+    table = Table(two)
+    table.command(TARGET, 2.0)
+    tried = table.ask(CHOOSE, nOthers=50.0)
+    assert (tried["nKind"], tried["nLength"], tried["nNeeds"]) == (THERE, 50, 37)
+    table.ask(FOUND, nOfKind=THERE, nOfLength=50)
+    rests = {"bLeadsNow": 1.0, "nNow": 50}
+    settled = table.ask(CHOOSE, **rests)  # not in fewer, and others need not go by that
+    assert (settled["nKind"], settled["nNeeds"]) == (NONE, 1)
+    sooner = table.ask(CHOOSE, nOthers=41.0, **rests)
+    assert (sooner["nKind"], sooner["nLength"], sooner["bWaits"]) == (THERE, 41, 0)
+    table.fails(sooner)
+    assert table.ask(CHOOSE, **rests)["nNeeds"] == 42
+    later = table.ask(CHOOSE, nOthers=53.0, **rests)
+    assert (later["nKind"], later["nLength"], later["bWaits"]) == (THERE, 53, 1)
+    assert later["bStraight"]
+    table.fails(later)  # it is there, so it is tried in each slot
+    assert table.ask(CHOOSE, **rests)["nKind"] == NONE
+    table.ask(SLOT)
+    assert table.ask(CHOOSE, nOthers=52.0, bLeadsNow=1.0, nNow=49)["nLength"] == 52
+
+
+def test_one_motion_of_its_own_is_what_others_wait_for(two):
+    table = Table(two)
+    table.command(TARGET, 2.0)
+    table.ask(FOUND, nOfKind=THERE, nOfLength=table.ask(CHOOSE, nOthers=5.0)["nLength"])
+    assert table.ask(CHOOSE, bLeadsNow=1.0, nNow=37)["nNeeds"] == 37
+    table.ask(SLOT)
+    assert table.ask(COMMAND, bNew=0.0)["nNeeds"] == 36
+    table.command(STOP)
+    assert table.ask(CHOOSE, nNow=36)["nNeeds"] == 0
+
+
+def test_beside_an_axis_that_is_far_away_the_speed_brings_it_there_together(two):
+    table = Table(two)
+    table.command(TARGET, 4.0)
+    tried = table.ask(CHOOSE, nOthers=212.0)  # 200 at full speed: 16 slots of way
+    assert tried["nKind"] == RAMP
+    assert tried["fRamp"] * (200 - 2 * 10 * tried["fRamp"]) == pytest.approx(16.0)
+    kept = {"nDeclineNow": 10.0, "fKeptNow": 1.1 * tried["fRamp"], "nNow": 10.0}
+    assert table.ask(CHOOSE, **kept)["nKind"] == NONE
+    table.ask(SLOT)
+    assert table.ask(CHOOSE, **kept | {"fKeptNow": 2.0 * tried["fRamp"]})["nKind"] == RAMP

@@ -16,8 +16,14 @@ from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent
-# of a target, that is damped on the way
-ROOM = "fAim := table.fAim, fRoom := cCalmRoom, fSpanLow := fSpanLow, fSpanHigh := fSpanHigh,"
+# beyond a target, that is damped on the way, or that others take longer to
+ROOM = "fAim := table.fAim, fRoom := {}, fSpanLow := fSpanLow, fSpanHigh := fSpanHigh,"
+# of several axes
+SEVERAL = {
+    "held": "AND NOT (bHeld AND (nTick < account.nSlot))",
+    "others": "nOthers := nOthers,",
+    "kept": "AND (nLength > nOthers)",
+}
 SIDES = 12  # of a polygon, whose normals have the cosines
 QUARTER = [1.0, 0.8660254037844387, 0.5]
 COSINES = [
@@ -185,6 +191,8 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
 
 def _following(constants: PlannerConstants, account: str | None) -> dict[str, str | int]:
     """Fill what depends on whether an account follows the machine, and on whether the load is measured."""
+    several = len(constants.axes) > 1
+    straight = several or constants.sensor is not None
     return {
         "follows": int(account is not None),
         "is_measured": int(constants.sensor is not None),
@@ -192,8 +200,11 @@ def _following(constants: PlannerConstants, account: str | None) -> dict[str, st
         "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
         "unmeasured": "bUncalm" if constants.rates else "FALSE",
         "calm_slots": LITTLE,
-        "room": ROOM if constants.sensor else "",
+        "room": ROOM.format("cCalmRoom" if constants.sensor else "fPart") if straight else "",
+        "is_straight": int(straight),
         "quiet": "" if account else "bQuiet := table.bQuiet,",
+        **(SEVERAL if several else dict.fromkeys(SEVERAL, "")),
+        "is_several": int(several),
     }
 
 
@@ -314,11 +325,12 @@ def filled(part: str, **values: str | int) -> str:
     What stands between ``@where_follows`` and ``@end`` is for a rope that changes on the way, where
     ``follows`` is given and not 0; between ``@where_stays`` and ``@end`` for one that does not; and
     between ``@where_measured`` and ``@end`` for a load that is measured, where ``is_measured`` is not 0,
-    and likewise ``@where_modal`` for loads that do not hang on ropes.
+    and likewise ``@where_modal`` for loads that do not hang on ropes, ``@where_several`` for several axes,
+    and ``@where_straight`` where targets are not to be left far behind.
     """
     follows = bool(values.get("follows"))
     stated = {"follows": follows, "stays": not follows}
-    stated |= {part: bool(values.get(f"is_{part}")) for part in ("measured", "modal")}
+    stated |= {part: bool(values.get(f"is_{part}")) for part in ("measured", "modal", "several", "straight")}
     text = WHERE.sub(
         lambda some: some[2] if stated.get(some[1], True) else "", (FOLDER / f"{part}.st").read_text("ascii")
     )

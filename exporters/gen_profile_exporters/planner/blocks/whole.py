@@ -49,6 +49,7 @@ def around(motion: str, constants: PlannerConstants) -> str:
     names = {part: f"{own}_{part}" for part in ("motion", "observer", "quick_stop", "zones", "event_log")}
     parts = [motion]
     lasts = {"zone": ZONES, "live": max(1, len(constants.live)), "mode": constants.modes}
+    lasts["axis"] = len(constants.axes)
     values = names | {f"last_{array}": str(length - 1) for array, length in lasts.items()}
     taken = {"quick_stop": True, "zones": constants.zones, "event_log": constants.events}
     parts += [filled(part, **values) for part, is_taken in taken.items() if is_taken]
@@ -66,6 +67,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     varied = c.stated_error > 0.0 and not c.rates
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
     stated["measured"] = c.sensor is not None
+    stated["several"] = len(c.axes) > 1
     head = interface(c).replace(*TOLERANCE)
     head = re.sub(r"(?m)^(\s*bStop : BOOL;.*\n)", rf"\1{PROMPT}\n", head, count=1)
     body = (FOLDER / "shell.st").read_text("ascii")
@@ -80,6 +82,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         **values,
         # where a sensor is, it stands to damp
         "goes_on": "(nState = cMoving) OR (nState = cStanding)" if c.sensor else "nState = cMoving",
+        "together": "nTogether := nTogether, bHeld := bHeld, " if len(c.axes) > 1 else "",
         "first_suffix": c.axes[0].suffix,
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
         "shell_constants": constant_lines(_constants(c)),
@@ -101,6 +104,7 @@ def _of_axis(text: str, number: int, axis: AxisConstants, sensed: str) -> str:
 def _constants(c: PlannerConstants) -> dict[str, object]:
     lives = c.live or {"": (0.0, 1.0)}
     common: dict[str, object] = {
+        "cAxes": len(c.axes),
         "cLives": len(c.live),
         "cCycle": c.cycle,
         "cOperations": operations(c),
@@ -116,7 +120,6 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
     }
     if c.sensor:
         common |= {
-            "cAxes": len(c.axes),
             "cStatedError": c.stated_error,
             "cSettled": c.sensor.again,
             "cRoused": c.sensor.roused,
