@@ -74,6 +74,7 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         *([] if passage is None else [("duration", passage.gained(figures["duration_s"]))]),
         *_peaks(outcome),
         ("sway on the way", f"{load} {mm(figures['sway_transient_peak_m'])}"),
+        *_passed(figures, load),
         ("residual sway", f"{load} {nominal} nominal, {worst} at worst"),
         *(
             []
@@ -120,6 +121,13 @@ def _provenance(judged: JudgedFile) -> Iterator[tuple[str, str]]:
     yield "manifest", MANIFEST_WORDS[judged.manifest]
     if judged.companions:
         yield "exported with it", companions(judged.companions)
+
+
+def _passed(figures: Mapping[str, float], load: str) -> Iterator[tuple[str, str]]:
+    """Tell how far the load passes its target, where that is limited."""
+    if "load_overshoot_peak_m" in figures:
+        nominal, worst = (max(figures[f"load_overshoot_{which}_m"], 0.0) for which in ("peak", "worst"))
+        yield "past the target", f"{load} {mm(nominal)} nominal, {mm(worst)} at worst"
 
 
 def certificate(path: Path, document: Certificate) -> str:

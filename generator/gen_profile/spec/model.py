@@ -180,7 +180,7 @@ class AxisLimitsSpec(Checked, table="limits.axis"):
 
 @attrs.frozen(kw_only=True)
 class LimitsSpec(Checked, table="limits"):
-    """Limits of all axes' commands, and the end load's transient sway in m.
+    """Limits of all axes' commands, the end load's transient sway in m, and how far it passes its target.
 
     `axis` holds what is different for single axes: all axes by name in the plant's order, or none.
     """
@@ -189,6 +189,7 @@ class LimitsSpec(Checked, table="limits"):
     acceleration: Positive | None = None
     jerk: Positive | None = None
     sway: Positive | None = None
+    overshoot: NotNegative | None = None
     travel: Travel | None = None
     axis: Annotated[Mapping[AxisName, AxisLimitsSpec], Words("must be a table by axis, found {found}")] = NONE
 

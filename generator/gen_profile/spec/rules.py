@@ -7,6 +7,7 @@ from gen_profile.plants.plant import Coordinate, Parameter, Plant, decides
 from gen_profile.plants.virtual_work import end_load_is_a_body
 from gen_profile.spec.can import SENSOR_BYTES, CanSensorSpec
 from gen_profile.spec.model import RobustnessSpec, Spec
+from gen_profile.spec.passed_target import directions
 from gen_profile.spec.planner import SensorSpec
 from gen_profile.spec.stack_rules import stack_faults
 from gen_profile.spec.structure import place
@@ -266,6 +267,28 @@ def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 yield limits.place(column, "travel"), problem
 
 
+def _overshoot(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse to look at targets that no load is known to pass, or that it passes anyway."""
+    if spec.limits.overshoot is None:
+        return
+    where = "limits.overshoot"
+    if spec.path is not None:
+        yield where, "not on a path over stacks; state what is behind the target as a stack (path.stacks)"
+    elif not spec.move.stops:
+        yield where, "a load that reaches its target at a speed passes it; end at rest (move.final_velocity)"
+    elif spec.check.foreign is not None:
+        yield where, "a foreign FMU (check.fmu) does not tell where the load is; remove one of them"
+    elif not plant.bodies:
+        yield (
+            where,
+            "the machine's file states no bodies, and equations alone do not tell where a load is; state "
+            "bodies and mechanics in it, or remove the limit",
+        )
+    elif not any(spec.move.distance[one.axis] for one in directions(plant)):
+        template = "no axis carries the {load} straight to a target that it could pass; remove the limit"
+        yield where, Phrase(template, load=plant.end_load_name)
+
+
 def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
     """Hold the target's units to what its axes measure."""
     for axis in plant.actuated:
@@ -318,6 +341,6 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
 OF_MACHINE = (
-    _forgotten, _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _units, _all_axes,
-    _live, _sensor, stack_faults,
+    _forgotten, _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _overshoot,
+    _units, _all_axes, _live, _sensor, stack_faults,
 )  # fmt: skip

@@ -58,6 +58,8 @@ class Certificate(Summarised):
         Whether setpoints are rounded to counts, for the reasons where nothing is proved.
     not_rechecked : tuple of str
         What of it `gen_profile_recheck` does not cover, and so cannot prove again.
+    unproved : tuple of str
+        Places of the spec's limits of which nothing is proved.
     """
 
     spec_sha256: str
@@ -75,6 +77,7 @@ class Certificate(Summarised):
     scales: Array
     rounded: bool = False
     not_rechecked: tuple[str, ...] = ()
+    unproved: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -109,11 +112,16 @@ class Certificate(Summarised):
         return tuple(sway.reason for sway in self.sways if sway.reason is not None)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say that the certificate, if there is one, cannot be proved again by the re-checker."""
+        """Say which limits it does not speak of, and that it, if it is one, cannot be proved again."""
+        silent = tuple(
+            f"{place}: nothing is proved of it; the check judges it on the machines that it tries."
+            for place in self.unproved
+        )
         if not (self.proved and self.not_rechecked):
-            return ()
+            return silent
         what = ", ".join(self.not_rechecked)
         return (
+            *silent,
             f"The re-checker (gen_profile_recheck) does not cover {what}: it will refuse this certificate, "
             "and only gen-profile check --certificate proves it again.",
         )

@@ -17,7 +17,7 @@ from gen_profile.assurance.certificate.certify import SLACK, Attempt, Progress, 
 from gen_profile.assurance.certificate.document import Certificate, certificate_path, damaged, encode, parse
 from gen_profile.assurance.certificate.in_order import in_order
 from gen_profile.assurance.certificate.rechecking import not_covered
-from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayBounds, limits_of
+from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayBounds, limits_of, unproved
 from gen_profile.assurance.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.assurance.verification.origin import spec_and_manifest
 from gen_profile.assurance.verification.plausibility import another_move
@@ -102,7 +102,12 @@ def check_certificate(
             )
     met = zip(claimed.sways, largest_met.tolist(), strict=True)
     sways = tuple(attrs.evolve(sway, largest_met=most) for sway, most in met)
-    return attrs.evolve(claimed, sways=sways, not_rechecked=not_covered(artefact.path, artefact.spec))
+    return attrs.evolve(
+        claimed,
+        sways=sways,
+        not_rechecked=not_covered(artefact.path, artefact.spec),
+        unproved=unproved(artefact.spec),
+    )
 
 
 def _bound_again(
@@ -159,6 +164,7 @@ def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certific
         scales=result.scales,
         rounded=bool(artefact.setpoints.resolution.any()),
         not_rechecked=not_covered(artefact.path, artefact.spec),
+        unproved=unproved(artefact.spec),
     )
 
 

@@ -67,6 +67,11 @@ def limits_of(spec: Spec) -> tuple[SwayLimit, ...]:
     return (*after, SwayLimit(load=spec.machine().end_load_name, allowed=allowed, on_the_way=True))
 
 
+def unproved(spec: Spec) -> tuple[str, ...]:
+    """List the limits that no bound is proved of: bounds are of sways, and not of where loads are."""
+    return () if spec.limits.overshoot is None else ("limits.overshoot",)
+
+
 @attrs.frozen(kw_only=True)
 class WatchedSway:
     """A sway whose greatest value is wanted.

@@ -200,6 +200,7 @@ def _verdict(
         by_fmpy=tuple(by_fmpy),
         apart=float(np.max(apart)),
         sway_limit=spec.limits.sway,
+        overshoot_limit=spec.limits.overshoot,
         demanded=spec.planner.lateness,
         required=_required(spec) if len(judged) == numbering.count >= HISTORIES else (),
     )

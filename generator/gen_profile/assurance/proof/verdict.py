@@ -137,6 +137,8 @@ class Proof(Summarised, Examination):
         m, by which it found another sway at most.
     sway_limit : float or None
         Allowed sway of the end load at any time in m, which no planner block keeps.
+    overshoot_limit : float or None
+        Likewise, how far it may pass its target.
     demanded : float or None
         Times what is possible that a command may take, as the spec states.
     required : sequence of (str, str)
@@ -154,6 +156,7 @@ class Proof(Summarised, Examination):
     by_fmpy: tuple[int, ...]
     apart: float
     sway_limit: float | None = None
+    overshoot_limit: float | None = None
     demanded: float | None = None
     required: Sequence[tuple[str, str]] = ()
     faults: tuple[str, ...] = ()
@@ -278,7 +281,12 @@ class Proof(Summarised, Examination):
         return (*sentences, *self.faults)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say what is wrong without counting: sway on the way."""
+        """Say what is wrong without counting: sway on the way, and a limit that is not looked at."""
+        if self.overshoot_limit is not None:
+            return (*self._swaying(), "limits.overshoot is stated, which a planner block does not look at.")
+        return self._swaying()
+
+    def _swaying(self) -> tuple[str, ...]:
         end_load = list(self.limit)[-1]
         swaying = max(self.judged, key=lambda one: one.on_the_way[end_load])
         if self.sway_limit is None or swaying.on_the_way[end_load] <= self.sway_limit:

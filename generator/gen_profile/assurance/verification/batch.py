@@ -15,6 +15,7 @@ from gen_profile.dynamics.evaluation.clearance import zones_of
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
+from gen_profile.spec.passed_target import Target, targets
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
@@ -97,7 +98,8 @@ def residual_peaks(
     -------
     (runs, loads) array, or with more columns
         m. Where the spec has stacks, the last three are the least room to one in m, when that is in s, and
-        which of `zones_of` it is.
+        which of `zones_of` it is; where it limits how far the load passes its target, the room behind that,
+        negative by as much as it is passed, when, and which of `targets` it is.
 
     Raises
     ------
@@ -126,11 +128,24 @@ def residual_peaks(
             for zone in zones_of(spec)
         ]
     ).reshape(-1, 10)
+    ahead = targets(spec)  # no path over stacks has any
+    if ahead:
+        zones = np.array([_behind(number, one) for number, one in enumerate(ahead)])
     places = [f"position.{body}.{along}" for body in plant.bodies for along in "xz"] if len(zones) else []
+    if ahead:
+        places = [
+            f"position.{plant.bodies[d.body]}.{'xy'[d.coordinate]}" for d in (one.direction for one in ahead)
+        ]
     outputs = [*places, *(f"sway.{load}" for load in plant.loads)]
     components = plant.directions if on_the_way else 0
     found = runs.peaks(feed.times, inputs, values, outputs, since=since, components=components, zones=zones)
     return found[:, len(places) :]
+
+
+def _behind(number: int, target: Target) -> list[float]:
+    """Write what is behind a target as a zone of all heights: the output is its body's place and height."""
+    low, high = (target.at, np.inf) if target.way > 0.0 else (-np.inf, target.at)
+    return [number, number, low, high, np.inf, 1.0, *np.ravel(NOWHERE)]
 
 
 def processors() -> int:

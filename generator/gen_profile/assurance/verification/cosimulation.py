@@ -28,6 +28,7 @@ from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.model import Spec
+from gen_profile.spec.passed_target import targets
 from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.support.errors import CosimulationError
 from gen_profile.support.progress import Progress, no_progress
@@ -128,6 +129,7 @@ def judge(
         arrival=arrival(spec, setpoints),
         findings=tuple(_finding(spec, machine, response, arrival_time) for machine, response in pairs),
         sway_limit=spec.limits.sway,
+        overshoot_limit=min((one.most for one in targets(spec)), default=None),
         path=spec.path,
         wind=in_wind(spec, machines),
         directions=spec.machine().directions,
@@ -190,4 +192,15 @@ def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) 
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
         on_the_way=None if spec.limits.sway is None else float(np.abs(end_load).max()),
         nearest=near,
+        overshoot=None if spec.limits.overshoot is None else _overshoot(spec, machine, response),
     )
+
+
+def _overshoot(spec: Spec, machine: Scenario, response: Response) -> float:
+    """Find how far the end load passes its targets at any time, in m."""
+    p = parameter_rows(spec.machine(), [machine.parameters])
+    places = body_places(spec.machine(), response.q_u, response.position, p)
+    passed = (
+        one.sign * (places[:, one.direction.body, one.direction.coordinate] - one.at) for one in targets(spec)
+    )
+    return max(float(way.max()) for way in passed)

@@ -109,7 +109,8 @@ def _batch(
         other = peaks(feed.thinned(2), max_step)
     else:
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
-    lengths = np.s_[:, : -2 if spec.path is not None else None]  # not when a load was nearest, and to what
+    nearest = spec.path is not None or spec.limits.overshoot is not None
+    lengths = np.s_[:, : -2 if nearest else None]  # not when a load was nearest, and to what
     between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest[lengths].max())
     return greatest, float(np.abs(greatest - other)[lengths].max()) + between
 
@@ -129,4 +130,5 @@ def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:
         modal=residual,
         on_the_way=None if spec.limits.sway is None else float(peaks[len(residual)]),
         nearest=near,
+        overshoot=None if spec.limits.overshoot is None else -float(peaks[-3]),
     )

@@ -32,7 +32,7 @@ def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
 
 def whole_way(spec: Spec) -> bool:
     """Whether what loads do on the way is judged, too."""
-    return spec.limits.sway is not None or spec.path is not None
+    return spec.limits.sway is not None or spec.limits.overshoot is not None or spec.path is not None
 
 
 def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) -> Array:

@@ -36,6 +36,8 @@ class Finding:
         Greatest sway of the end load at any time in m, where that is limited.
     nearest : Nearest or None
         Where it has the least room to stacks, if the spec has some.
+    overshoot : float or None
+        How far the end load passes its target at any time in m, where that is limited; negative before it.
     """
 
     scenario: Scenario
@@ -43,6 +45,7 @@ class Finding:
     modal: Mapping[str, float]
     on_the_way: float | None = None
     nearest: Nearest | None = None
+    overshoot: float | None = None
 
     @property
     def room(self) -> float | None:
@@ -113,6 +116,9 @@ class Check(Drawable, Tabled, Examination):
         Whether faults in the timing of setpoints count as well.
     sway_limit : float or None
         Allowed sway of the end load at any time in m.
+    overshoot_limit : float or None
+        How far the end load may pass its target in m: `limits.overshoot`, or as far as it may sway after the
+        move where that is more.
     searched : int
         Number of machines that were looked at for the worst ones in the ranges.
     plausibility_warnings : tuple of str
@@ -131,6 +137,7 @@ class Check(Drawable, Tabled, Examination):
     faults: tuple[str, ...] = ()
     strict: bool = False
     sway_limit: float | None = None
+    overshoot_limit: float | None = None
     searched: int = 0
     plausibility_warnings: tuple[str, ...] = ()
     wind: StaticDeflection | None = None
@@ -179,6 +186,12 @@ class Check(Drawable, Tabled, Examination):
         if self.sway_limit is None or finding.on_the_way is None:
             return 0.0
         return (finding.on_the_way + self.error_bound) / (SWAY_TOLERANCE * self.sway_limit)
+
+    def _share_passed(self, finding: Finding) -> float:
+        """Share of how far the target may be passed, the error bound included; 0 where there is no limit."""
+        if self.overshoot_limit is None or finding.overshoot is None:
+            return 0.0
+        return (finding.overshoot + self.error_bound) / (SWAY_TOLERANCE * self.overshoot_limit)
 
     def _share_of_room(self, finding: Finding) -> float:
         """Tell by how much in m a load is nearer to a stack than it may be, above 1."""
@@ -253,6 +266,14 @@ class Check(Drawable, Tabled, Examination):
                 "ranges."
             )
             yield self._exceeded(template, swaying, load, swaying.on_the_way or 0.0, self.sway_limit)
+        passing = max(findings, key=self._share_passed)
+        if self.overshoot_limit is not None and self._share_passed(passing) > 1.0:
+            template = (
+                "The {load} passes its target by {found:.4g} mm ({name}), and {limit:.4g} mm are allowed "
+                "(limits.overshoot, or check.residual_sway where that is more; integration error up to "
+                "{error}); allow more, take more time, or narrow the ranges."
+            )
+            yield self._exceeded(template, passing, load, passing.overshoot or 0.0, self.overshoot_limit)
         near = max(findings, key=self._share_of_room)
         if self._share_of_room(near) > 1.0:
             template = "path.clearance: {where} ({name}; integration error up to {error})."
@@ -277,6 +298,7 @@ class Check(Drawable, Tabled, Examination):
             "arrival_s": self.arrival,
             "strict": self.strict,
             "sway_limit_m": self.sway_limit,
+            "overshoot_limit_m": self.overshoot_limit,
             "machines_searched": self.searched,
             "wind": None if self.wind is None else self.wind.to_dict(),
             "nearest": self._nearest(),
@@ -292,6 +314,7 @@ class Check(Drawable, Tabled, Examination):
                     "residual_peaks_m": dict(finding.residual),
                     "residual_modal_m": dict(finding.modal),
                     "sway_peak_m": finding.on_the_way,
+                    "overshoot_m": finding.overshoot,
                     "room_m": finding.room,
                     "passed": self.keeps_limit(finding),
                 }
@@ -316,7 +339,10 @@ class Check(Drawable, Tabled, Examination):
 
     def _share(self, finding: Finding) -> float:
         return max(
-            self.fraction_after(finding), self._share_on_the_way(finding), self._share_of_room(finding)
+            self.fraction_after(finding),
+            self._share_on_the_way(finding),
+            self._share_passed(finding),
+            self._share_of_room(finding),
         )
 
     def _nearest(self) -> dict[str, Any] | None:

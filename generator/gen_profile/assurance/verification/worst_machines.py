@@ -147,7 +147,7 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
         figures = [peaks[:, : len(limits)] / limits]
         if sway is not None:
             figures.append(peaks[:, len(limits)] / sway)
-        if spec.path is not None:
+        if spec.path is not None or spec.limits.overshoot is not None:
             figures.append(-peaks[:, -3])
         return np.column_stack(figures)
 

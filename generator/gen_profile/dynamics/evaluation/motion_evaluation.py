@@ -1,5 +1,6 @@
 """A motion on the machines of a spec: what it does to them, and its figures."""
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -10,6 +11,7 @@ from gen_profile.dynamics.evaluation.residual_sway import RESIDUAL_SAMPLES, STAN
 from gen_profile.dynamics.evaluation.scenarios import Scenario, scenarios
 from gen_profile.dynamics.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Sway
 from gen_profile.dynamics.problem.dynamics import parameter_rows
+from gen_profile.dynamics.problem.overshoot import beyond
 from gen_profile.dynamics.problem.parameter_box import machines_inside
 from gen_profile.dynamics.problem.problem import problem_of
 from gen_profile.motion.actuator import lag_compensated
@@ -24,6 +26,7 @@ from gen_profile.motion.metrics import (
 )
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
+from gen_profile.spec.passed_target import Target, targets
 from gen_profile.support.errors import InfeasibleProblem, SpecError, rounded_down
 from gen_profile.support.summary import Summarised
 
@@ -51,6 +54,8 @@ class MotionEvaluation(Summarised):
         Of machines all over the ranges, less accurately; of the same where nothing has a range.
     watch : float
         How long a residual is watched, in s.
+    targets : tuple of Target
+        What the end load may pass by little only.
     """
 
     motion: Profile
@@ -59,6 +64,7 @@ class MotionEvaluation(Summarised):
     swing: PlantSimulation
     everywhere: PlantSimulation
     watch: float
+    targets: tuple[Target, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -93,6 +99,9 @@ class MotionEvaluation(Summarised):
             "sway_residual_peak_perturbed_m": residuals[min(1, len(self.machines) - 1)],
             "sway_residual_worst_m": max(residuals),
         }
+        if self.targets:
+            nominal, worst = self.overshoot
+            table |= {"load_overshoot_peak_m": nominal, "load_overshoot_worst_m": worst}
         if command is not motion:
             table |= {
                 f"command_{name}_max_{unit}": greatest(command, order, motion.leading)
@@ -100,6 +109,21 @@ class MotionEvaluation(Summarised):
             }
             table["command_overshoot_m"] = overshoot(command)
         return table
+
+    @cached_property
+    def overshoot(self) -> tuple[float, float]:
+        """How far the end load passes its targets during the motion in m: nominal, and at worst."""
+        if not self.targets:
+            return -math.inf, -math.inf
+
+        def greatest_of(swing: PlantSimulation, samples: int) -> list[float]:
+            times = np.linspace(0.0, self.motion.duration, samples)
+            sway = swing.sway(times)[:, :, swing.plant.end_load]
+            found = beyond(self.targets, self.motion.derivative(times, 0), sway).max(axis=(0, 2))
+            return [float(one) for one in found]
+
+        known = greatest_of(self.swing, TRANSIENT_SAMPLES)
+        return known[0], max(*known, *greatest_of(self.everywhere, COARSE_SAMPLES))
 
     @property
     def axes(self) -> dict[str, dict[str, float]]:
@@ -176,6 +200,7 @@ def _evaluation(
         swing=swing,
         everywhere=everywhere,
         watch=observation_time(spec),
+        targets=targets(spec),
     )
 
 

@@ -12,6 +12,8 @@ from gen_profile.dynamics.problem import symbolic as sym
 from gen_profile.dynamics.problem.dynamics import dynamics, parameter_rows
 from gen_profile.dynamics.problem.initial_state import initial_state
 from gen_profile.dynamics.problem.linearization import eigenvalues, eigenvalues_at, linear_terms, linearize
+from gen_profile.dynamics.problem.overshoot import beyond
+from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.dynamics.problem.symbolic import Function
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
@@ -185,6 +187,27 @@ def greatest_sway(
     except CosimulationError:
         return np.full(len(machines), np.inf)
     return peak(length(sway[:, :, plant.end_load]))[:, 0]
+
+
+def greatest_overshoot(
+    problem: Problem,
+    motion: Profile,
+    machines: Sequence[Mapping[str, float]],
+    *,
+    accuracy: float = RELATIVE_TOLERANCE,
+    samples: int = TRANSIENT_SAMPLES,
+) -> Array:
+    """Find how far every machine's end load passes its targets during a motion, in m, shape (machines,).
+
+    Infinite where the loads swing so far that they cannot be followed.
+    """
+    plant, times = problem.plant, np.linspace(0.0, motion.duration, samples)
+    try:
+        swing = PlantSimulation(plant, motion, machines, motion.duration, problem.initial, accuracy=accuracy)
+        sway = swing.sway(times)[:, :, plant.end_load]
+    except CosimulationError:
+        return np.full(len(machines), np.inf)
+    return np.asarray(beyond(problem.targets, motion.derivative(times, 0), sway).max(axis=(0, 2)))
 
 
 def free_swing(

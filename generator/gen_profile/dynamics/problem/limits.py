@@ -49,7 +49,9 @@ class Breach:
         return Reason(code=Code.LIMIT_BROKEN, **attrs.asdict(self))
 
 
-def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tuple[Breach, ...]:
+def breaches(
+    limits: LimitsSpec, command: Profile, transient_sway: float, overshoot: float = -math.inf
+) -> tuple[Breach, ...]:
     """Find the limits that a motion breaks.
 
     Parameters
@@ -59,13 +61,14 @@ def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tup
         Setpoints of the drives, lag compensation included.
     transient_sway : float
         Greatest sway of the end load during the move in m, nominal machine.
+    overshoot : float
+        How far the end load passes its target, in m.
     """
-    return tuple(
-        breach for breach in _demands(limits, command, transient_sway) if breach.found > breach.allowed
-    )
+    demands = _demands(limits, command, transient_sway, overshoot)
+    return tuple(breach for breach in demands if breach.found > breach.allowed)
 
 
-def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:
+def _demands(limits: LimitsSpec, command: Profile, sway: float, overshoot: float) -> Iterator[Breach]:
     """List what the motion needs of every limit there is."""
     for column in range(command.axes):
         allowed_here = limits.of(column)
@@ -82,3 +85,5 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
             yield Breach(place=travel, found=-bottom - rounding, allowed=-low)
     if limits.sway is not None:
         yield Breach(place="limits.sway", found=sway, allowed=limits.sway)
+    if limits.overshoot is not None:
+        yield Breach(place="limits.overshoot", found=overshoot, allowed=limits.overshoot)

@@ -10,6 +10,7 @@ import attrs
 from gen_profile.dynamics.problem.held_axes import reduced
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import AxisLimitsSpec, LimitsSpec, Spec
+from gen_profile.spec.passed_target import Target, targets
 from gen_profile.support.units import RATES
 
 Effort = Literal["jerk", "snap", "reference"]
@@ -62,6 +63,10 @@ class Problem:
         γ in 1/m; None lets the solver take `AUTO_SWAY` over the peak sway of the same move with β = 0.
     limits : LimitsSpec
         Of the command and of the sway on the way.
+    targets : tuple of Target
+        What the end load may pass by `limits.overshoot`, with the problem's own axes.
+    overshoot_margin : float
+        m, by which less the nominal machine may pass them, since others pass them farther.
     sway_spread : float
         How many times the nominal machine's sway on the way the worst one's is, for which the limit holds.
     worst_case : WorstCase or None
@@ -86,6 +91,8 @@ class Problem:
     sway_scale: float | None
     order: int = 1
     limits: LimitsSpec = attrs.field(factory=LimitsSpec)
+    targets: tuple[Target, ...] = ()
+    overshoot_margin: float = 0.0
     sway_spread: float = 1.0
     worst_case: WorstCase | None = None
     ranges: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
@@ -102,7 +109,7 @@ class Problem:
         return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
 
     def within(self, share: float) -> Problem:
-        """Ask for a share of what the limits allow of velocity, acceleration and jerk, and of the room."""
+        """Ask for a share of what limits allow of velocity, acceleration, jerk, overshoot and room."""
         room = 1.0 - share
 
         def narrow(column: int, own: AxisLimitsSpec) -> AxisLimitsSpec:
@@ -113,12 +120,20 @@ class Problem:
             return attrs.evolve(own, **rates, travel=None if own.travel is None else inside)
 
         axis = {f"axis{column}": narrow(column, self.limits.of(column)) for column in range(len(self.target))}
-        return attrs.evolve(self, limits=LimitsSpec(sway=self.limits.sway, axis=axis))
+        past = None if self.limits.overshoot is None else share * self.limits.overshoot
+        return attrs.evolve(self, limits=LimitsSpec(sway=self.limits.sway, overshoot=past, axis=axis))
 
     @property
     def nominal_sway(self) -> float | None:
         """What the limit of sway on the way leaves to the nominal machine, in m; None without a limit."""
         return None if self.limits.sway is None else self.limits.sway / self.sway_spread
+
+    @property
+    def nominal_overshoot(self) -> float | None:
+        """How far the nominal machine's load may pass its target, in m; None without a limit."""
+        if self.limits.overshoot is None or not self.targets:
+            return None
+        return max(self.limits.overshoot - self.overshoot_margin, 0.0)
 
 
 # With sway_scale = "auto" β and γ mean for every move what they mean for the paper's: the sway counts in
@@ -149,6 +164,12 @@ def problem_of(spec: Spec, *, whole: bool = False) -> Problem:
         desensitized=tuple(robustness.uncertain) if robustness.method == "sensitivity" else (),
         order=robustness.order,
         limits=spec.limits.only(machine.moving),
+        targets=tuple(
+            attrs.evolve(
+                one, direction=attrs.evolve(one.direction, axis=machine.moving.index(one.direction.axis))
+            )
+            for one in targets(spec)
+        ),
         worst_case=worst_case,
         ranges=spec.checked_ranges(),
         effort=spec.cost.effort,

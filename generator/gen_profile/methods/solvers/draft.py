@@ -15,6 +15,7 @@ from gen_profile.dynamics.evaluation.motion_evaluation import (
     share_of_residual_sway,
 )
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE, Breach, breaches
+from gen_profile.dynamics.problem.overshoot import counted, excess
 from gen_profile.methods.solvers import transient_sway
 from gen_profile.methods.solvers.direct.relaxation import Relaxed
 from gen_profile.methods.solvers.motion import whole_motion
@@ -119,7 +120,8 @@ class Plan(Drawable):
         """The limits that the motion, which must be there, breaks on some machine."""
         figures = self.evaluation.figures
         sway = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
-        return breaches(self.spec.limits, self.evaluation.command, sway)
+        over = counted(self.evaluation.targets, *self.evaluation.overshoot)
+        return breaches(self.spec.limits, self.evaluation.command, sway, over)
 
     @cached_property
     def excess_sway(self) -> float:
@@ -134,6 +136,8 @@ class Plan(Drawable):
         except CosimulationError:
             return math.inf
         if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
+            return math.inf
+        if excess(evaluation.targets, evaluation.overshoot[1]) > 0.0:
             return math.inf
         taken = share_of_residual_sway(self.spec, evaluation)
         return math.log(taken / WITHIN) if taken > 0.0 else -math.inf

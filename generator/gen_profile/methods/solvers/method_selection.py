@@ -8,12 +8,14 @@ from functools import partial
 import attrs
 import numpy as np
 
+from gen_profile.dynamics.evaluation.simulation import greatest_overshoot
 from gen_profile.dynamics.problem.limits import Breach, breaches
 from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.overshoot import counted
 from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct import solver as direct
 from gen_profile.methods.solvers.direct import worst_case
-from gen_profile.methods.solvers.direct.relaxation import SHORTEST, Relaxation, Relaxed, shortest
+from gen_profile.methods.solvers.direct.relaxation import SHORTEST, Relaxation, Relaxed, shortest, wideable
 from gen_profile.methods.solvers.direct.solver import ProgramSequence
 from gen_profile.methods.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.methods.solvers.indirect import solver as indirect
@@ -156,7 +158,7 @@ def _begun(
 def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:
     """Bisect intervals where limits begin to bind, if that is worth it, and look for less violation."""
     finer = nearest.bisected()
-    return None if finer is None else Relaxation(problem, (), finer).least(_places(problem))
+    return None if finer is None else Relaxation(problem, (), finer).least(wideable(problem))
 
 
 def _with_reserve(problem: Problem, near: ProgramSequence | None, *, coarse: bool) -> Solution:
@@ -188,12 +190,8 @@ def _infeasible(problem: Problem, nearest: Relaxed) -> Solution:
 
 def least_violation(problem: Problem) -> Relaxed | None:
     """Find the motion for which all limits must be widened least; none without limits."""
-    places = _places(problem)
+    places = wideable(problem)
     return Relaxation(problem).least(places) if places else None
-
-
-def _places(problem: Problem) -> tuple[str, ...]:
-    return tuple(problem.limits.stated())
 
 
 def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
@@ -253,4 +251,7 @@ def _broken(solution: Solution) -> tuple[Breach, ...]:
     sway = 0.0 if problem.limits.sway is None else sway_on_the_way(solution)
     sway = max(sway, problem.sway_spread * sway / SLACK)
     command = lag_compensated(optimal_profile(solution), problem.tau)
-    return breaches(problem.limits, command, sway)
+    over = -math.inf
+    if problem.targets:
+        over = float(greatest_overshoot(problem, optimal_profile(solution), [problem.parameters])[0])
+    return breaches(problem.limits, command, sway, counted(problem.targets, over))

@@ -7,11 +7,12 @@ import attrs
 
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE, Breach, breaches
 from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.overshoot import counted
 from gen_profile.dynamics.problem.problem import problem_of
 from gen_profile.methods.shapers.base_moves import BASES
 from gen_profile.methods.shapers.shaped_move import ShapedMove, shaped_move, too_short
 from gen_profile.methods.solvers.search import Search, least
-from gen_profile.methods.solvers.transient_sway import sways
+from gen_profile.methods.solvers.transient_sway import overshoots, sways
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Profile, grid_duration
 from gen_profile.spec.model import Spec
@@ -106,8 +107,10 @@ def _plausible_stretch(spec: Spec, shaped: ShapedMove) -> float:
 def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     """Find the limits that a motion breaks; the sway's last, for it must be integrated."""
     command = lag_compensated(motion, spec.actuator.tau)
-    broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
-    if broken or spec.limits.sway is None:
+    limits, problem = spec.limits, problem_of(spec, whole=True)
+    broken = breaches(attrs.evolve(limits, sway=None, overshoot=None), command, 0.0)
+    if broken or (limits.sway is None and limits.overshoot is None):
         return broken
-    nominal, worst = sways(problem_of(spec, whole=True), motion)
-    return breaches(spec.limits, command, max(nominal, worst / SWAY_TOLERANCE))
+    nominal, worst = (0.0, 0.0) if limits.sway is None else sways(problem, motion)
+    over = (-math.inf, -math.inf) if limits.overshoot is None else overshoots(problem, motion)
+    return breaches(limits, command, max(nominal, worst / SWAY_TOLERANCE), counted(problem.targets, *over))

@@ -11,6 +11,7 @@ from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers import transient_sway
 from gen_profile.methods.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed, refined
 from gen_profile.methods.solvers.draft import Plan, drafted, in_cycles, lasting, solved
+from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.methods.solvers.search import Search, least, slope_of
 from gen_profile.methods.solvers.shape import shaped_motion
 from gen_profile.methods.solvers.suggestions import beside, remedy, sufficient_duration
@@ -89,15 +90,20 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
 def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Problem, Relaxed]:
     """Find the shortest motion within the limits, and the problem with the spread that machines have then."""
     _require_short(choice.usual_duration(problem))
-    swayed = transient_sway.limited(problem)
-    least = choice.minimum_time(problem, progress, search=ROUGHLY if swayed else SHORTEST)
+    swayed = transient_sway.limited(problem) or bool(problem.targets and problem.ranges)
+    least = choice.minimum_time(
+        problem, progress, search=ROUGHLY if transient_sway.limited(problem) else SHORTEST
+    )
     with suppress(OutOfWork), budget(SPREADING * left()):
         for _ in range(SPREADS):
             if least is None or not swayed:
                 break
-            more = transient_sway.spread(least.solution)
-            swayed = abs(more - problem.sway_spread) > NEARLY * more
-            problem = attrs.evolve(problem, sway_spread=more)
+            more, solution = transient_sway.spread(least.solution), least.solution
+            margin = problem.overshoot_margin
+            if solution.optimum is not None:
+                margin = transient_sway.overshoot_margin(problem, optimal_profile(solution))
+            swayed = abs(more - problem.sway_spread) > NEARLY * more or margin > problem.overshoot_margin
+            problem = attrs.evolve(problem, sway_spread=more, overshoot_margin=margin)
             least = choice.minimum_time(problem, progress, least)
     if least is None:
         slow = _slow(spec, problem)

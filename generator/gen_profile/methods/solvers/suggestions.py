@@ -204,7 +204,11 @@ def tried(spec: Spec, *, coarse: bool = False, options: SuggestionOptions = USUA
 
 
 def _kept(solution: Solution) -> bool:
-    return choice.keeps_limits(solution) and transient_sway.keeps_sway(solution, transient_sway.ACCEPTED)
+    return (
+        choice.keeps_limits(solution)
+        and transient_sway.keeps_sway(solution, transient_sway.ACCEPTED)
+        and transient_sway.keeps_behind(solution)
+    )
 
 
 def _relaxation(problem: Problem, spread: float = 1.0) -> Relaxation:
@@ -314,7 +318,13 @@ def _wider_limits(
     needed = max(nearest.wider, 1.0)
 
     def change(factor: float) -> Mapping[str, Any]:
-        return {place: _times(value, factor * needed) for place, value in limits.items()}
+        way = max((abs(target.way) for target in relaxation.problem.targets), default=0.0)
+        return {
+            place: rounded_up(value + (factor * needed - 1.0) * way)
+            if place == "limits.overshoot"
+            else _times(value, factor * needed)
+            for place, value in limits.items()
+        }
 
     return least_change(spec, change, relaxation.problem.sway_spread, options=options)
 

@@ -11,7 +11,8 @@ from functools import partial
 
 import attrs
 
-from gen_profile.dynamics.evaluation.simulation import greatest_sway
+from gen_profile.dynamics.evaluation.simulation import greatest_overshoot, greatest_sway
+from gen_profile.dynamics.problem.overshoot import excess
 from gen_profile.dynamics.problem.parameter_box import machines_of
 from gen_profile.dynamics.problem.problem import Problem, problem_of
 from gen_profile.methods.solvers import method_selection as choice
@@ -30,6 +31,7 @@ NEARLY_ACCEPTED = 1.008  # likewise where solving again takes long
 # the first spread that will do is taken; aimed at is a little more, for what lies between machines and times
 # looked at, and the worst machine's sway falls by at least a tenth as much as the nominal one's
 SPREAD = Search(precision=1e-3, aim=-2e-3, believed=(0.1, 10.0), tries=5)
+OVERSHOOT_ROUNDS = 4  # to find by how much less the nominal machine's load may pass its target
 ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001  # over the motion: n periods of a harmonic are met to (π n / 1000)² / 2
 
@@ -57,14 +59,14 @@ def attempt(
     problem = attrs.evolve(problem_of(spec), sway_spread=spread)
     if near is not None and spec.solver.solver != "indirect":
         begun = partial(choice.attempt, method="direct", near=near)
-        return _kept(problem, begun, NEARLY_ACCEPTED, progress)
+        return _behind(problem, lambda asked: _kept(asked, begun, NEARLY_ACCEPTED, progress))
     return kept_by_all(problem, spec.solver.solver, progress)
 
 
 def kept_by_all(
     problem: Problem, method: SolverName, progress: Progress = no_progress, *, coarse: bool = False
 ) -> Solution:
-    """Solve a problem again with less sway of the nominal machine, until all in its ranges keep the limit.
+    """Solve a problem again with less sway of the nominal machine, until all in its ranges keep the limits.
 
     How much less is measured on motions on few intervals first.
 
@@ -76,6 +78,10 @@ def kept_by_all(
     coarse : bool
         On few intervals only.
     """
+    return _behind(problem, partial(_swaying, method=method, progress=progress, coarse=coarse))
+
+
+def _swaying(problem: Problem, method: SolverName, progress: Progress, *, coarse: bool) -> Solution:
     if not limited(problem) or (method == "indirect" and problem.worst_case is None):
         return choice.attempt(problem, method, coarse=coarse)  # the indirect method knows no limits
     if coarse or problem.worst_case is None:
@@ -85,6 +91,50 @@ def kept_by_all(
         problem = attrs.evolve(problem, sway_spread=solution.problem.sway_spread)
     # where it finds a motion, so does "auto", and it is the quicker to fail
     return _kept(problem, partial(choice.attempt, method="direct"), NEARLY_ACCEPTED, progress)
+
+
+def _behind(problem: Problem, solve: Callable[[Problem], Solution]) -> Solution:
+    """Let the nominal machine's load pass its targets by less, until no machine's passes them too far.
+
+    As much is taken off as the worst went too far, as far as it may pass them at all.
+    """
+    for _ in range(OVERSHOOT_ROUNDS):
+        solution = solve(problem)
+        if solution.optimum is None or not problem.targets:
+            return solution
+        problem = solution.problem
+        margin = overshoot_margin(problem, optimal_profile(solution))
+        if margin == problem.overshoot_margin:
+            break
+        problem = attrs.evolve(problem, overshoot_margin=margin)
+    if keeps_behind(solution):
+        return solution
+    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+
+
+def keeps_behind(solution: Solution) -> bool:
+    """Whether no machine's load passes the targets of its problem too far."""
+    targets = solution.problem.targets
+    if not targets:
+        return True
+    return excess(targets, overshoots(solution.problem, optimal_profile(solution))[1]) <= 0.0
+
+
+def overshoot_margin(problem: Problem, motion: Profile) -> float:
+    """Tell by how much less the nominal machine may pass the targets in m, for what the worst one does."""
+    if not problem.targets:
+        return 0.0
+    missing = excess(problem.targets, overshoots(problem, motion)[1], ACCEPTED)
+    if missing <= 0.0:
+        return problem.overshoot_margin
+    return min(problem.overshoot_margin + missing, problem.limits.overshoot or 0.0)
+
+
+def overshoots(problem: Problem, motion: Profile) -> tuple[float, float]:
+    """Find how far the end load passes its targets in a motion in m: nominal, and on the worst machine."""
+    machines = machines_of(problem)
+    found = greatest_overshoot(problem, motion, machines, accuracy=ACCURACY, samples=SAMPLES)
+    return float(found[0]), float(found.max())
 
 
 def limited(problem: Problem) -> bool:

@@ -140,6 +140,10 @@ def _limits(spec: Spec, evaluation: MotionEvaluation, figures: Mapping[str, floa
     rows = [*_axis_limits(spec, evaluation)]
     if spec.limits.sway is not None:
         rows.append(_limit("sway on the way", figures["sway_transient_peak_m"], spec.limits.sway, "mm", 1e3))
+    if check.overshoot_limit is not None:
+        passed = max(finding.overshoot or 0.0 for finding in check.judged) + check.error_bound
+        words = "how far the load passes its target, error included"
+        rows.append(_limit(words, max(passed, 0.0), check.overshoot_limit, "mm", 1e3))
     for load, limit in check.limit.items():
         worst = max(finding.residual[load] for finding in check.judged) + check.error_bound
         rows.append(_limit(f"residual sway of the {load}, error included", worst, limit, "mm", 1e3))

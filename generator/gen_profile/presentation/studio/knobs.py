@@ -21,6 +21,7 @@ from gen_profile.spec.values import Bounds
 from gen_profile.support.units import RATES
 
 REACH = 4.0  # times the value to begin with, up to which a slider goes, and down to which share of it
+OF_THE_LOAD = ("limits.sway", "limits.overshoot")  # limits in m whatever the axes' units are
 _TABLES = tomllib.loads((Path(__file__).parents[2] / "lists" / "knobs.toml").read_text("utf-8"))
 UNITS: Mapping[str, str] = _TABLES["units"]
 USUAL: Mapping[str, float] = _TABLES["usual"]
@@ -275,7 +276,7 @@ def _limits(spec: Spec) -> Iterator[Knob]:
         name = place.rpartition(".")[2] if place != "limits" else ""
         unit = next((axis.unit for axis in axes if axis.name == name), "m" if "m" in units else "rad")
         if not name and len(units) > 1:  # no limit means the same of axes of different units
-            yield from (knob for knob in _fields(table, place) if knob.words == "limits.sway")
+            yield from (knob for knob in _fields(table, place) if knob.words in OF_THE_LOAD)
             continue
         for knob in _fields(table, place, words="limits", name=name):
             rate = RATES.get(knob.words.rpartition(".")[2])

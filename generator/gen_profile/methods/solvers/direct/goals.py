@@ -7,6 +7,7 @@ import numpy as np
 
 from gen_profile.dynamics.problem.cost import SwayCost, axis_reach
 from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.dynamics.problem.overshoot import beyond
 from gen_profile.dynamics.problem.pontryagin import SNAP_TIME
 from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct.bezier import Piece, gram
@@ -14,6 +15,7 @@ from gen_profile.methods.solvers.direct.condensing import IntervalMaps
 from gen_profile.methods.solvers.direct.conic import ConicProgram, Entries, place, squares
 from gen_profile.methods.solvers.direct.transcription import Iterate, Transcription
 from gen_profile.motion.profile import Array
+from gen_profile.spec.passed_target import Target
 from gen_profile.support.one_thread import one_thread
 
 WITHIN = 1.0 - 1e-6  # fraction of a limit that a program may use: its own tolerance must not break the limit
@@ -189,6 +191,42 @@ def keep_sway(
     below = matrix.rows + matrix.rows // directions + 1  # the first row of each cone is empty
     sides = np.column_stack([np.ones(points), offset.reshape(points, directions) / limit])
     program.within_cones(attrs.evolve(-matrix, rows=below), sides, give)
+
+
+def passed(transcription: Transcription, iterate: Iterate, problem: Problem) -> Array:
+    """Tell how far in m the end load is past its targets at the collocation points, (targets, points)."""
+    sway, axes = transcription.end_sway_found(iterate), transcription.axes(iterate.local)
+    return beyond(problem.targets, axes.reshape(len(sway), -1), sway)
+
+
+def keep_behind(
+    program: ConicProgram,
+    targets: Sequence[Target],
+    transcription: Transcription,
+    iterate: Iterate,
+    maps: IntervalMaps,
+    *,
+    limit: float,
+    widened: bool = False,
+) -> None:
+    """Bound how far the nominal machine's end load passes its targets at the collocation points.
+
+    Parameters
+    ----------
+    limit : float
+        m.
+    widened : bool
+        Whether the program's last variable widens it, by the way for every time beyond the first.
+    """
+    sway, blocks, offset = transcription.end_sway(iterate, maps)
+    directions, axes = sway.shape[1], transcription.axes
+    for target in targets:
+        axis, component = target.direction.axis, target.direction.component
+        rows = -blocks[:, component::directions]
+        rows[:, :, : transcription.breadth] += axes.matrix[:, :, axis]
+        behind = np.tile(target.at - axes.offset[:, axis], transcription.intervals)
+        sides = limit / abs(target.way) + (behind + offset[component::directions]) / target.way
+        program.at_most(transcription.of_coupled(rows / target.way), sides, float(widened))
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -20,7 +20,11 @@ REACHED = 1e-4  # fraction of a limit that may lack of all of it; 1e-3 costs up 
 
 
 def switching(
-    setup: Setup, iterate: Iterate, sway_limit: float | None, widened: Container[str] = (), wider: float = 1.0
+    setup: Setup,
+    iterate: Iterate,
+    on_the_way: tuple[float | None, float | None],
+    widened: Container[str] = (),
+    wider: float = 1.0,
 ) -> NDArray[np.bool_]:
     """Tell within which intervals some limit begins or ceases to bind, shape (intervals,).
 
@@ -28,15 +32,15 @@ def switching(
     ----------
     setup : Setup
     iterate : Iterate
-    sway_limit : float or None
-        m, at the collocation points.
+    on_the_way : (float or None, float or None)
+        Of the sway at the collocation points, and of how far the load passes its targets there, in m.
     widened : container of str
         Places of limits that are so many times as wide, as `goals.keep_limits` widens them.
     wider : float
     """
     transcription = setup.transcription
     local = iterate.local.reshape(transcription.intervals, len(transcription.target), -1)
-    taken = []
+    taken, (sway_limit, overshoot_limit) = [], on_the_way
     for limit in goals.axis_limits(setup.problem, transcription):
         values = np.einsum("krs,ks->kr", limit.rows, local[:, limit.axis])
         give = limit.give * (wider - 1.0) if limit.place in widened else 0.0
@@ -46,6 +50,11 @@ def switching(
         sway = np.linalg.norm(transcription.end_sway_found(iterate), axis=1)
         give = wider if "limits.sway" in widened else 1.0
         taken.append(sway.reshape(transcription.intervals, STAGES) / (give * sway_limit))
+    if overshoot_limit is not None:
+        ways = np.abs([target.way for target in setup.problem.targets])[:, None]
+        most = overshoot_limit + ways * (wider - 1.0 if "limits.overshoot" in widened else 0.0)
+        farther = goals.passed(transcription, iterate, setup.problem) - most
+        taken += [*(1.0 + farther / ways).reshape(len(ways), transcription.intervals, STAGES)]
     binds = [fractions > 1.0 - REACHED for fractions in taken]
     return np.asarray(np.any([some.any(axis=1) & ~some.all(axis=1) for some in binds], axis=0))
 

@@ -81,7 +81,7 @@ class Relaxed:
         """Quarter the intervals where limits begin or cease to bind; None where they are short already."""
         sequence_result, goal = self.sequence_result, self.sequence_result.goal
         for _ in range(2):
-            where = switching(goal.setup, sequence_result.iterate, goal.sway_limit, goal.widened, self.wider)
+            where = switching(goal.setup, sequence_result.iterate, goal.on_the_way, goal.widened, self.wider)
             where &= goal.setup.transcription.piece.length > FINEST
             if not where.any():
                 break
@@ -155,6 +155,7 @@ class Relaxation:
             goal = Goal(
                 setup=setup,
                 sway_limit=setup.problem.nominal_sway,
+                overshoot_limit=setup.problem.nominal_overshoot,
                 effort_price=price / effort,
                 worst=RESTS,
                 widened=widened,
@@ -172,8 +173,17 @@ def time_dependent_limits(problem: Problem) -> tuple[str, ...]:
 
     A move that begins at an end of its travel asks for all of it, however long it takes.
     """
-    places = tuple(problem.limits.stated())
+    places = wideable(problem)
     return tuple(place for place in places if not place.endswith(".travel")) or places
+
+
+def wideable(problem: Problem) -> tuple[str, ...]:
+    """Name the limits of which less than all may suffice; where there are none, the one that is stated.
+
+    All of ``limits.overshoot`` is taken by a load that may not pass its target, for it ends there.
+    """
+    places = tuple(problem.limits.stated())
+    return tuple(place for place in places if place != "limits.overshoot") or places
 
 
 def least_duration(relaxation: Relaxation) -> float | None:

@@ -71,6 +71,8 @@ class Goal:
         Its machines tried keep their loads' limits after the move.
     sway_limit : float or None
         m, on the way, of the nominal machine at the collocation points.
+    overshoot_limit : float or None
+        m, by which its end load may pass its target there.
     sway_cost : SwayCost
         Of eq. (26), which is minimised.
     effort_price : float or None
@@ -87,11 +89,17 @@ class Goal:
 
     setup: Setup
     sway_limit: float | None
+    overshoot_limit: float | None = None
     sway_cost: SwayCost = UNWEIGHTED
     effort_price: float | None = None
     worst: float | None = None
     widened: tuple[str, ...] = ()
     nearest: Iterate | None = None
+
+    @property
+    def on_the_way(self) -> tuple[float | None, float | None]:
+        """Limits of the sway at the collocation points, and of how far the load passes its target."""
+        return self.sway_limit, self.overshoot_limit
 
     @property
     def extra(self) -> int:
@@ -107,6 +115,10 @@ class Goal:
         if self.sway_limit is not None:
             wide = "limits.sway" in self.widened
             goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0], widened=wide)
+        if self.overshoot_limit is not None:
+            wide, most = "limits.overshoot" in self.widened, self.overshoot_limit
+            ahead = setup.problem.targets
+            goals.keep_behind(program, ahead, transcription, iterate, maps[0], limit=most, widened=wide)
         if setup.tried:
             goals.bound_worst(program, transcription, setup.tried, maps, self.worst)
         linear = np.zeros(program.variables)
@@ -213,7 +225,8 @@ def solve(
 
     def attempt(sway_limit: float | None) -> Solution:
         nonlocal setup, iterations, start
-        goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
+        behind = problem.nominal_overshoot
+        goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit, overshoot_limit=behind)
         if problem.limits.stated() and not coarse:
             result = refined(start, goal)
         else:
@@ -315,7 +328,7 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
             break
         start, before, cost = result.iterate, cost, goal.setup.cost(result.iterate, goal.sway_cost)
         begun.append((start, goal))
-        where = switching(goal.setup, start, goal.sway_limit)
+        where = switching(goal.setup, start, goal.on_the_way)
         if abs(before - cost) < goal.setup.options.worth_bisecting * cost or not where.any():
             break
         finer, start = bisected(goal.setup, start, where)

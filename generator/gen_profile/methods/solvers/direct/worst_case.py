@@ -151,7 +151,13 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
     swaying = problem.nominal_sway
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=swaying, worst=GOOD_ENOUGH)
+        goal = Goal(
+            setup=setup,
+            sway_cost=sway_cost,
+            sway_limit=swaying,
+            overshoot_limit=problem.nominal_overshoot,
+            worst=GOOD_ENOUGH,
+        )
         start = _begun(setup, result)
         # the bound only rises with more machines: what was not good enough before is not now
         result = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
