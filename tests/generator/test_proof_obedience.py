@@ -417,7 +417,8 @@ def test_what_commands_mean_depends_on_what_the_block_did():
     )
     none = np.zeros(1000, dtype=bool)
     far = np.zeros((1, 1000))
-    facts = {"done": none, "stands": none, "errors": 1.0 * none, "position": far, "low": far, "high": far}
+    facts = {"done": none, "stands": none, "withdrawn": none, "errors": 1.0 * none}
+    facts |= dict.fromkeys(("position", "low", "high"), far)
     assert changes(read(*rows, facts=Facts(**facts)).holds) == {300: 0}
     done = none.copy()
     done[150:200] = True
@@ -437,7 +438,13 @@ def test_an_interval_is_in_the_way_where_it_lies_before_the_target(low, ahead, i
     errors, still, place = np.zeros(1000), np.zeros(1000, dtype=bool), np.zeros((1, 1000))
     errors[101:] = BLOCKED
     facts = Facts(
-        done=still, stands=still, errors=errors, position=place, low=place + ahead, high=place + ahead
+        done=still,
+        stands=still,
+        errors=errors,
+        position=place,
+        low=place + ahead,
+        high=place + ahead,
+        withdrawn=still,
     )
     inputs = attrs.evolve(INPUTS, names=names)
     rows = np.array([list(values.values()), list(closed.values())])
@@ -476,10 +483,14 @@ def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
         sway_limit=0.05,
         sensed=lambda _: np.zeros(4, dtype=bool),
         drifts=np.zeros(4, dtype=bool),
+        brakings=[],
     )
     for left, found in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
         run = SimpleNamespace(residual=np.array([left]), stands=1)
         assert list(BlockWatch._understated(None, run, followed)) == found
+    followed.brakings.append(1)
+    assert list(BlockWatch._understated(None, run, followed)) == []
+    followed.brakings.clear()
     followed.issued["nPromise"][-1] = 1.0  # the rope changed on the way
     assert list(BlockWatch._understated(None, run, followed)) == []
     followed.issued["nPromise"][-1], followed.drifts[1] = 0.0, True  # another rope was given at rest

@@ -28,7 +28,7 @@ from gen_profile_exporters.playback.structured_text import block_name
 
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command
 SHELL_WORK, ZONES_WORK = 200, 150  # operations of every cycle: of an axis, and where it has zones;
-BRAKE_WORK = 350  # and where one leaves little room to brake
+BRAKE_WORK = 350  # and where it has to brake in time
 EACH = re.compile(r"(?ms)^ *@each_axis\n(.*?)^ *@end_axis\n")
 TOLERANCE = ("is not the cycle time of this block", "is not within 0.1 % of the cycle time of this block")
 
@@ -109,7 +109,7 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
         "cCycle": c.cycle,
         "cOperations": operations(c),
         "cShellWork": len(c.axes) * (SHELL_WORK + (ZONES_WORK if c.zones else 0)) + 15 * len(c.live),
-        **({"cBrakeWork": BRAKE_WORK} if c.zones else {}),
+        "cBrakeWork": BRAKE_WORK,
         "cHoldCycles": round(HOLD / c.cycle),
         "cGivesUpCycles": round(GIVES_UP * max(c.periods) / c.cycle),
         "cSwayLimit": c.sway_limit,

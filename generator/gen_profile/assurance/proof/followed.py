@@ -23,7 +23,7 @@ from gen_profile.assurance.proof.orders import (
     TimedOrder,
     taken_over,
 )
-from gen_profile.methods.quickest.axis_alone import AxisLimits
+from gen_profile.methods.quickest.axis_alone import AxisLimits, braked
 from gen_profile.methods.quickest.modes import Complex
 from gen_profile.methods.quickest.motion import AxisGoal, AxisState, alone
 from gen_profile.motion.profile import Array
@@ -40,6 +40,8 @@ SLOT = 0.05  # periods: what docs/planner.md calls a slot
 CALMING = 0.1  # share of the limits that docs/planner.md keeps for calming where live parameters change
 BEFORE_SLOW = 3.0  # slots at full speed, in which a slow interval's limit holds, too, as docs/planner.md says
 IN_VELOCITY = 1.001e-3  # share of the greatest velocity, by which one counts as reached; documented: 0.001
+ENDS_WITHIN = 2  # cycles, as braking begins and ends within one
+UNKNOWN = 2.0  # nPromise: it is not known how the load swings
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
 
 
@@ -158,9 +160,18 @@ class Followed:
         return [taken_over(last, own.velocity) for last, own in zip(given, self.limits, strict=True)]
 
     @cached_property
+    def brakings(self) -> list[int]:
+        """Cycles in which axes begin to be braked: an interval came nearer than the stated ends of a stop."""
+        lost = self.issued["nPromise"] == UNKNOWN
+        begun = np.flatnonzero(lost[1:] & ~lost[:-1] & ~self.stands[:-1]) + 1
+        nearer = [zone for zone in self.zones if came_nearer(self, zone)]
+        return [at for at in begun.tolist() if any(_is_braked(self, zone, at) for zone in nearer)]
+
+    @cached_property
     def unknown_from(self) -> int:
         """Cycle from which on it is not known how the load of the machine as given swings."""
         lost = [order.begin for order in self.orders if order.kind in (QUICK_STOP, DISABLED)]
+        lost += self.brakings
         lost += [*self.rest_reports, *np.flatnonzero(self.retold)[:1].tolist()]
         return min(lost, default=self.cycles)
 
@@ -391,6 +402,42 @@ def bounded(followed: Followed, alone_time: float, motions: int = 1) -> float:
 def in_time(followed: Followed, alone_time: float, motions: int = 1) -> float:
     """Tell in s what so many motions may take any block, its reaction included."""
     return followed.reaction + LATENESS * bounded(followed, alone_time, motions)
+
+
+def came_nearer(followed: Followed, zone: Zone) -> bool:
+    """Whether an interval was blocked where it had been stated that a stop leads."""
+    before = zone.begin - 1
+    if zone.limit or not 0 <= before < followed.cycles - 1:
+        return False
+    low, high = (followed.of(name)[zone.axis, before] for name in ("fStopLow", "fStopHigh"))
+    return bool(low < zone.high - EXACT and high > zone.low + EXACT)
+
+
+def _is_braked(followed: Followed, zone: Zone, cycle: int) -> bool:
+    """Whether axes are braked to rest from a cycle on, which is soon after an interval came nearer."""
+    until = zone.begin + followed.after(
+        in_time(followed, to_speeds(followed, followed.velocity[:, zone.begin]))
+    )
+    if not zone.begin <= cycle < until or followed.stands[zone.begin : cycle].any():
+        return False
+    takes = max(time for time, _ in braking(followed, cycle))
+    rests = cycle + followed.after(takes) + ENDS_WITHIN
+    return bool(followed.stands[cycle : rests + 1].any()) or rests >= followed.cycles
+
+
+def braking(followed: Followed, cycle: int) -> list[tuple[float, float]]:
+    """Tell the time in s and the way in m in which each axis is braked from its state before a cycle on."""
+    before = zip(
+        followed.velocity[:, cycle - 1], followed.acceleration[:, cycle - 1], followed.limits, strict=True
+    )
+    return [
+        braked(
+            float(v),
+            float(a),
+            AxisLimits(velocity=own.velocity, acceleration=own.acceleration, jerk=own.jerk),
+        )
+        for v, a, own in before
+    ]
 
 
 def to_speeds(followed: Followed, before: Array, wanted: Sequence[float] | None = None) -> float:

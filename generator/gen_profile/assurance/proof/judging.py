@@ -40,6 +40,8 @@ class WatchedRun:
         How often inputs changed, and outputs came, in which state.
     unproven : bool
         Whether a sensor had at the end not yet shown a motion of its axis, so that nothing may be promised.
+    braked : bool
+        Whether axes were braked as an interval came nearer than it was stated that they stop.
     """
 
     run: BlockRun
@@ -49,6 +51,7 @@ class WatchedRun:
     obeyed: Sequence[Obeyed] = ()
     exercised: Pairs = attrs.field(factory=dict)
     unproven: bool = False
+    braked: bool = False
 
 
 def judge_run(
@@ -77,7 +80,7 @@ def judge_run(
         history=history,
         cycles=run.cycles,
         rests_after=max(0.0, run.stands * cycle - last) if run.stands >= 0 else None,
-        promise=run.promise and not history.misinformed,
+        promise=run.promise and not (history.misinformed or watched.braked),
         residual=dict(zip(loads, run.residual.tolist(), strict=True)),
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
@@ -85,7 +88,10 @@ def judge_run(
         overstated=watched.overstated,
         obeyed=tuple(watched.obeyed),
         exercised=watched.exercised,
-        faults=(*_faults(history, watched, limits, lasts=group in (RHYTHMS, LONG)), *watched.faults),
+        faults=(
+            *_faults(spec, history, watched, limits, cycle=cycle, lasts=group in (RHYTHMS, LONG)),
+            *watched.faults,
+        ),
     )
 
 
@@ -108,22 +114,28 @@ def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
     return shares
 
 
-def _faults(history: History, watched: WatchedRun, limits: dict[str, float], *, lasts: bool) -> Iterator[str]:
+def _faults(
+    spec: Spec, history: History, watched: WatchedRun, limits: dict[str, float], *, cycle: float, lasts: bool
+) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence; in one that lasts long errors may add up."""
     run = watched.run
     if run.fault:
         yield "a setpoint is no number" if run.fault == NO_NUMBER else f"the block {FAULTS[run.fault]}"
         return
-    for named, axis in zip(history.axes.values(), run.axes, strict=True):
-        yield from _axis_faults(history, named, axis, limits)
+    for (number, named), axis in zip(history.axes.items(), run.axes, strict=True):
+        braked = (
+            (spec.limits.of(number).jerk or 0.0) * cycle**3 * watched.braked
+        )  # braking ends within a cycle
+        yield from _axis_faults(history, named, axis, limits, ROUNDING + braked)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    if not run.promise and not (history.brakes or history.disturbed or lasts or watched.unproven):
+    unknown = history.brakes or history.disturbed or watched.unproven or watched.braked
+    if not run.promise and not (unknown or lasts):
         yield TAKEN_BACK
 
 
 def _axis_faults(
-    history: History, named: BlockAxis, axis: AxisExtremes, limits: dict[str, float]
+    history: History, named: BlockAxis, axis: AxisExtremes, limits: dict[str, float], gap: float
 ) -> Iterator[str]:
     of, which = (f" of {named.name}", f"axis {named.name}") if named.name else ("", "axis")
     for name in ("velocity", "acceleration", "jerk"):
@@ -133,7 +145,7 @@ def _axis_faults(
     beyond = limits[f"{named.prefix}beyond_travel_{named.unit}"]
     if not beyond <= ROUNDING and not history.moved:
         yield f"the {which} leaves its travel by {beyond:.3g} {named.unit}"
-    if not axis.gap <= ROUNDING and not (history.brakes or history.moved):  # a quick stop ends within a cycle
+    if not axis.gap <= gap and not (history.brakes or history.moved):  # a quick stop ends within a cycle
         yield f"a setpoint{of} jumps by {axis.gap:.3g} {named.unit}"
     if not axis.creep <= STEADY:
         yield f"the {which} moves on at rest by {axis.creep:.3g} {named.unit}"

@@ -118,6 +118,8 @@ class Facts:
     errors : (cycles,) array
     position, low, high : (axes, cycles) array
         Setpoints, and where a stop would lead.
+    withdrawn : (cycles,) array of bool
+        Whether there is no promise as it is not known how the load swings.
     """
 
     done: Flags
@@ -126,6 +128,13 @@ class Facts:
     position: Array
     low: Array
     high: Array
+    withdrawn: Flags
+
+    def led_into(self, axis: int, cycle: int, interval: Interval) -> bool:
+        """Whether a stop would have led an axis into an interval, as was stated in the cycle before."""
+        low, high = interval
+        lowest, highest = self.low[axis, cycle - 1], self.high[axis, cycle - 1]
+        return bool(lowest < high - ROUNDING and highest > low + ROUNDING)
 
 
 @attrs.frozen(kw_only=True)
@@ -189,7 +198,8 @@ def read_orders(
 
 def _events(start_cycles: Sequence[int], facts: Facts) -> list[int]:
     """Cycles in which something may change though no input does."""
-    flags = np.stack([facts.done, facts.stands, facts.errors == BLOCKED, facts.errors == NO_MOTION])
+    errors = [facts.errors == BLOCKED, facts.errors == NO_MOTION]
+    flags = np.stack([facts.done, facts.stands, facts.withdrawn, *errors])
     changes = np.flatnonzero(np.diff(flags, prepend=False).any(axis=0)).tolist()
     return [begin + 1 for begin in start_cycles] + [at + k for at in changes for k in (0, 1)]
 
@@ -207,7 +217,9 @@ class _Reader:
         self._inputs, self._facts = inputs, facts
         self.aborted, self.error, self.command = 0, 0, STOP
         self.due: int | None = None  # the cycle in which wrong values begin to count
-        self._latched = self._execute = self._velocity = self._braking = self._in_the_way = False
+        self._latched = self._execute = self._velocity = self._braking = self._in_the_way = self._nearer = (
+            False
+        )
         self._neutral, self._enabled, self._edge = False, False, 0
         self._fences, self._fenced = list[list[Interval]](), False
         self._since = {LIVE: -1, LIMITS: -1}  # cycles from which values are wrong
@@ -236,6 +248,7 @@ class _Reader:
         facts = self._facts
         done = bool(facts is not None and cycle and facts.done[cycle - 1])
         self._braking = self._braking and not (facts is None or facts.stands[cycle - 1])
+        self._braking |= self._is_braked(cycle, row)
         if done and not row["bExecute"]:
             self.command = STOP
         if not (row["bExecute"] if self.aborted == 1 else self.aborted == 2 and row["bVelocity"]):
@@ -404,11 +417,21 @@ class _Reader:
         self._in_the_way |= starts and is_cause and (self._fenced or cycle == self._edge + 1)
         return self._in_the_way
 
+    def _is_braked(self, cycle: int, row: Mapping[str, float]) -> bool:
+        """Whether axes are since the cycle before: an interval came nearer than the stated ends of a stop."""
+        facts, last = self._facts, cycle - 1
+        if facts is None or not cycle:
+            return False
+        closed = [(k, one) for k in range(len(self._inputs.axes)) for one in self._closed(row, k)]
+        nearer = self._nearer or any(facts.led_into(k, cycle, one) for k, one in closed)
+        self._nearer = nearer and not facts.stands[last]
+        return self._nearer and bool(facts.withdrawn[last] and not facts.withdrawn[max(last - 1, 0)])
+
     def _leads_into(self, facts: Facts, axis: int, cycle: int, fence: Interval) -> bool:
         """Whether the goal of an axis lies within or behind an interval, or a stop would lead there."""
         (low, high), place = fence, facts.position[axis, cycle]
         lowest, highest = facts.low[axis, cycle], facts.high[axis, cycle]
-        if lowest < high - ROUNDING and highest > low + ROUNDING:
+        if facts.led_into(axis, cycle + 1, fence):
             return True
         goal = self._goal[axis] if self._kind == POSITION else place  # from within it may be on its way out
         ahead = goal > low and min(place, highest) <= low + ROUNDING

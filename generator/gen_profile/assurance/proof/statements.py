@@ -11,9 +11,12 @@ from gen_profile.assurance.proof.followed import (
     IN_VELOCITY,
     NOTHING,
     SLOT,
+    UNKNOWN,
     Allowance,
     Followed,
     Zone,
+    braking,
+    came_nearer,
     greatest,
     in_time,
     never,
@@ -39,6 +42,7 @@ ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
 LEFT, OVERSTATED = "left by errors", "overstated"  # what is measured but not judged
 UNDISTURBED = 1e-3  # of the allowed sway, that may be left on the machine as given
+AT_ONCE = 2  # cycles, in which an axis must be braked where there is no room for anything else
 TAKEN_UP = 2  # cycles, in which a blocked interval is
 SHOWN = (10, 20, 21, 22, *range(50, 60), *range(60, 67), 70)  # codes of events that other outputs show, too
 COMMANDED = (21, 22)  # those whose value is the first axis's target or velocity
@@ -139,7 +143,7 @@ def promises(run: Followed) -> Iterator[Allowance]:
     yield from never("lost", (why == ADDED_UP) & (stated <= run.sway_limit))
     yield from never("kept", promise & ((stated > run.sway_limit) | run.damped))
     may_be, must_be = _unknown(run)
-    yield from never("lost", (why == 2.0) & ~may_be)
+    yield from never("lost", (why == UNKNOWN) & ~may_be)
     yield from never("kept", promise & must_be)
     drifted = np.cumsum(run.drifts) > 0
     yield from never("lost", (why == 1.0) & ~drifted)
@@ -216,6 +220,9 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
                 may_be[at:] &= run.issued["bBusy"][at - 1] != 0.0
         if sees[order.begin : order.end].any():
             must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
+    for begin in run.brakings:
+        reports = (at for at in run.rest_reports if at >= begin and run.guided[at] and run.stands[at])
+        may_be[begin : min(reports, default=run.cycles)] = True
     return may_be | (np.cumsum(run.lost_sensors) > 0), must_be
 
 
@@ -234,7 +241,7 @@ def blocked(run: Followed) -> Iterator[Allowance]:
     for zone, stopped in _in_force(run, slow=False):
         before = max(zone.begin - 1, 0)
         led = low[zone.axis, before] < zone.high and high[zone.axis, before] > zone.low
-        begin = stopped if led else zone.begin
+        begin = stopped if led and not _is_kept_out(run, zone) else zone.begin
         own = slice(begin, zone.end)
         place, guided = run.position[zone.axis, own], run.guided[own]
         within = np.minimum(place - zone.low, zone.high - place)
@@ -259,6 +266,17 @@ def blocked(run: Followed) -> Iterator[Allowance]:
             yield Allowance(
                 "zone", at, float(not any(z.number == number for z in run.zones if not z.limit)), 0.0
             )
+
+
+def _is_kept_out(run: Followed, zone: Zone) -> bool:
+    """Whether braking its axis within the limits keeps it out of an interval that is blocked on its way."""
+    if not came_nearer(run, zone):
+        return False
+    _, way = braking(run, zone.begin)[zone.axis]
+    place, velocity = (float(one[zone.axis, zone.begin - 1]) for one in (run.position, run.velocity))
+    end = place + way + AT_ONCE * run.cycle * velocity
+    below, above = place <= zone.low and end <= zone.low, place >= zone.high and end >= zone.high
+    return way * velocity > 0.0 and (below or above)
 
 
 def slowed(run: Followed) -> Iterator[Allowance]:
@@ -336,7 +354,7 @@ def _remains_at_last(run: Followed) -> Iterator[Allowance]:
     """Judge what motions leave that begin and end at rest after the last live parameters were given."""
     if run.last_modes is None or run.last_modes.modes.damped:
         return
-    lost = [order.end for order in run.orders if order.kind in (QUICK_STOP, DISABLED)]
+    lost = [*run.brakings, *(order.end for order in run.orders if order.kind in (QUICK_STOP, DISABLED))]
     known = max(run.last_known, *lost, 0)
     rests = [max(begin, known) for begin, end in runs_of(run.stands) if end > known]
     if len(rests) > 1:

@@ -17,6 +17,7 @@ from gen_profile.assurance.proof.followed import (
     CALMING,
     LEAST_REACTION,
     REACTION,
+    UNKNOWN,
     Followed,
     GivenMachine,
     Zone,
@@ -173,6 +174,7 @@ class BlockWatch:
             overstated=overstated,
             obeyed=obeyed(followed),
             exercised=tried,
+            braked=bool(followed.brakings),
         )
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
@@ -180,7 +182,8 @@ class BlockWatch:
         states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
         known = followed.issued["nPromise"][-1] in (0.0, ADDED_UP)
         known = known and not (followed.sensed("bSensorUsed").any() or followed.drifts.any())
-        if states is None or not known or any(one.kind in (QUICK_STOP, DISABLED) for one in followed.orders):
+        lost = followed.brakings or any(one.kind in (QUICK_STOP, DISABLED) for one in followed.orders)
+        if states is None or not known or lost:
             return  # it is not known how the load swings
         stated = float(states[run.stands :].max(initial=0.0))  # a damped load's falls
         if left > stated + LARGE_SWINGS * followed.sway_limit:
@@ -262,6 +265,7 @@ class BlockWatch:
             position=position,
             low=low,
             high=high,
+            withdrawn=issued["nPromise"] == UNKNOWN,
         )
 
     def _zones(self, start_cycles: Sequence[int], rows: Array, cycles: int) -> Iterator[Zone]:

@@ -28,6 +28,11 @@ def to_velocity(velocity: float, acceleration: float, wanted: float, limits: Axi
     return _ramp(velocity, acceleration, wanted, limits)[0]
 
 
+def braked(velocity: float, acceleration: float, limits: AxisLimits) -> tuple[float, float]:
+    """Tell the time in s and the way in m (or rad) from a velocity and an acceleration to rest, anywhere."""
+    return _ramp(velocity, acceleration, 0.0, limits)
+
+
 def to_place(way: float, velocity: float, acceleration: float, limits: AxisLimits) -> float:
     """Tell the time in s from a velocity and an acceleration to rest, so far away in m (or rad)."""
     most = limits.velocity
