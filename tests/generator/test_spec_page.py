@@ -19,7 +19,7 @@ OPTIONAL = [number for number, line in enumerate(LINES) if re.match(r"# \[|# [\w
 # fields that a file states in another way, which the page tells instead
 OTHERWISE = {
     "plant": {"parameters": "L1", "defaults": "L1"},
-    "move": {"shortest": "duration"},
+    "move": {"shortest": "duration", "bounds": "duration"},
     "check": {"foreign": "fmu", "default": "residual_sway"},
 }
 

@@ -69,6 +69,14 @@ class PlantSpec(Checked, table="plant"):
 
 
 @attrs.frozen(kw_only=True)
+class DurationBounds(Checked, table="move.duration"):
+    """What a duration that is to be found may be at least and at most, in s."""
+
+    least: Duration | None = None
+    most: Duration | None = None
+
+
+@attrs.frozen(kw_only=True)
 class MoveSpec(Checked, table="move"):
     """Start and target of every axis in m (or rad), duration in s; from standstill, to standstill or a speed.
 
@@ -78,6 +86,8 @@ class MoveSpec(Checked, table="move"):
         Axes that may move on the way although they end where they began; all others are held.
     shortest : bool
         The duration is to be found, and the one given here means nothing.
+    bounds : DurationBounds
+        Of a duration that is to be found.
     initial : mapping of str to float
         What swings at the start: unactuated coordinates by name in m (or rad), their rates as ``NAME.rate``.
     final_velocity : tuple of float
@@ -88,6 +98,7 @@ class MoveSpec(Checked, table="move"):
     target: tuple[Distance, ...]
     duration: Duration
     shortest: bool = False
+    bounds: DurationBounds = DurationBounds()
     free: tuple[AxisName, ...] = ()
     initial: Annotated[Mapping[SwingState, float], example("theta1 = 0.05")] = NONE
     final_velocity: tuple[Distance, ...] = attrs.field()
@@ -345,7 +356,8 @@ class Spec(Drawable, Checked):
         for place, value in values.items():
             spec = _put(spec, place.split("."), value)
             if place == "move.duration":
-                spec = _put(spec, ["move", "shortest"], False)
+                move = attrs.evolve(spec.move, shortest=False, bounds=DurationBounds())
+                spec = attrs.evolve(spec, move=move)
         return spec
 
     def checked_ranges(self) -> dict[str, tuple[float, float]]:
@@ -395,8 +407,9 @@ class Spec(Drawable, Checked):
             del document["can"]["without"]
         if not self.move.free:  # as a spec without hashes
             del document["move"]["free"]
+        bounds = document["move"].pop("bounds")
         if document["move"].pop("shortest"):
-            document["move"]["duration"] = "minimum"
+            document["move"]["duration"] = bounds or "minimum"
         return document
 
     def files(self) -> dict[str, bytes]:

@@ -75,6 +75,9 @@ def _move(spec: Spec) -> Iterator[Fault]:
         yield "move.distance", "must not be zero on every axis"
     if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
         yield "move.distance", Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE)
+    least, most = move.bounds.least, move.bounds.most
+    if least is not None and most is not None and most < least:
+        yield "move.duration.most", Phrase("must be at least {least:g}, the least one", least=least)
     limited = " ".join(spec.limits.only([k for k, asked in enumerate(move.asked) if asked]).stated())
     if move.shortest and not any(name in limited for name in RATES):
         problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'

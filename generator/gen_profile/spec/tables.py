@@ -15,7 +15,16 @@ from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec.can import read_data_sheet
 from gen_profile.spec.external_fmu import KEYS as FMU_KEYS
 from gen_profile.spec.external_fmu import external_fmu
-from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
+from gen_profile.spec.model import (
+    RESIDUAL_SHARE,
+    AxisSpec,
+    CheckSpec,
+    DurationBounds,
+    MoveSpec,
+    PlantSpec,
+    Spec,
+    Sway,
+)
 from gen_profile.spec.rules import broken_rules
 from gen_profile.spec.stacks import StacksSpec, stacks_of
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, place
@@ -269,7 +278,7 @@ def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec
 
 def _duration(table: Table, structurer: Structurer) -> Table:
     """Tell whether the duration is to be found; its place is then held by a number."""
-    duration, shortest = table.get("duration"), False
+    duration, shortest, bounds = table.get("duration"), False, DurationBounds()
     if "duration" not in table:
         structurer.faults.add("move.duration", "required, but missing")
     elif isinstance(duration, str):
@@ -279,8 +288,15 @@ def _duration(table: Table, structurer: Structurer) -> Table:
         if not shortest:
             structurer.faults.add("move.duration", template, found=found(duration), near=near)
         duration = PLACEHOLDER_DURATION
+    elif isinstance(duration, Mapping):
+        kinds, shortest = kinds_of(DurationBounds), True
+        stated = structurer.known(dict(duration), tuple(kinds), "move.duration")
+        values = {
+            key: structurer.fit(one, kinds[key], f"move.duration.{key}", None) for key, one in stated.items()
+        }
+        bounds, duration = DurationBounds(**values), PLACEHOLDER_DURATION
     number = structurer.fit(duration, Duration, "move.duration", PLACEHOLDER_DURATION)
-    return {"duration": number, "shortest": shortest}
+    return {"duration": number, "shortest": shortest, "bounds": bounds}
 
 
 def _per_axis(

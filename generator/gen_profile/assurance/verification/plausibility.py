@@ -1,6 +1,7 @@
 """Whether replayed setpoints are the move that a spec asks for, before anything swings from them."""
 
 from collections.abc import Iterator
+from math import inf
 
 import numpy as np
 
@@ -79,18 +80,19 @@ def _missed_time(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
 
     Setpoints that only hold what was reached are no part of the motion.
     """
+    times, least, most = setpoints.times, spec.move.duration, spec.move.duration
     if spec.move.shortest:
-        return
-    times, asked = setpoints.times, spec.move.duration
+        least, most = spec.move.bounds.least or 0.0, spec.move.bounds.most or inf
     onward = setpoints.position[-1] + np.outer(times - times[-1], spec.move.final_velocity)
     standstill = STANDING_TOLERANCE * _sizes(spec).max() + 0.5 * setpoints.resolution
     moving = np.flatnonzero((np.abs(setpoints.position - onward) > standstill).any(axis=1))
     last = int(moving[-1]) if len(moving) else 0
-    late = times[last] >= asked * (1.0 - DURATION_TOLERANCE)
-    early = times[-1] + setpoints.cycle_time <= asked * (1.0 + DURATION_TOLERANCE)
+    late = times[last] >= most * (1.0 - DURATION_TOLERANCE)
+    early = times[-1] + setpoints.cycle_time <= least * (1.0 + DURATION_TOLERANCE)
     if late or early:
         arrival = times[last + 1] if late else times[-1]
-        yield f"The motion arrives at {arrival:.6g} s, and the spec asks for {asked:.6g} s (move.duration)."
+        asked = f"at {'most' if late else 'least'} " * (least < most) + f"{most if late else least:.6g} s"
+        yield f"The motion arrives at {arrival:.6g} s, and the spec asks for {asked} (move.duration)."
 
 
 def _left_travel(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:

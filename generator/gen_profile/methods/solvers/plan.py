@@ -3,7 +3,7 @@
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers.draft import Plan, solved
 from gen_profile.methods.solvers.over_stacks.plan import over_stacks
-from gen_profile.methods.solvers.shortest import shortest
+from gen_profile.methods.solvers.shortest import short_enough, shortest
 from gen_profile.methods.solvers.solution import SIMPLER, Status, no_motion
 from gen_profile.methods.solvers.suggestions import Remedy, explained, remedy
 from gen_profile.spec.model import Spec
@@ -39,7 +39,7 @@ def draft(spec: Spec, progress: Progress = no_progress) -> Plan:
         Nothing is left of a budget.
     """
     if spec.path is not None:
-        return over_stacks(spec, progress)
+        return short_enough(spec, over_stacks(spec, progress))
     if spec.move.shortest:
         return shortest(spec, progress)
     progress("solving")

@@ -87,7 +87,8 @@ def shortest_duration(spec: Spec, shaped: ShapedMove) -> float | None:
     quickest = delay + _plausible_stretch(spec, shaped)
 
     def excess(duration: float) -> float:
-        keeps = duration > in_cycles(quickest) and not _breaches(spec, shaped.profile(duration))
+        enough = duration > in_cycles(quickest) and duration >= (spec.move.bounds.least or 0.0)
+        keeps = enough and not _breaches(spec, shaped.profile(duration))
         return -math.inf if keeps else math.inf
 
     return least(excess, 2.0 * delay, SHORTEST, LONGEST * delay, in_cycles)

@@ -7,10 +7,11 @@ import attrs
 
 from gen_profile.dynamics.problem.held_axes import held_axes
 from gen_profile.dynamics.problem.problem import Problem, problem_of
+from gen_profile.methods.shapers.shaped_move import too_short
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers import transient_sway
 from gen_profile.methods.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed, refined
-from gen_profile.methods.solvers.draft import Plan, drafted, in_cycles, lasting, solved
+from gen_profile.methods.solvers.draft import Plan, drafted, in_cycles, lasting, solved, suggested
 from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.methods.solvers.search import Search, least, slope_of
 from gen_profile.methods.solvers.shape import shaped_motion
@@ -26,6 +27,7 @@ SLOW = 2.0  # times the usual duration, which is time enough where no duration k
 SEARCHING = 8.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
+ROUNDING = 1e-9  # of a duration
 NEARLY = 2e-3  # relative, by which it may be another than was supposed
 # residual sway falls steeply with the duration, as far as nothing more is known of it
 COARSE = Search(
@@ -47,7 +49,7 @@ def timed(spec: Spec, progress: Progress = no_progress) -> Spec:
 
 
 def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
-    """Find the shortest motion that ends on a cycle of the controller.
+    """Find the shortest motion within the spec's bounds that ends on a cycle of the controller.
 
     An optimal one takes longer than its limits make it where it would otherwise leave more sway than the
     check allows on some machine.
@@ -61,7 +63,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
     """
     if spec.solver.shaper is not None:
         motion = shaped_motion(spec, spec.solver.shaper)
-        return Plan(spec=lasting(spec, motion.duration), solution=None, found=motion)
+        return short_enough(spec, Plan(spec=lasting(spec, motion.duration), solution=None, found=motion))
     problem = problem_of(spec)
     try:
         with budget(SEARCHING):
@@ -84,7 +86,28 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
             *held_axes(spec),
             reasons=[Reason(code=Code.RESIDUAL_SWAY, place="check.residual_sway")],
         )
-    return least
+    return short_enough(spec, least)
+
+
+def short_enough(spec: Spec, shortest_found: Plan) -> Plan:
+    """Give the shortest motion, unless the spec allows less time.
+
+    Raises
+    ------
+    InfeasibleProblem
+    """
+    most, duration = spec.move.bounds.most, shortest_found.motion.duration
+    if most is None or duration <= most * (1.0 + ROUNDING):
+        return shortest_found
+    raise InfeasibleProblem(
+        Phrase(
+            "move.duration: the shortest motion takes {duration:.6g} s, and at most {most:g} s are allowed.",
+            duration=duration,
+            most=most,
+        ),
+        reasons=[too_short(most, duration)],
+        suggestions=[suggested({"move.duration": duration}, shortest_found)],
+    )
 
 
 def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Problem, Relaxed]:
@@ -148,8 +171,12 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
     Motions on few intervals lead near to it; where the work ends before one on many is found, one of those is
     taken.
     """
-    first = _drafted(spec, shortest_kept)
-    if first.excess_sway <= 0.0:
+    first, bound = _drafted(spec, shortest_kept), spec.move.bounds.least or 0.0
+    if first.spec.move.duration < bound:
+        first = solved(lasting(spec, in_cycles(spec, bound)), spread=problem.sway_spread, near=shortest_kept)
+        if _excess(first) <= 0.0:
+            return first
+    elif first.excess_sway <= 0.0:
         finer = refined(problem, shortest_kept, progress)
         shorter = _drafted(spec, finer)
         if shorter.excess_sway <= 0.0:

@@ -104,6 +104,9 @@ class _Planner:
         _require_height(self.bay)
         move = self.bay.spec.move
         found = self.shortest() if move.shortest else self.in_time(move.duration)
+        least = move.bounds.least or 0.0
+        if found is not None and found.up.duration < least:
+            found = self.in_time(in_cycles(self.bay.spec, least))
         if found is None:
             raise _refusal(self)
         return found
