@@ -11,7 +11,7 @@ import gen_profile as gp
 from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.methods.solvers.over_stacks.hoist import Rates, highest, least_time, rest_to_rest
 from gen_profile.spec.reading import overridden, spec_from_dict
-from gen_profile.spec.stacks import trolley_and_hoist
+from gen_profile.spec.stacks import PathAxes, path_axes
 
 PROFILE = [[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [10.5, 6.0], [10.5, 2.0], [12.0, 3.0]]
 AS_STACKS = ((0.0, 8.0, 0.0), (8.0, 10.5, 6.0), (10.5, 12.0, 3.0))
@@ -52,16 +52,22 @@ def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
     [
         ("", "path.file: bay.csv holds no rows of numbers"),
         ("from,to,height\n", "path.file: bay.csv holds no rows of numbers"),
-        ("20.0,22.5,1O.4\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two or three numbers"),
-        ("1,8,10.5,6\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two or three numbers"),
-        ("from,to,height\n\n# lee\n8,10.5\n8,10.5,x\n", "path.file: bay.csv: line 5 must be two or three"),
-        ("from,to,height\n8,10.5\n10.5,13,9\n", "path.file: bay.csv: line 3 must be two or three numbers"),
+        ("20.0,22.5,1O.4\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two, three or five numbers"),
+        ("1,8,10.5,6\n8,10.5,6\n", "path.file: bay.csv: line 1 must be two, three or five numbers"),
+        (
+            "from,to,height\n\n# lee\n8,10.5\n8,10.5,x\n",
+            "path.file: bay.csv: line 5 must be two, three or five",
+        ),
+        (
+            "from,to,height\n8,10.5\n10.5,13,9\n",
+            "path.file: bay.csv: line 3 must be two, three or five numbers",
+        ),
         (
             "from_mm,to_mm,height_mm\n8000,10500,6000\n",
             "path.file: bay.csv: line 1 names another unit than m",
         ),
         ("Place [cm];Height [cm]\n8;6\n", "path.file: bay.csv: line 1 names another unit than m"),
-        ("from,to,height\n8,10.5,nan\n", "path.file: bay.csv: line 2 must be two or three numbers"),
+        ("from,to,height\n8,10.5,nan\n", "path.file: bay.csv: line 2 must be two, three or five numbers"),
         ("height,from,to\n6,8,10.5\n", "path.file: bay.csv: line 1 names a column behind the height"),
     ],
 )
@@ -114,7 +120,7 @@ def test_a_profile_counts_the_higher_end_of_every_piece():
         ({"limits": {"axis": {"cart": {"jerk": 1.0}}}}, "limits.axis.hoist.velocity: required with [path]"),
         (
             {"plant": {"type": "double-pendulum-crane", "m": None, "L0": None}, "move": {"start": None}},
-            "path: needs a machine of two axes",
+            "path: needs a machine of a hoist and one or two axes",
         ),
     ],
 )
@@ -160,7 +166,7 @@ def test_one_number_of_one_stack_can_be_changed(tmp_path, text, change, stacks):
         (LISTED, "path.stacks.1.3=1", "'3' is none of the numbers 0 to 2"),
         (LISTED, "path.stacks.1.height=1", "'height' is none of the numbers 0 to 2"),
         (FILED, "path.stacks.2.0=1", "path.stacks.2: there are 2 stacks, numbered from 0"),
-        (FILED, "path.stacks.1.3=1", "path.stacks.1: holds three numbers: 0 is from"),
+        (FILED, "path.stacks.1.3=1", "path.stacks.1: holds 3 numbers: 0 is from"),
         (FILED, "path.stacks.1=high", r"path.stacks.1: must be three numbers in m"),
     ],
 )
@@ -173,10 +179,10 @@ def test_a_number_of_no_stack_is_refused(tmp_path, text, change, sentence):
 
 def test_which_axis_is_the_hoist():
     spec = quay()
-    assert trolley_and_hoist(spec.machine(), spec.plant.parameters) == (0, 1)
+    assert path_axes(spec.machine(), spec.plant.parameters) == PathAxes(along=(0,), hoist=1)
     for name in ("gantry-crane", "tower-crane", "slosh-tank"):
         other = gp.preset_spec(name)
-        assert trolley_and_hoist(other.machine(), other.plant.parameters) is None
+        assert path_axes(other.machine(), other.plant.parameters) is None
 
 
 def test_planners_and_comparisons_refuse_stacks(tmp_path):

@@ -313,7 +313,7 @@ class TestOverStacks:
         found = {part["part"]: part for part in answer}
         verdict = found["verdict"]
         assert verdict["one_by_one"] > verdict["duration"] and 0.0 < verdict["room"] < 0.1
-        assert verdict["passed"] and found["side"]["stacks"][2] == (25.0, 27.5, 16.4)
+        assert verdict["passed"] and found["side"]["stacks"][2]["row"] == (25.0, 27.5, 16.4)
         assert found["setting"]["command"].endswith("--set 'path.stacks.2=[25.0, 27.5, 16.4]'")
         ways = [{str(line["name"]): line for line in part["lines"]} for part in (first, found["side"])]
         about, exact = (way["middle of the payload, nominal"] for way in ways)

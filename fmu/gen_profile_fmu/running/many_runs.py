@@ -13,7 +13,8 @@ from gen_profile.support.errors import CosimulationError
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.running.instances import CalledFmu, Instance, compiled_loops, doubles, instance, unsigned
 
-NO_ZONES = np.empty((0, 9))
+ZONE = 17  # numbers of a zone
+NO_ZONES = np.empty((0, ZONE))
 
 
 class _PerRun(Structure):
@@ -89,11 +90,11 @@ class ManyRuns(AbstractContextManager["ManyRuns"]):
         components : int
             So many of the last outputs are the components of a vector: its greatest length at any time, also
             before `since`, is one more column.
-        zones : (zones, 10) array
+        zones : (zones, ZONE) array
             Where bodies may not be; the least room to them at any time, that time in s and the zone's number
-            are three more columns. Numbers of the
-            outputs that are a body's place and height; from, to and a height; 1 where they may not be below
-            it, −1 where not above; twice where it may be all the same.
+            are three more columns. Numbers of the outputs that are a body's x, y and z; a height; 1 where
+            they may not be below it, −1 where not above; from and to in x and in y; twice likewise where it
+            may be all the same.
 
         Returns
         -------

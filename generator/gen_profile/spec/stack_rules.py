@@ -6,7 +6,7 @@ import numpy as np
 
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
-from gen_profile.spec.stacks import MOST_STACKS, StackZone, hanging, trolley_and_hoist, zones
+from gen_profile.spec.stacks import MOST_STACKS, PathAxes, Place, StackZone, hanging, path_axes, zones
 from gen_profile.support.errors import SpecError
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
@@ -20,9 +20,14 @@ def stack_faults(spec: Spec, plant: Plant) -> Iterator[Fault]:
     if path is None:
         return
     for key, rows in (("stacks", path.stacks), ("overhead", path.overhead)):
-        for number, (low, high, _) in enumerate(rows):
+        for number, (low, high, *rest) in enumerate(rows):
             if not low < high:
                 yield f"path.{key}.{number}", "must begin left of where it ends: from, to, height"
+            elif len(rest) == 3 and not rest[0] < rest[1]:
+                yield (
+                    f"path.{key}.{number}",
+                    "must begin before where it ends, in y too: third and fourth number",
+                )
     if not path.stacks:
         yield (
             "path.stacks",
@@ -33,16 +38,17 @@ def stack_faults(spec: Spec, plant: Plant) -> Iterator[Fault]:
     if len(path.stacks) > MOST_STACKS:
         template = "holds {count} stacks, and {most} are the most; join those of about one height"
         yield "path.stacks", Phrase(template, count=len(path.stacks), most=MOST_STACKS)
-    axes = trolley_and_hoist(plant, spec.plant.parameters)
+    axes = path_axes(plant, spec.plant.parameters)
     if axes is None:
         yield (
             "path",
-            "needs a machine of two axes, one that carries the load along and one that lifts it, such as "
-            "single-pendulum-crane",
+            "needs a machine of a hoist and one or two axes that carry the load along, such as "
+            "single-pendulum-crane or hall-crane",
         )
         return
     yield from _methods(spec)
-    yield from _rates(spec, plant, axes[1])
+    yield from _in_plan_view(spec, axes)
+    yield from _rates(spec, plant, axes.hoist)
     yield from _ends(spec, plant)
 
 
@@ -77,6 +83,23 @@ def _methods(spec: Spec) -> Iterator[Fault]:
         yield "check.fmu", "an external FMU tells no place of the load; remove it, or remove [path]"
 
 
+def _in_plan_view(spec: Spec, axes: PathAxes) -> Iterator[Fault]:
+    """Refuse what a machine of so many horizontal axes does not know."""
+    assert spec.path is not None
+    if len(axes.along) == 2:
+        if any(spec.move.initial.values()):
+            yield (
+                "move.initial",
+                "a path of two horizontal axes begins with the load hanging still; remove it",
+            )
+        return
+    for key, rows in (("stacks", spec.path.stacks), ("overhead", spec.path.overhead)):
+        for number, row in enumerate(rows):
+            if len(row) != 3:
+                template = "the machine has one horizontal axis; state three numbers: from, to and height"
+                yield f"path.{key}.{number}", template
+
+
 def _rates(spec: Spec, plant: Plant, hoist: int) -> Iterator[Fault]:
     """Require what limits the hoist, and where its top is."""
     limits, name = spec.limits.of(hoist), plant.actuated[hoist].name
@@ -97,12 +120,12 @@ def _ends(spec: Spec, plant: Plant) -> Iterator[Fault]:
         yield "path.hook", "the machine has no hook; remove it"
     for key, bodies in zip(("start", "target"), places, strict=True):
         for zone in zones(path, [bodies, bodies]):
-            x, z = bodies[zone.body]
-            if not zone.own and zone.within(x) and zone.clear(np.asarray(z)) < 0.0:
-                yield f"move.{key}", _too_near(spec, plant, zone, x, z)
+            x, y, z = bodies[zone.body]
+            if not zone.own and zone.area.holds((x, y)) and zone.clear(np.asarray(z)) < 0.0:
+                yield f"move.{key}", _too_near(spec, plant, zone, bodies[zone.body])
 
 
-def _too_near(spec: Spec, plant: Plant, zone: StackZone, x: float, z: float) -> Phrase:
+def _too_near(spec: Spec, plant: Plant, zone: StackZone, place: Place) -> Phrase:
     """Say how far a load is from where it may be: sideways, or upwards."""
     assert spec.path is not None
     template = (
@@ -118,6 +141,6 @@ def _too_near(spec: Spec, plant: Plant, zone: StackZone, x: float, z: float) -> 
         template,
         body=plant.bodies[zone.body],
         obstacle=spec.path.named(zone.obstacle),
-        sideways=min(x - zone.low, zone.high - x),
-        upwards=abs(zone.top - z),
+        sideways=-float(zone.area.outside(*place[:2])),
+        upwards=abs(zone.top - place[2]),
     )

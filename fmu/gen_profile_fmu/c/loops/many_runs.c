@@ -24,9 +24,9 @@ typedef struct {
     size_t n_zones;
 } Plan;
 
-/* A zone: the outputs that are a body's place and height; from, to and a height, 1 where bodies have to be above it
-   and -1 where below; twice between which places it may be. */
-enum { X, Z, LOW, HIGH, TOP, UP, OWN, ZONE = OWN + 4 };
+/* A zone: the outputs that are a body's x, y and z; a height, 1 where bodies have to be above it and -1 where below;
+   an area, from and to in x and in y; twice an area in which it may be all the same. */
+enum { X, Y, Z, TOP, UP, AREA, OWN = AREA + 4, ZONE = OWN + 8 };
 
 static const double *of_run(const PerRun *numbers, size_t run) { return numbers->values + run * numbers->size; }
 
@@ -37,10 +37,16 @@ static double length(const Plan *plan, const double *values) {
     return sqrt(squares);
 }
 
-/* By how much more than it must a body at x is beside a zone. */
-static double beside(const double *zone, double x) {
-    double most = fmax(zone[LOW] - x, x - zone[HIGH]);
-    for (size_t i = OWN; i < ZONE; i += 2) most = fmax(most, fmin(x - zone[i], zone[i + 1] - x));
+/* How far outside an area a place is, along the axis along which it is farther. */
+static double outside(const double *area, double x, double y) {
+    return fmax(fmax(area[0] - x, x - area[1]), fmax(area[2] - y, y - area[3]));
+}
+
+/* By how much more than it must a body is beside a zone. */
+static double beside(const double *zone, const double *places) {
+    const double x = places[(size_t)zone[X]], y = places[(size_t)zone[Y]];
+    double most = outside(zone + AREA, x, y);
+    for (size_t i = OWN; i < ZONE; i += 4) most = fmax(most, -outside(zone + i, x, y));
     return most;
 }
 
@@ -51,8 +57,8 @@ enum { ROOM, TIME, NUMBER, NEAREST };
 static void look(const Plan *plan, double time, const double *was, const double *is, double *nearest) {
     for (size_t number = 0; number < plan->n_zones; number++) {
         const double *zone = plan->zones + number * ZONE;
-        const size_t x = (size_t)zone[X], z = (size_t)zone[Z];
-        const double first = beside(zone, was[x]), last = beside(zone, is[x]);
+        const size_t z = (size_t)zone[Z];
+        const double first = beside(zone, was), last = beside(zone, is);
         const double above = zone[UP] * (was[z] - zone[TOP]), later = zone[UP] * (is[z] - zone[TOP]);
         double room = fmin(fmax(first, above), fmax(last, later));
         const double apart = first - above, after = last - later;

@@ -16,12 +16,15 @@ from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
 from gen_profile.spec.passed_target import Target, targets
+from gen_profile.spec.plan_view import EVERYWHERE, Area
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.running.many_runs import ManyRuns
+from gen_profile_fmu.running.many_runs import ZONE, ManyRuns
 
-NOWHERE = ((np.inf, -np.inf),) * 2  # in place of where a body stands at the start or the target
+NOWHERE = Area(
+    (np.inf, -np.inf), (np.inf, -np.inf)
+)  # in place of where a body stands at the start or the target
 _most: ContextVar[int] = ContextVar("_most", default=sys.maxsize)
 
 
@@ -114,38 +117,30 @@ def residual_peaks(
     inputs = {
         f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
     }
-    zones = np.array(
-        [
-            [
-                2.0 * zone.body,
-                2.0 * zone.body + 1.0,
-                zone.low,
-                zone.high,
-                zone.top,
-                -1.0 if zone.overhead else 1.0,
-                *np.ravel((*zone.own, *NOWHERE)[:2]),
-            ]
-            for zone in zones_of(spec)
-        ]
-    ).reshape(-1, 10)
     ahead = targets(spec)  # no path over stacks has any
-    if ahead:
-        zones = np.array([_behind(number, one) for number, one in enumerate(ahead)])
-    places = [f"position.{body}.{along}" for body in plant.bodies for along in "xz"] if len(zones) else []
-    if ahead:
-        places = [
-            f"position.{plant.bodies[d.body]}.{'xy'[d.coordinate]}" for d in (one.direction for one in ahead)
-        ]
+    rows = [_behind(one) for one in ahead] or [
+        _zone(zone.body, zone.top, -1.0 if zone.overhead else 1.0, zone.area, *zone.own)
+        for zone in zones_of(spec)
+    ]
+    zones = np.array(rows).reshape(-1, ZONE)
+    places = [f"position.{body}.{along}" for body in plant.bodies for along in "xyz"] if rows else []
     outputs = [*places, *(f"sway.{load}" for load in plant.loads)]
     components = plant.directions if on_the_way else 0
     found = runs.peaks(feed.times, inputs, values, outputs, since=since, components=components, zones=zones)
     return found[:, len(places) :]
 
 
-def _behind(number: int, target: Target) -> list[float]:
-    """Write what is behind a target as a zone of all heights: the output is its body's place and height."""
-    low, high = (target.at, np.inf) if target.way > 0.0 else (-np.inf, target.at)
-    return [number, number, low, high, np.inf, 1.0, *np.ravel(NOWHERE)]
+def _zone(body: int, top: float, up: float, *areas: Area) -> list[float]:
+    """Write where a body may not be, and then where it may be all the same, as `ManyRuns` takes it."""
+    edges = (edge for area in (*areas, NOWHERE, NOWHERE)[:3] for edge in (*area.x, *area.y))
+    return [*(3.0 * body + along for along in range(3)), top, up, *edges]
+
+
+def _behind(target: Target) -> list[float]:
+    """Write what is behind a target as a zone of all heights."""
+    beyond = (target.at, np.inf) if target.way > 0.0 else (-np.inf, target.at)
+    area = Area(beyond) if target.direction.coordinate == 0 else Area(EVERYWHERE, beyond)
+    return _zone(target.direction.body, np.inf, 1.0, area)
 
 
 def processors() -> int:

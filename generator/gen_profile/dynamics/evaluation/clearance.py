@@ -5,7 +5,8 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.spec.model import Spec
-from gen_profile.spec.stacks import StackZone, hanging, zones
+from gen_profile.spec.plan_view import Line
+from gen_profile.spec.stacks import StackZone, hanging, path_axes, zones
 
 
 @attrs.frozen(kw_only=True)
@@ -38,6 +39,13 @@ def zones_of(spec: Spec) -> tuple[StackZone, ...]:
     return zones(spec.path, ends)
 
 
+def line_of(spec: Spec) -> Line:
+    """Lay the way of a spec's path in plan view, along which loads go."""
+    axes = path_axes(spec.machine(), spec.plant.parameters)
+    assert axes is not None  # as the spec's rules hold
+    return axes.line(spec.move.start, spec.move.target)
+
+
 def nearest(spec: Spec, times: Array, bodies: Array) -> Nearest:
     """Find where a machine has the least room; between two times its bodies go straight.
 
@@ -52,8 +60,8 @@ def nearest(spec: Spec, times: Array, bodies: Array) -> Nearest:
     """
     found = []
     for zone in zones_of(spec):
-        x, z = bodies[:, zone.body, 0], bodies[:, zone.body, 2]
-        beside, above = zone.beside(x), zone.clear(z)
+        x, y, z = bodies[:, zone.body].T
+        beside, above = zone.beside(x, y), zone.clear(z)
         room = np.maximum(beside, above)
         apart = beside - above
         passes = apart[:-1] * apart[1:] < 0.0

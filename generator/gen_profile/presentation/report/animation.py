@@ -183,7 +183,7 @@ def _obstacles(spec: Spec) -> Array:
     path = spec.path
     if path is None:
         return np.zeros((0, 4))
-    floor = min(0.0, *(height for *_, height in path.stacks))
-    standing = [(a, floor - path.rail, b - a, top - floor) for a, b, top in path.stacks]
-    hanging = [(a, height - path.rail, b - a, path.rail - height) for a, b, height in path.overhead]
+    floor = min(0.0, *(row[-1] for row in path.stacks))
+    standing = [(a, floor - path.rail, b - a, top - floor) for a, b, *_, top in path.stacks]
+    hanging = [(a, height - path.rail, b - a, path.rail - height) for a, b, *_, height in path.overhead]
     return np.array([*standing, *(one for one in hanging if one[3] > 0.0)])

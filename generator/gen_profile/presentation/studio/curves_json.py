@@ -7,10 +7,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.dynamics.evaluation.clearance import line_of
 from gen_profile.motion.profile import Array
 from gen_profile.presentation.charts.figure import Figure, Panel
 from gen_profile.presentation.charts.plotly_json import rounded
-from gen_profile.presentation.charts.side_view import side_view
+from gen_profile.presentation.charts.side_view import side_view, standing_on
 from gen_profile.spec.model import Spec
 
 MOST = 2000  # points of a curve, of which a screen shows fewer still
@@ -57,8 +58,18 @@ def side_json(spec: Spec, places: Array) -> dict[str, Any]:
     places : (machines, samples, bodies, 2) array
         As `side_view` takes them.
     """
-    panel, path = side_view(spec, places), spec.path
+    panel, path, line = side_view(spec, places), spec.path, line_of(spec)
     assert path is not None
+    shown, first = standing_on(path, line), len(path.stacks)
+
+    def obstacles(rows: Sequence[tuple[float, ...]], before: int) -> list[dict[str, Any]]:
+        """List those that are in the load's way: how the spec states them, and where they are along it."""
+        return [
+            {"number": number, "row": row, "shown": shown[before + number]}
+            for number, row in enumerate(rows)
+            if before + number in shown
+        ]
+
     return {
         "title": panel.title,
         "x_label": panel.x_label,
@@ -67,8 +78,9 @@ def side_json(spec: Spec, places: Array) -> dict[str, Any]:
             {"name": line.name, **attrs.asdict(line.style), "x": rounded(line.x), "y": rounded(line.y)}
             for line in panel.lines
         ],
-        "stacks": path.stacks,
-        "overhead": path.overhead,
+        "way": line.way,
+        "stacks": obstacles(path.stacks, 0),
+        "overhead": obstacles(path.overhead, first),
     }
 
 

@@ -289,10 +289,12 @@ def _path(path: StacksSpec | None) -> Iterator[Knob]:
     if path is None:
         return
     yield Knob(path="path.rail", kind="number", value=path.rail, unit="m")
-    size = ("width", "height")
-    pairs = [("load", size, path.load), ("hook", size, path.hook)]
+    sizes = {2: ("width", "height"), 3: ("width", "depth", "height")}
+    pairs = [
+        (key, sizes[len(size)], size) for key, size in (("load", path.load), ("hook", path.hook)) if size
+    ]
     for key, names, pair in [*pairs, ("clearance", ("sideways", "upwards"), path.clearances)]:
-        for index, value in enumerate(pair or ()):
+        for index, value in enumerate(pair):
             yield Knob(
                 path=f"path.{key}",
                 index=index,

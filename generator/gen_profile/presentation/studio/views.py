@@ -21,6 +21,7 @@ from gen_profile.methods.solvers.plan import draft, judged
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.motion.metrics import extremes, peak
 from gen_profile.presentation.charts.curves import motion_figure, select_machines, sway_figure
+from gen_profile.presentation.charts.side_view import on_line
 from gen_profile.presentation.report.animation import animation
 from gen_profile.presentation.studio.curves_json import curves_json, side_json
 from gen_profile.presentation.studio.knobs import knobs
@@ -88,8 +89,8 @@ def _sketched(spec: Spec) -> Iterator[Part]:
 
 def _side(spec: Spec, evaluation: MotionEvaluation) -> Part:
     times = np.linspace(0.0, evaluation.motion.duration, SAMPLES)
-    places = np.asarray(evaluation.swing.bodies(times))[..., ::2]
-    return {"part": "side", **side_json(spec, places)}
+    places = np.asarray(evaluation.swing.bodies(times))
+    return {"part": "side", **side_json(spec, on_line(spec, places))}
 
 
 def _setting(question: Question, spec: Spec) -> Part:

@@ -9,12 +9,15 @@ import numpy as np
 from gen_profile.dynamics.evaluation.scenarios import scenarios
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.dynamics.problem.initial_state import initial_state
+from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces, Rates, highest, least_time
-from gen_profile.methods.solvers.over_stacks.swing import Swing, swing_of
+from gen_profile.methods.solvers.over_stacks.swing import Swing, swing_of, swings_along
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant, decides
 from gen_profile.spec.model import AxisLimitsSpec, Spec
-from gen_profile.spec.stacks import StackZone, hanging, trolley_and_hoist, zones
+from gen_profile.spec.plan_view import Area, Line
+from gen_profile.spec.stacks import PathAxes, StackZone, hanging, path_axes, zones
+from gen_profile.support.units import RATES
 
 FINE = 4001  # times at which levels are compared; between them they are straight lines
 UNLIMITED = 1e4  # in place of a limit of the trolley that is not stated
@@ -30,8 +33,11 @@ class Bay:
     ----------
     spec : Spec
     plant : Plant
-    trolley, hoist : int
-        Numbers of the axes.
+    axes : PathAxes
+    line : Line
+        In plan view, along which the load goes: the trolley's places are along it.
+    moving : tuple of int
+        Coordinates of the machine that move as the load goes along the line.
     nominal, others : Swing
         Of the nominal machine, with sensitivities, and of the machines at the ends of all ranges.
     machines : (machines, parameters) array
@@ -39,12 +45,14 @@ class Bay:
     hang : (machines, bodies) array
         Heights of the bodies at the start, m above the suspension.
     zones : tuple of StackZone
+        Along the line.
     """
 
     spec: Spec
     plant: Plant
-    trolley: int
-    hoist: int
+    axes: PathAxes
+    line: Line
+    moving: tuple[int, ...]
     nominal: Swing
     others: Swing
     machines: Array
@@ -52,9 +60,34 @@ class Bay:
     zones: tuple[StackZone, ...]
 
     @property
+    def hoist(self) -> int:
+        """Number of the axis that lifts."""
+        return self.axes.hoist
+
+    @property
     def limits(self) -> AxisLimitsSpec:
-        """Of the trolley."""
-        return self.spec.limits.of(self.trolley)
+        """Of the trolley, along the line: what the axes that carry it along allow."""
+        stated = [
+            (self.spec.limits.of(axis), k) for k, axis in enumerate(self.axes.along) if self.line.way[k]
+        ]
+        rates = {
+            rate: min(
+                (
+                    each / abs(self.line.way[k])
+                    for one, k in stated
+                    if (each := getattr(one, rate)) is not None
+                ),
+                default=None,
+            )
+            for rate in RATES
+        }
+        travels = [
+            sorted((edge - self.line.origin[k]) / self.line.way[k] for edge in one.travel)
+            for one, k in stated
+            if one.travel is not None
+        ]
+        travel = (max(low for low, _ in travels), min(high for _, high in travels)) if travels else None
+        return AxisLimitsSpec(**rates, travel=travel)
 
     @property
     def rates(self) -> Rates:
@@ -65,15 +98,19 @@ class Bay:
     def begin(self) -> Array:
         """State of the nominal machine at the start, sensitivities included."""
         state = np.zeros(self.nominal.states)
-        state[0] = self.spec.move.start[self.trolley]
+        state[0] = self._along(self.spec.move.start)
         swing = initial_state(self.plant, self.spec.move.initial)
         state[3 : 3 + len(swing)] = swing
         return state
 
     @property
     def target(self) -> float:
-        """Of the trolley in m."""
-        return self.spec.move.target[self.trolley]
+        """Of the trolley in m, along the line."""
+        return self._along(self.spec.move.target)
+
+    def _along(self, end: Sequence[float]) -> float:
+        places = [*(end[axis] for axis in self.axes.along), 0.0][:2]
+        return float(self.line.along(np.array(places)))
 
     @property
     def rise(self) -> float:
@@ -181,28 +218,33 @@ class Bay:
 def bay_of(spec: Spec, reserve: float = 0.0) -> Bay:
     """State the path of a spec over its stacks, with so much more clearance in m."""
     plant, path, move = spec.machine(), spec.path, spec.move
-    axes = trolley_and_hoist(plant, spec.plant.parameters)
+    axes = path_axes(plant, spec.plant.parameters)
     assert path is not None and axes is not None  # as the spec's rules hold
-    trolley, hoist = axes
+    line = axes.line(move.start, move.target)
+    swings = swings_along(plant, axes, line, linearize(plant, spec.plant.parameters, move.target))
     sideways, above = path.clearances
     wider = attrs.evolve(path, clearance=(sideways + reserve, above + reserve))
     named = _machines(spec, plant)
     ends = [hanging(plant, spec.plant.parameters, q_a) for q_a in (move.start, move.target)]
-    hang = np.array([[z for _, z in hanging(plant, values, move.start)] for values in named])
+    hang = np.array([[z for *_, z in hanging(plant, values, move.start)] for values in named])
     desensitized = tuple(spec.robustness.uncertain) if spec.robustness.method == "sensitivity" else ()
+    found = []
+    for wide, zone in zip(zones(wider, ends), zones(path, ends), strict=True):
+        met, met_wide = zone.on(line), wide.on(line)
+        if met is not None and met_wide is not None:  # loads do not sway away from the line
+            places = [float(line.along(np.array(end[zone.body][:2]))) for end in ends]
+            found.append(_up_to_ends(met_wide, met, places))
     return Bay(
         spec=spec,
         plant=plant,
-        trolley=trolley,
-        hoist=hoist,
-        nominal=swing_of(plant, trolley, desensitized),
-        others=swing_of(plant, trolley, ()),
+        axes=axes,
+        line=line,
+        moving=swings[1],
+        nominal=swing_of(plant, axes, *swings, desensitized),
+        others=swing_of(plant, axes, *swings, ()),
         machines=parameter_rows(plant, named),
         hang=hang,
-        zones=tuple(
-            _up_to_ends(wide, zone, [end[zone.body][0] for end in ends])
-            for wide, zone in zip(zones(wider, ends), zones(path, ends), strict=True)
-        ),
+        zones=tuple(found),
     )
 
 
@@ -210,7 +252,7 @@ def _up_to_ends(wide: StackZone, zone: StackZone, places: Sequence[float]) -> St
     """Widen a zone up to where its body starts or ends at most, which else would be within it."""
     low = max([wide.low, *(x for x in places if x <= zone.low)])
     high = min([wide.high, *(x for x in places if x >= zone.high)])
-    return attrs.evolve(wide, low=low, high=high)
+    return attrs.evolve(wide, area=Area((low, high)))
 
 
 def _machines(spec: Spec, plant: Plant) -> list[dict[str, float]]:
@@ -239,7 +281,7 @@ def _side(zone: StackZone, end: float) -> tuple[float, float]:
         return (-math.inf, zone.low)
     if end >= zone.high:
         return (zone.high, math.inf)
-    return next(((a, b) for a, b in zone.own if a <= end <= b), (-math.inf, math.inf))
+    return next((one.x for one in zone.own if one.x[0] <= end <= one.x[1]), (-math.inf, math.inf))
 
 
 def _crossings(times: Array, level: Array, top: float) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import attrs
@@ -267,7 +267,7 @@ def sketched(spec: Spec) -> Array | None:
     Returns
     -------
     (samples, bodies, 2) array
-        m, horizontally and above the suspension.
+        m, along the line and above the suspension.
     """
     bay = bay_of(spec, RESERVE).alone()
     planner, lifted = _Planner(bay=bay), partial(bay.lifted, top=bay.top)
@@ -308,16 +308,19 @@ def _held(lift: float, duration: float) -> Pieces:
 
 
 def _profile(bay: Bay, course: Course) -> Profile:
-    """Write the course as polynomials of both axes, with ends that are exact."""
-    lengths = np.full(len(course.jerks), course.up.duration / len(course.jerks))
-    trolley = _to_rest(lengths, course.jerks, float(bay.begin[0]), bay.target)
-    hoist = _to_rest(
-        course.up.lengths, -course.up.jerks, bay.spec.move.start[bay.hoist], bay.spec.move.target[bay.hoist]
+    """Write the course as polynomials of all axes, with ends that are exact."""
+    lengths, move = np.full(len(course.jerks), course.up.duration / len(course.jerks)), bay.spec.move
+    axes = {
+        axis: _to_rest(lengths, way * course.jerks, move.start[axis], move.target[axis])
+        for axis, way in zip(bay.axes.along, bay.line.way, strict=False)
+    }
+    axes[bay.hoist] = _to_rest(
+        course.up.lengths, -course.up.jerks, move.start[bay.hoist], move.target[bay.hoist]
     )
-    knots = np.union1d(trolley.knots, hoist.knots)
+    knots = reduce(np.union1d, [one.knots for one in axes.values()])
     knots = knots[np.append(np.diff(knots) > CLOSE, True)]
     knots[0], knots[-1] = 0.0, course.up.duration
-    columns = {bay.trolley: trolley.at(knots[:-1]), bay.hoist: hoist.at(knots[:-1])}
+    columns = {axis: one.at(knots[:-1]) for axis, one in axes.items()}
     taylor = np.stack([columns[axis] for axis in sorted(columns)], axis=2)
     return Profile(
         knots=knots,
@@ -362,6 +365,12 @@ def _require_height(bay: Bay) -> None:
             "path.stacks: {stack} is in the way: at the hoist's top the {body} is {lacking:.3g} m too low to "
             "pass it with path.clearance."
         )
+        if len(bay.axes.along) == 2:
+            template = (
+                "path.stacks: {stack} is in the way: at the hoist's top the {body} is {lacking:.3g} m too "
+                "low to pass it with path.clearance; the way is straight in plan view, and one around it "
+                "takes two moves."
+            )
     else:
         place, less = "path.overhead", above - lacking / 2.0 - RESERVE
         values["beam"] = path.named(beam.obstacle)

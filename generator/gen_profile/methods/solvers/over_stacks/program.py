@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from gen_profile.dynamics.problem.linearization import Linearization, linear_terms, linearize
+from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Entries, place, squares
 from gen_profile.methods.solvers.over_stacks.bay import Bay
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
@@ -281,9 +281,13 @@ class Program:
     def _left(self, program: ConicProgram, machine: int) -> None:
         """Hold what a machine swings by at the target to the limits of residual sway, and off stacks."""
         bay, up, at = self.bay, self.about.up, len(self.about.jerks) * (self.width + 1)
-        linear, turns = _swinging_on(bay, machine)
-        sways = np.concatenate([linear.sway_gain, np.zeros_like(linear.sway_gain)], axis=1)
-        limits = KEPT_RESIDUAL * np.array(list(bay.spec.check.residual_sway.values()))
+        gain, turns = _swinging_on(bay, machine)
+        sways = np.concatenate([gain, np.zeros_like(gain)], axis=1)
+        stated, ways = np.array(list(bay.spec.check.residual_sway.values())), bay.plant.directions
+        groups = stated.reshape(-1, ways if len(stated) % ways == 0 else len(stated))
+        limits = KEPT_RESIDUAL * groups.min(axis=1).repeat(
+            groups.shape[1]
+        )  # along the line, of both directions
         held = [] if bay.spec.robustness.method == "none" else [(sways, limits, 0.0)]
         for body, still in enumerate(bay.still(machine)):
             low, high = bay.bounds(machine, body, up, np.array([up.duration]))
@@ -300,14 +304,13 @@ class Program:
                 program.at_most(place(sign * wide, np.array([at])), side, give=give)
 
 
-def _swinging_on(bay: Bay, machine: int) -> tuple[Linearization, list[Array]]:
-    """Linearise a machine at the target, and tell what (q_u, q̇_u) there becomes at times to come."""
-    plant, target = bay.plant, bay.spec.move.target
-    rows = bay.machines[machine : machine + 1]
-    stiffness, damping = (terms[0] for terms in linear_terms(plant, rows, target))
-    n = len(stiffness)
+def _swinging_on(bay: Bay, machine: int) -> tuple[Array, list[Array]]:
+    """Linearise a machine at the target: sways by what moves, and what (q_u, q̇_u) becomes later."""
+    plant, target, moving = bay.plant, bay.spec.move.target, list(bay.moving)
     names = [parameter.name for parameter in plant.parameters]
-    linear = linearize(plant, dict(zip(names, rows[0].tolist(), strict=True)), target)
+    linear = linearize(plant, dict(zip(names, bay.machines[machine].tolist(), strict=True)), target)
+    stiffness, damping = (one[np.ix_(moving, moving)] for one in (linear.stiffness, linear.damping))
+    n = len(stiffness)
     periods = 0.5 if n == 1 else 3.0
     times = TURNS * (1 if n == 1 else 4)
     step = periods * 2.0 * math.pi / float(linear.frequencies[0]) / times
@@ -315,7 +318,7 @@ def _swinging_on(bay: Bay, machine: int) -> tuple[Linearization, list[Array]]:
     turns = [np.eye(2 * n)]
     for _ in range(times - 1):
         turns.append(turns[-1] @ once)
-    return linear, turns
+    return linear.sway_gain[:, moving], turns
 
 
 def _control_points(span: float, order: int) -> Array:

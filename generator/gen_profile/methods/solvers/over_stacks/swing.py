@@ -7,11 +7,15 @@ import numpy as np
 
 from gen_profile.dynamics.problem import symbolic as sym
 from gen_profile.dynamics.problem.dynamics import dynamics
-from gen_profile.dynamics.problem.sensitivities import swing_equations
+from gen_profile.dynamics.problem.linearization import Linearization
+from gen_profile.dynamics.problem.sensitivities import sensitivities
 from gen_profile.dynamics.problem.symbolic import Function, Symbol
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
+from gen_profile.spec.plan_view import Line
+from gen_profile.spec.stacks import PathAxes
 
+ALIKE = 1e-9  # relative difference of what is the same
 TROLLEY = 3  # states of the trolley, which come first: place, velocity and acceleration
 
 
@@ -25,7 +29,7 @@ class Swing:
     rate : Function
         Of (state, hoist's place, velocity and acceleration, parameters): [ż, ∂ż/∂z] without the jerk's part.
     seen : Function
-        Of the same: [y, ∂y/∂z], y being the bodies' horizontal places and the end load's sway.
+        Of the same: [y, ∂y/∂z], y being the bodies' places along the line and the end load's sway along it.
     """
 
     states: int
@@ -33,25 +37,74 @@ class Swing:
     seen: Function
 
 
+def swings_along(
+    plant: Plant, axes: PathAxes, line: Line, linear: Linearization
+) -> tuple[Line, tuple[int, ...]]:
+    """Choose a line on which the load swings as on this one, and tell which coordinates move on it.
+
+    A machine that swings alike along both axes does on any line what it does along the first; what is
+    crosswise stays at rest.
+    """
+    if len(axes.along) == 1:
+        return line, tuple(range(len(plant.unactuated)))
+    first, second = axes.along
+    pushes, shown = linear.input, linear.sway_gain[plant.end_load]
+    powers = [np.linalg.matrix_power(linear.stiffness, k) for k in range(len(pushes))]
+    seen = np.array([shown @ one @ pushes[:, [first, second]] for one in powers])
+    alike = np.abs(seen - seen[:, :1, :1] * np.eye(2)).max(axis=(1, 2)) <= ALIKE * np.abs(seen).max(
+        axis=(1, 2)
+    )
+    if alike.all():
+        line = Line()
+    pushed = pushes[:, [first, second]] @ np.array(line.way)
+    reached = np.max([np.abs(one @ pushed) / np.abs(one).max() for one in powers], axis=0)
+    return line, tuple(np.flatnonzero(reached > ALIKE * reached.max()).tolist())
+
+
 @cache
-def swing_of(plant: Plant, trolley: int, names: tuple[str, ...]) -> Swing:
-    """Compile a machine, with sensitivities to some parameters."""
+def swing_of(
+    plant: Plant, axes: PathAxes, line: Line, moving: tuple[int, ...], names: tuple[str, ...]
+) -> Swing:
+    """Compile a machine that goes along a line, with sensitivities to some parameters.
+
+    Parameters
+    ----------
+    plant : Plant
+    axes : PathAxes
+    line : Line
+    moving : tuple of int
+        Numbers of the coordinates that are states; others stay at 0.
+    names : tuple of str
+    """
     d = dynamics(plant)
-    swing, rate, sensitive = swing_equations(plant, d, names, 1)
+    q, dq, ddq = (sym.split(one) for one in (d.q_u, d.dq_u, d.ddq_u))
+    swing = sym.column([*(q[k] for k in moving), *(dq[k] for k in moving)])
+    rate = sym.column([*(dq[k] for k in moving), *(ddq[k] for k in moving)])
+    still = sym.column([one[k] for one in (q, dq) for k in range(len(q)) if k not in moving])
+    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
+    sensitive = sensitivities(rate, swing, by_name, names, 1)
     carried, hoist = sym.symbols("trolley", TROLLEY), sym.symbols("hoist", 3)
     state = sym.column([carried, swing, *(one.states for one in sensitive)])
-    moved = sym.column([sym.split(carried)[1], sym.split(carried)[2], sym.zeros(1, 1)])
+    onwards = sym.column([sym.split(carried)[1], sym.split(carried)[2], sym.zeros(1, 1)])
 
     def driven(expression: Symbol) -> Symbol:
+        expression = sym.at_zero(expression, still)
         for order, symbol in enumerate((d.q_a, d.dq_a, d.ddq_a)):
-            both = [sym.split(hoist)[order], sym.split(carried)[order]]
-            axes = sym.column(both if trolley else both[::-1])
-            expression = sym.substitute(expression, symbol, axes)
+            along = sym.split(carried)[order]
+            moved: dict[int, Symbol] = {axes.hoist: sym.split(hoist)[order]}
+            for axis, origin, way in zip(axes.along, line.origin, line.way, strict=False):
+                moved[axis] = way * along if order else origin + way * along
+            expression = sym.substitute(
+                expression, symbol, sym.column([moved[axis] for axis in sorted(moved)])
+            )
         return expression
 
-    rates = sym.column([moved, driven(rate), *(driven(one.rates) for one in sensitive)])
-    places = sym.split(d.place)[::3]
-    seen = driven(sym.column([*places, sym.split(d.sway)[-1]]))
+    rates = sym.column([onwards, driven(rate), *(driven(one.rates) for one in sensitive)])
+    places, sways = sym.split(d.place), sym.split(d.sway)[plant.end_load]
+    (x, y), origin = line.way, line.way[0] * line.origin[0] + line.way[1] * line.origin[1]
+    alongs = [x * places[k] + y * places[k + 1] - origin for k in range(0, len(places), 3)]
+    sway = sum((way * one for way, one in zip(line.way[1:], sways[1:], strict=False)), line.way[0] * sways[0])
+    seen = driven(sym.column([*alongs, sway]))
     inputs = {"state": state, "hoist": hoist, "p": d.p}
     return Swing(
         states=state.shape[0],

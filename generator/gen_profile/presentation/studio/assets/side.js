@@ -46,7 +46,7 @@ const side = (() => {
   }
 
   /** All that a load keeps clear of, with the key of its numbers; what is overhead goes up, not down. */
-  const obstaclesOf = (part) => ["stacks", "overhead"].flatMap((key) => part[key].map((stack, number) => ({ path: `path.${key}.${number}`, number, up: key === "overhead", stack: [...stack] })));
+  const obstaclesOf = (part) => ["stacks", "overhead"].flatMap((key) => part[key].map(({ number, row, shown }) => ({ path: `path.${key}.${number}`, number, up: key === "overhead", row, stack: [...shown] })));
 
   /** An obstacle's places on the screen, and what its handles say. */
   function place({ stack, top }, { up, stack: [from, to, height] }) {
@@ -68,16 +68,17 @@ const side = (() => {
     })));
   }
 
-  /** Move a stack, or its top, by so much from where it was taken, and tell the spec. */
-  function move({ number, kind, from: [low, high, height] }, [across, up]) {
-    const next = kind === "top" ? [low, high, round(height + up)] : [round(low + across), round(high + across), height];
-    const moved = shown.obstacles[number];
-    moved.stack = next;
+  /** Move a stack along the way, or its top, by so much from where it was taken, and tell the spec. */
+  function move({ number, kind, from: { stack: [low, high, height], row } }, [across, up]) {
+    const top = kind === "top", moved = shown.obstacles[number], [x, y] = shown.part.way;
+    moved.stack = top ? [low, high, round(height + up)] : [round(low + across), round(high + across), height];
+    const places = row.slice(0, -1); // from and to in x, and perhaps in y
+    moved.row = top ? [...places, round(row.at(-1) + up)] : [...places.map((value, place) => round(value + across * (place < 2 ? x : y))), row.at(-1)];
     place(shown.handles[number], moved);
-    shown.options.drag(moved.path, next);
+    shown.options.drag(moved.path, moved.row);
   }
 
-  const taken = (target) => (target.dataset.number === undefined ? null : { number: Number(target.dataset.number), kind: target.getAttribute("class"), from: shown.obstacles[target.dataset.number].stack });
+  const taken = (target) => (target.dataset.number === undefined ? null : { number: Number(target.dataset.number), kind: target.getAttribute("class"), from: { ...shown.obstacles[target.dataset.number] } });
 
   function listen(svg) {
     svg.addEventListener("pointerdown", (event) => {
