@@ -30,10 +30,17 @@ _TIME_OF_DAY = re.compile(
     r"(?:\s*([AP])\.?\s?M\.?)?\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d)?",
     re.IGNORECASE,
 )
+DURATIONS = {"d": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # s
+_DURATION = re.compile(  # a TIME of IEC 61131-3, as in T#1m2s345ms
+    r"L?T(?:IME)?#(-?)" + "".join(rf"(?:(\d+(?:\.\d+)?){unit}_?)?" for unit in DURATIONS), re.IGNORECASE
+)
 
 
 def seconds_of(text: str) -> float:
-    """Read a date (ISO 8601, or day first) in s, or a time of day behind any other date; else NaN."""
+    """Read a date (ISO 8601, or day first) in s, a TIME, or a time of day behind any other date; else NaN."""
+    if (match := _DURATION.fullmatch(text)) and any(parts := match.groups()[1:]):
+        total = sum(float(part or 0.0) * unit for part, unit in zip(parts, DURATIONS.values(), strict=True))
+        return -total if match[1] else total
     dated = _DAY_FIRST.sub(lambda day: f"{day[3]}-{day[2]:0>2}-{day[1]:0>2}", text).replace(",", ".")
     try:
         moment = datetime.fromisoformat(dated)

@@ -7,6 +7,7 @@ the first place of each fault and its cure.
 """
 
 import math
+import re
 from array import array
 from collections.abc import Sequence
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
-from gen_profile.studies.identification.log_clock import LATEST, unit_of, unwrapped
+from gen_profile.studies.identification.log_clock import LATEST, seconds_of, unit_of, unwrapped
 from gen_profile.studies.identification.log_table import MISSING, LogTable
 from gen_profile.support.errors import OutputError
 from gen_profile.support.phrase import Phrase, joined
@@ -33,6 +34,9 @@ SHUFFLED = 0.125  # backward steps per row, from which on rows are in no order
 LATE = 2.0  # usual steps, within which a clock goes on that was set back
 FAR = 20.0  # usual steps that a gap between runs has at least
 LONGEST_GAP = 0.5  # of what was logged: over a longer one the swings cannot be counted
+
+
+_WHOLE = re.compile(r"[+-]?\d+(?:[eE][+-]?\d+)?")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -188,6 +192,8 @@ def _no_number(table: LogTable, head: int, row: int, place: int) -> str:
     """Say that a cell holds no number."""
     text, name = table.cell(row, place), Phrase("column {number}", number=place + 1)
     hint: str = LEAVE_EMPTY if text.lower() in MISSING else number_meant(text)
+    if not math.isnan(table.number(row, place)):
+        hint = Phrase(", as it is beyond {most:g}", most=GREATEST)
     if not hint and text[:1].isdecimal() and any(mark in text for mark in ":/"):
         hint = AS_ISO
     template = "{source}, row {row}: {name} holds {text!r}, which is no number of a log{hint}."
@@ -315,10 +321,13 @@ def _not_rising(log: _Log, index: int) -> str:
 
 
 def _require_separate(table: LogTable, head: int, first: int) -> None:
-    """Refuse numbers whose decimal commas separate columns, too: they are twice as many as the names."""
-    names, cells = len(table.rows[head]), table.rows[first] if first < len(table.rows) else ()
-    whole = all(cell.lstrip("+-").isdecimal() for cell in cells)
-    if not table.decimal_comma and table.is_head(head) and names > 1 and whole and len(cells) == 2 * names:
+    """Refuse numbers whose decimal commas separate columns, too: there are more of them than names."""
+    names = sum(map(bool, table.rows[head]))
+    cells = [cell for cell in (table.rows[first] if first < len(table.rows) else ()) if cell]
+    numbers = [cell for cell in cells if math.isnan(seconds_of(cell))]  # and no times of day
+    whole = all(_WHOLE.fullmatch(cell) for cell in numbers)
+    fractions = len(cells) == 2 * names or any(cell.startswith("0") and len(cell) > 1 for cell in numbers)
+    if table.rows.separator == "," and table.is_head(head) and len(cells) > names > 1 and whole and fractions:
         template = (
             "{source}, row {row}: holds {count} numbers below {names} names; where decimals have commas, "
             "separate columns by semicolons or tabs."

@@ -126,11 +126,17 @@ class LogTable:
                 above.append(row)
         return above[0] if above else 0
 
-    def _holds_values(self, row: int, places: Sequence[int]) -> bool:
-        """Tell whether cells hold times, values or what stands for none, and not all of them that."""
+    def _holds_values(self, row: int, places: Sequence[int], *, alone: bool = False) -> bool:
+        """Tell whether cells hold times, values or what stands for none, and not all of them that.
+
+        Where one is empty the next row decides: a remark with a date, such as when a trace was recorded, is
+        followed by none.
+        """
         known = [place for place in places if not math.isnan(self.seconds(row, place))]
         others = {self.cell(row, place).lower() for place in places if place not in known}
-        return bool(known) and others <= {"", *MISSING}
+        if not known or not others <= {"", *MISSING}:
+            return False
+        return alone or "" not in others or self._holds_values(row + 1, places, alone=True)
 
     def place(self, head: int, column: str) -> int:
         """Find a column by its name in a row of names, or by its number from 1.
