@@ -87,6 +87,21 @@ def test_without_limits_little_more_acceleration_is_taken_than_by_the_exact_moti
     assert over_range <= 1.501 * exact
 
 
+def test_options_decide_how_much_effort_less_sway_may_take():
+    problem = ranged(limits=LimitsSpec())
+    usual, little, wide = (
+        worst_case.solve(problem, options).raise_for_status()
+        for options in (
+            worst_case.USUAL,
+            worst_case.RangeOptions(held_back=1.2),
+            worst_case.RangeOptions(margin=0.02),
+        )
+    )
+    peaks = [greatest(optimal_profile(one), 2, 0) for one in (usual, little)]
+    assert peaks[1] == pytest.approx(0.8 * peaks[0], rel=1e-3)
+    assert little.cost < usual.cost and wide.cost < usual.cost
+
+
 def drawn(problem, uncertain, count):
     places = np.random.default_rng(3).uniform(-1.0, 1.0, (count, len(uncertain)))
     nominal = problem.parameters

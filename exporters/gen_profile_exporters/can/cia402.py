@@ -2,6 +2,7 @@
 
 from enum import Enum, IntEnum
 
+CIA_402 = 402  # low word of 1000h, the device profile
 VOLTAGE = 1 << 4
 REMOTE = 1 << 9
 LIMIT_ACTIVE = 1 << 11

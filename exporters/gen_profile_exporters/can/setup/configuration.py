@@ -18,7 +18,15 @@ from canopen.sdo.exceptions import SdoError
 from gen_profile.support.errors import StreamAborted
 from gen_profile.support.units import AxisScale
 from gen_profile_exporters.can import drive_units, frames, startup
-from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
+from gen_profile_exporters.can.cia402 import (
+    CIA_402,
+    FAULTS,
+    MODES,
+    MOVING,
+    Controlword,
+    State,
+    state_of,
+)
 from gen_profile_exporters.can.following_window import useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.host.link import Link
@@ -37,7 +45,6 @@ from gen_profile_exporters.can.setup.units import require_position_unit, require
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.modulo import least, nearest, turn_counts, within
 
-CIA_402 = 402  # low word of 1000h
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h

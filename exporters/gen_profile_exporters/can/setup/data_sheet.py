@@ -20,6 +20,7 @@ from canopen.objectdictionary.datatypes import INTEGER_TYPES, SIGNED_TYPES
 from gen_profile.spec.can import DataSheet
 from gen_profile.support.errors import ExportError, StreamAborted
 from gen_profile_exporters.can import frames, startup
+from gen_profile_exporters.can.cia402 import CIA_402
 from gen_profile_exporters.can.host.link import Link
 from gen_profile_exporters.can.scaling import Demand, quick_stop_deceleration, start_counts
 from gen_profile_exporters.can.setup import configuration
@@ -148,7 +149,7 @@ class _Sheet:
         self._refused: dict[tuple[int, int], str] = {}
         about = objects.device_information
         usual = {(0x1018, 1): about.vendor_number or 0, (0x1018, 2): about.product_number or 0}
-        usual |= {(0x1000, 0): configuration.CIA_402, (0x6502, 0): MANY, (0x6065, 0): 1}
+        usual |= {(0x1000, 0): CIA_402, (0x6502, 0): MANY, (0x6065, 0): 1}
         usual |= {(STATUSWORD, 0): SWITCH_ON_DISABLED, (ACTUAL_POSITION, 0): start}
         always = {STATUSWORD, ACTUAL_POSITION}
         for place, value in usual.items():

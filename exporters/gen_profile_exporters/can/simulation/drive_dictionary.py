@@ -13,20 +13,18 @@ from canopen.objectdictionary import ODVariable
 from canopen.objectdictionary.eds import export_eds
 
 from gen_profile.spec.can import FixedPdosSpec
-from gen_profile_exporters.can.setup.data_sheet import may_carry
+from gen_profile_exporters.can.setup.data_sheet import NO_OBJECT, NOT_MAPPABLE, may_carry
 from gen_profile_exporters.can.startup import AT_ONCE, NO_REMOTE_REQUEST, OFF, PDO_PARAMETERS
 
 PDOS = range(4)
 MAPPED = 8  # entries of a mapping
 VENDOR, PRODUCT, REVISION = 0x0000_02E5, 0x4750_0001, 1
 PDO_BITS = 64  # what a frame carries
-# SDO abort codes of CiA 301
-NO_OBJECT = 0x0602_0000
-NOT_MAPPABLE, PDO_TOO_LONG = 0x0604_0041, 0x0604_0042
-OUT_OF_RANGE, WRONG_STATE = 0x0609_0030, 0x0800_0022
+# further SDO abort codes of CiA 301
+PDO_TOO_LONG, OUT_OF_RANGE, WRONG_STATE = 0x0604_0042, 0x0609_0030, 0x0800_0022
 TRANSMISSION_TYPES = {*range(241), *AT_ONCE}  # the others are reserved, or wait for remote requests
 PERIOD, SYNC_COUNTER = 0x60C2, 0x1019
-HEARTBEAT = 0x1017  # which canopen's node must have, and refuses by SDO where the drive lacks it
+HEARTBEAT_TIME = 0x1017  # which canopen's node must have, and refuses by SDO where the drive lacks it
 RATE_UNITS = {0x60A9, 0x60AA}  # of velocity and acceleration
 # what a drive does that lacks the object: it faults when the connection is lost, brakes on a ramp of its own
 # and stays in quick stop, interpolates over 4 ms, and watches no following error
@@ -125,7 +123,7 @@ def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
         if variable.index - 0x200 in PDO_PARAMETERS and make.fixed_pdos.stated:
             variable.access_type = "const"
         variable.min, variable.max = make.limits.get((variable.index, variable.subindex), (None, None))
-    for index in {*make.lacks} - {HEARTBEAT}:
+    for index in {*make.lacks} - {HEARTBEAT_TIME}:
         del objects[index]
     return objects
 
@@ -171,8 +169,8 @@ def eds(node: int, make: DriveVariant, file_name: str = "drive.eds") -> str:
     for change in ("Creation", "Modification"):
         about |= {f"{change}Date": "01-01-2026", f"{change}Time": "12:00AM"}
     objects = dictionary(node, make)
-    if HEARTBEAT in make.lacks:
-        del objects[HEARTBEAT]
+    if HEARTBEAT_TIME in make.lacks:
+        del objects[HEARTBEAT_TIME]
     for variable in _variables_of(objects):
         value = variable.default
         if variable.index in PDO_PARAMETERS and variable.subindex == 1:

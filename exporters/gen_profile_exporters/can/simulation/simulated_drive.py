@@ -24,9 +24,9 @@ from gen_profile_exporters.can.cia402 import (
     State,
 )
 from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.setup.data_sheet import NO_OBJECT
 from gen_profile_exporters.can.simulation.drive_dictionary import (
     MAPPED,
-    NO_OBJECT,
     OWN,
     PDOS,
     DriveVariant,

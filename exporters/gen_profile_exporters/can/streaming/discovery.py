@@ -11,7 +11,7 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.support.errors import StreamAborted
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.cia402 import MODES
+from gen_profile_exporters.can.cia402 import CIA_402, MODES
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.host.link import Link
 
@@ -21,7 +21,6 @@ ANSWER_TIMEOUT = NANOSECONDS // 2  # for the last answer
 NODES = range(1, frames.MASTER + 1)
 READ_DEVICE_TYPE = struct.pack("<BHBxxxx", 0x40, 0x1000, 0)  # SDO upload (CiA 301)
 CONTROLLERS = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER}
-CIA_402 = 402
 
 
 @attrs.frozen(kw_only=True)

@@ -16,8 +16,6 @@ from gen_profile.methods.solvers.direct.set_up import Setup, on_mesh
 from gen_profile.methods.solvers.direct.transcription import Iterate
 from gen_profile.motion.profile import Array
 
-REACHED = 1e-4  # fraction of a limit that may lack of all of it; 1e-3 costs up to 1e-4, 1e-5 saves 5e-6
-
 
 def switching(
     setup: Setup,
@@ -55,7 +53,7 @@ def switching(
         most = overshoot_limit + ways * (wider - 1.0 if "limits.overshoot" in widened else 0.0)
         farther = goals.passed(transcription, iterate, setup.problem) - most
         taken += [*(1.0 + farther / ways).reshape(len(ways), transcription.intervals, STAGES)]
-    binds = [fractions > 1.0 - REACHED for fractions in taken]
+    binds = [fractions > 1.0 - setup.options.reached for fractions in taken]
     return np.asarray(np.any([some.any(axis=1) & ~some.all(axis=1) for some in binds], axis=0))
 
 

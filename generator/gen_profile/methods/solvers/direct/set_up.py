@@ -27,8 +27,7 @@ from gen_profile.methods.solvers.indirect.boundary_value_problem import (
 )
 from gen_profile.motion.profile import Array
 
-# of intervals from the ends on (snap costs 5e-5 more with 2.0, 6e-6 less with 1.2), and how many at most
-GROWTH, MAX_GRADED = 1.4, 30
+MAX_GRADED = 30  # intervals that grow from the ends on, at most
 
 
 @attrs.frozen(kw_only=True)
@@ -50,6 +49,12 @@ class DirectOptions:
         Of a mesh where limits begin or cease to bind.
     worth_bisecting : float
         Relative change of the cost from one mesh to the next, below which it is bisected no more.
+    reached : float
+        Fraction of a limit that may lack of all of it where it counts as binding.
+    growth : float
+        Times the one before, an interval is long from the ends on, where snap lets the motion change quickly.
+    steeper : float
+        By which the exponent of the sway's cost may grow from one expansion to the next.
     """
 
     intervals: int = 40
@@ -59,6 +64,9 @@ class DirectOptions:
     max_iterations: int = 50
     max_bisections: int = 6
     worth_bisecting: float = 1e-4
+    reached: float = 1e-4
+    growth: float = 1.4
+    steeper: float = 2.0
 
 
 USUAL = DirectOptions()
@@ -237,8 +245,8 @@ def _mesh(problem: Problem, options: DirectOptions) -> Array:
     needed = fastest * problem.duration / options.radians_per_interval
     longest = 1.0 / float(np.clip(np.ceil(needed), options.intervals, options.max_intervals))
     shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
-    graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
-    graded = graded[graded > shortest / GROWTH][::-1]
+    graded = longest * options.growth ** -np.arange(1.0, MAX_GRADED)
+    graded = graded[graded > shortest / options.growth][::-1]
     rest = 1.0 - 2.0 * graded.sum()
     middle = np.ceil(rest / longest * (1.0 - 1e-9))
     return np.concatenate([graded, np.full(int(middle), rest / middle), graded[::-1]])

@@ -56,8 +56,6 @@ LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
 FAR = 1e-2  # likewise of how far that is from 1
 TINY = 1e-6  # below which how little it is does not matter
-# by which the exponent of the sway's cost may grow from one expansion to the next; 1 costs 6e-4
-STEEPER = 2.0
 UNWEIGHTED = SwayCost(beta=0.0, gamma=1.0)
 
 
@@ -168,7 +166,7 @@ class Goal:
         def exponent(iterate: Iterate) -> float:
             return float(self.sway_cost.exponents(self.setup.transcription.end_sway_found(iterate)).max())
 
-        most, way = exponent(before) + STEEPER, after.flat() - before.flat()
+        most, way = exponent(before) + self.setup.options.steeper, after.flat() - before.flat()
         while exponent(after) > most:
             way = 0.5 * way
             after = before.of_flat(before.flat() + way)

@@ -16,12 +16,13 @@ import numpy as np
 
 from gen_profile.dynamics.evaluation.residual_sway import modal_amplitudes
 from gen_profile.dynamics.evaluation.simulation import PlantSimulation
-from gen_profile.dynamics.problem.parameter_box import FEW, box_of, start, worst_places
+from gen_profile.dynamics.problem.parameter_box import CORNERS, FEW, box_of, start, worst_places
 from gen_profile.dynamics.problem.problem import Problem, WorstCase
 from gen_profile.methods.solvers.direct import solver as direct
 from gen_profile.methods.solvers.direct.conic import ConicStatus
 from gen_profile.methods.solvers.direct.relaxation import Relaxed, shortest
-from gen_profile.methods.solvers.direct.set_up import Setup, set_up
+from gen_profile.methods.solvers.direct.set_up import USUAL as PROGRAMS
+from gen_profile.methods.solvers.direct.set_up import DirectOptions, Setup, set_up
 from gen_profile.methods.solvers.direct.solver import (
     COARSE,
     ROUGH,
@@ -41,30 +42,57 @@ from gen_profile.motion.profile import Array, Profile
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.work import OutOfWork, budget, left, spend
 
-TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case; a hundred times as much costs 0.1 % less
 # where programs for the least worst case fail; a better one takes ever more effort
 BISECTION = Search(precision=0.35, close=0.0, stride=math.log(1.5), growth=1.0, downward=True)
 BISECTING = 0.6  # fraction of the work that is left for it
 HOPELESS = 1e3  # times a load's limit, above which the least worst case is not looked for
-# fraction of a load's limit that the least cost may use beyond the least worst case, and times that case; the
-# paper's crane over its range costs 8 % more with a tenth of the one, 2 % more with a tenth of the other
-MARGIN = 0.002
-SLACK = 1.003
-GOOD_ENOUGH = 0.01  # fraction of a load's limit below which less is not worth an effort
-# times the exact motion's acceleration, which most motions over a range need not exceed: the paper's crane
-# costs 5 % less with 1.2, and half as much again with 3
-HELD_BACK = 1.5
-ROUNDS = 8  # of adding worse machines, at most; the paper's crane over its range takes two
 EXCHANGING = 0.8  # fraction of the work that is left, after which the last motion is taken
-CORNERS = 6  # parameters up to which all corners are tried
-ADDED = 3  # machines at most in one round
-WORSE = 1.01  # how much worse a machine must be than those tried to be added; 1.001 changes a cost by 0.1 %
-ACCURACY = 1e-6  # of a machine's integration, relative
+
+
+@attrs.frozen(kw_only=True)
+class RangeOptions:
+    """How well a range is searched and its worst machine calmed; see docs/solvers.md for the evidence.
+
+    Attributes
+    ----------
+    direct : DirectOptions
+        Of the programs.
+    held_back : float
+        Times the acceleration of the motion that is exact and insensitive, which an axis may take that no
+        limit of acceleration or jerk binds: less and less sway would ask for more and more of it.
+    margin, slack : float
+        What the least cost may use beyond the least worst case: a fraction of a load's limit, and times that
+        case.
+    good_enough : float
+        Fraction of a load's limit below which less is not worth an effort.
+    traces : tuple of float
+        Of effort, in the least worst case; the first one whose programs do not fail.
+    rounds, added : int
+        Of adding worse machines, and how many at once, at most.
+    worse : float
+        Times the worst of the machines considered, from which on another one is added.
+    accuracy : float
+        Of their integration, relative.
+    """
+
+    direct: DirectOptions = PROGRAMS
+    held_back: float = 1.5
+    margin: float = 0.002
+    slack: float = 1.003
+    good_enough: float = 0.01
+    traces: tuple[float, ...] = (1e-8, 1e-6, 1e-4)
+    rounds: int = 8
+    added: int = 3
+    worse: float = 1.01
+    accuracy: float = 1e-6
+
+
+USUAL = RangeOptions()
 
 Parameters = Mapping[str, float]
 
 
-def solve(problem: Problem) -> Solution:
+def solve(problem: Problem, options: RangeOptions = USUAL) -> Solution:
     """Minimise the worst residual sway, each load in fractions of its limit, then the cost.
 
     Rounds go as far as work and programs allow; the last motion is the best.
@@ -73,6 +101,7 @@ def solve(problem: Problem) -> Solution:
     ----------
     problem : Problem
         With a `worst_case`.
+    options : RangeOptions, optional
 
     Returns
     -------
@@ -82,11 +111,11 @@ def solve(problem: Problem) -> Solution:
     limits = map(problem.limits.of, range(len(problem.target)))
     # of these no limit bounds how much effort less sway may take
     free = [axis for axis, own in enumerate(limits) if own.acceleration is None and own.jerk is None]
-    bounded = _held_back(problem, free) if free else problem
+    bounded = _held_back(problem, free, options) if free else problem
     solutions: list[Solution] = []
     try:
         with budget(EXCHANGING * left()):
-            solutions.extend(_rounds(bounded or problem))
+            solutions.extend(_rounds(bounded or problem, options))
     except OutOfWork:
         spend(0.0)
         if not solutions:
@@ -95,20 +124,20 @@ def solve(problem: Problem) -> Solution:
     return attrs.evolve((motions or solutions)[-1], problem=problem)
 
 
-def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
+def _held_back(problem: Problem, free: Sequence[int], options: RangeOptions) -> Problem | None:
     """Allow some axes little more acceleration than they take in the motion that is exact and insensitive.
 
     Without such a limit, less and less sway would ask for more and more acceleration.
     """
     names = tuple(problem.worst_case.uncertain) if problem.worst_case is not None else ()
     unweighted = attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0)
-    exact = direct.solve(unweighted, coarse=True)
+    exact = direct.solve(unweighted, coarse=True, options=options.direct)
     if exact.optimum is None:
         return None
     motion, limits = optimal_profile(exact), problem.limits
     own = {f"axis{axis}": limits.of(axis) for axis in range(len(problem.target))}
     for axis in free:
-        most = HELD_BACK * greatest(motion, 2, axis)
+        most = options.held_back * greatest(motion, 2, axis)
         own[f"axis{axis}"] = attrs.evolve(limits.of(axis), acceleration=most or None)
     return attrs.evolve(problem, limits=attrs.evolve(limits, axis=own))
 
@@ -128,7 +157,7 @@ def shortest_motion(
     """
     worst_case, problem = _taken_apart(problem)
     tried, shortest_known = ends(problem, worst_case), guess
-    for _ in range(ROUNDS):
+    for _ in range(USUAL.rounds):
         shortest_yet = shortest(problem, shortest_known, tried, progress)
         if shortest_yet is None or shortest_yet.solution.optimum is None:
             return shortest_yet
@@ -140,7 +169,7 @@ def shortest_motion(
     return None
 
 
-def _rounds(problem: Problem) -> Iterator[Solution]:
+def _rounds(problem: Problem, options: RangeOptions) -> Iterator[Solution]:
     """Solve for a few machines, about, search for worse ones, and solve again with them.
 
     Where there are none, and none that sway too much between collocation points, solve exactly.
@@ -149,22 +178,23 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
     sway_cost, iterations = resolve_sway_cost(problem)
     tried, bound, result, precision = ends(problem, worst_case), 0.0, None, COARSE
     swaying = problem.nominal_sway
-    for _ in range(ROUNDS):
-        setup, _ = set_up(problem, tried)
+    for _ in range(options.rounds):
+        setup, _ = set_up(problem, tried, options.direct)
         goal = Goal(
             setup=setup,
             sway_cost=sway_cost,
             sway_limit=swaying,
             overshoot_limit=problem.nominal_overshoot,
-            worst=GOOD_ENOUGH,
+            worst=options.good_enough,
         )
         start = _begun(setup, result)
         # the bound only rises with more machines: what was not good enough before is not now
-        result = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
+        result = sequence(start, goal, precision) if bound <= options.good_enough else None
         if result is None or result.verdict is not ConicStatus.SOLVED:
-            best = _least_worst(goal)
+            best = _least_worst(goal, options.traces)
             iterations += best.iterations
-            bound, upper = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
+            bound = float(best.solutions[0].x[-1])
+            upper = options.slack * float(best.solutions[-1].x[-1]) + options.margin
             if best.verdict is ConicStatus.FAILED and (bisected := _bisected(start, goal)) is not None:
                 bound, upper = bisected / math.exp(BISECTION.precision), bisected
             elif best.verdict is not ConicStatus.SOLVED:
@@ -177,8 +207,8 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
         yield attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
         if solution.optimum is None:
             return
-        upper = WORSE * float(goal.worst or 0.0)
-        worse = worse_machines(problem, worst_case, optimal_profile(solution), upper)
+        upper = options.worse * float(goal.worst or 0.0)
+        worse = worse_machines(problem, worst_case, optimal_profile(solution), upper, options)
         asked, swaying = swaying, to_be_asked(problem, solution, swaying)
         if not worse and asked == swaying:
             if precision < COARSE:
@@ -187,9 +217,9 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
         tried = [*tried, *worse]
 
 
-def _least_worst(goal: Goal) -> ProgramSequence:
+def _least_worst(goal: Goal, traces: Sequence[float]) -> ProgramSequence:
     """Minimise the worst fraction, for as little effort besides as the programs can tell from none."""
-    for price in TRACES:
+    for price in traces:
         least_worst = attrs.evolve(goal, effort_price=price, worst=None)
         best = sequence(goal.setup.transcription.rest(), least_worst)
         if best.verdict is not ConicStatus.FAILED:
@@ -234,7 +264,11 @@ def ends(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
 
 
 def worse_machines(
-    problem: Problem, worst_case: WorstCase, motion: Profile, fraction: float
+    problem: Problem,
+    worst_case: WorstCase,
+    motion: Profile,
+    fraction: float,
+    options: RangeOptions = USUAL,
 ) -> list[Parameters]:
     """Search the ranges for machines whose loads a motion leaves more than a fraction of their limits."""
     low, high = (_machine(problem, worst_case, (end,) * len(worst_case.uncertain)) for end in (-1.0, 1.0))
@@ -243,19 +277,24 @@ def worse_machines(
         return []
 
     def fractions(places: Array) -> Array:
-        return residual_fractions(problem, worst_case, motion, box.parameters(places))[:, None]
+        machines = box.parameters(places)
+        return residual_fractions(problem, worst_case, motion, machines, options.accuracy)[:, None]
 
-    places, _ = worst_places(fractions, start(box.phases, len(box.ranges), FEW), ADDED)
+    places, _ = worst_places(fractions, start(box.phases, len(box.ranges), FEW), options.added)
     return [*box.parameters(places[fractions(places)[:, 0] > fraction])]
 
 
 def residual_fractions(
-    problem: Problem, worst_case: WorstCase, motion: Profile, machines: Sequence[Parameters]
+    problem: Problem,
+    worst_case: WorstCase,
+    motion: Profile,
+    machines: Sequence[Parameters],
+    accuracy: float = USUAL.accuracy,
 ) -> Array:
     """Find what fraction of its limit every machine's load swings by where its modes meet, (machines,)."""
     end, limits = np.array([motion.duration]), np.array(worst_case.load_limits)
     swing = PlantSimulation(
-        problem.plant, motion, machines, motion.duration, problem.initial, accuracy=ACCURACY
+        problem.plant, motion, machines, motion.duration, problem.initial, accuracy=accuracy
     )
     responses = zip(machines, swing.at(end), strict=True)
     return np.array([(modal_amplitudes(problem.plant, p, at) / limits).max() for p, at in responses])
