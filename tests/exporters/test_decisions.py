@@ -117,12 +117,49 @@ def test_a_speed_is_another_one_beyond_its_band_and_the_end_where_there_is_no_ro
     assert table.command(SPEED, 0.0)["nDoes"] == STOP
 
 
-def test_a_prompt_stop_that_fails_may_leave_four_times_as_much(blocks):
-    table = Table(blocks)
+def test_a_prompt_stop_that_fails_may_leave_four_times_as_much_and_then_is_a_quiet_one(blocks):
+    table, eases = Table(blocks), [1.0]
     assert table.command(PROMPT)["fEase"] == 1.0
-    tried = table.ask(CHOOSE, nNow=30.0, fSpeed=1.0)
+    while (tried := table.ask(CHOOSE, nNow=30.0, fSpeed=1.0))["nKind"] == PROMPTLY:
+        assert tried["nLength"] == 29
+        eases.append(table.fails(tried)["fEase"])
+    assert eases[:3] == [1.0, 4.0, 16.0] and eases[-1] > 100.0
+    assert (tried["nDoes"], tried["nKind"], tried["bThere"]) == (STOP, REST, 1.0)
+
+
+def test_a_prompt_stop_takes_no_more_slots_than_are_committed(blocks):
+    table = Table(blocks)
+    table.command(PROMPT)
+    assert table.ask(CHOOSE, nNow=12.0, fSpeed=1.0)["nLength"] == 12
+
+
+def test_a_prompt_stop_within_levels_is_sought_in_fewer_slots_until_none_is_left_between(blocks):
+    for fewest in range(4, 29):
+        table, now = Table(blocks), 29
+        table.command(PROMPT)
+        table.ask(CHOOSE, nNow=40.0, fSpeed=1.0)
+        table.ask(FOUND, nOfKind=PROMPTLY)
+        while (tried := table.ask(CHOOSE, nNow=now, bLeadsNow=1.0))["nKind"]:
+            assert tried["nKind"] == PROMPTLY and tried["nLength"] < now and tried["fEase"] == 1.0
+            if tried["nLength"] >= fewest:
+                now = tried["nLength"]
+                table.ask(FOUND, nOfKind=PROMPTLY)
+            else:
+                table.fails(tried)
+        assert now == fewest
+
+
+def test_a_prompt_stop_beyond_levels_is_sought_with_half_the_sway_until_that_fails(blocks):
+    table = Table(blocks)
+    table.command(PROMPT)
+    for _ in range(2):
+        table.fails(table.ask(CHOOSE, nNow=40.0, fSpeed=1.0))
+    table.ask(CHOOSE)
+    assert table.ask(FOUND, nOfKind=PROMPTLY)["fEase"] == 8.0  # 16 was found
+    tried = table.ask(CHOOSE, nNow=29.0, bLeadsNow=1.0)
     assert (tried["nKind"], tried["nLength"]) == (PROMPTLY, 29)
-    assert table.fails(tried)["fEase"] == 4.0
+    table.fails(tried)
+    assert table.ask(CHOOSE, nNow=28.0)["nKind"] == NONE
 
 
 def test_a_decline_that_fails_is_sought_longer_and_then_behind_a_ramp_to_less(blocks):

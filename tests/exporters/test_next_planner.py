@@ -227,13 +227,31 @@ def test_a_prompt_stop_is_never_faster_than_the_axis_was_and_says_what_is_left(b
     assert stop["bPromise"][-1] == (stop["fSwayLeft"][-1] <= min(spec.check.residual_sway.values()))
 
 
-@pytest.mark.parametrize("seed", [21, 68])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_prompt_stop_shortly_before_the_end_of_travel_stays_in_travel_and_ends(bay, seed):
+    spec, compiled = bay
+    before = np.random.default_rng([6, seed]).uniform(0.1, 3.0)  # s
+    arrival = None
+    for _ in range(2):
+        history = History(spec, compiled, np.random.default_rng([6, seed]))
+        end = 0.0 if history.place < 20.0 else 40.0
+        moves = history.hold(90.0 if arrival is None else arrival - before, bExecute=1.0, fTarget=end)
+        arrival = np.flatnonzero(moves["fVelocity"])[-1] * history.cycle
+    toward, stated = np.sign(end - 20.0), (moves["fStopLow"][-1], moves["fStopHigh"][-1])
+    stop = history.hold(40.0, bStop=1.0, bPrompt=1.0)
+    assert not stop["fVelocity"][int((before + 0.5) / history.cycle) :].any()  # as soon as what was committed
+    reached = (toward * stop["fPosition"]).max()
+    assert reached <= max(toward * place for place in stated) + 1e-9
+    history.keeps()
+
+
+@pytest.mark.parametrize("seed", [4, 5])
 def test_after_a_prompt_stop_that_leaves_too_much_a_far_target_begins_and_brings_the_promise_back(bay, seed):
     spec, compiled = bay
-    random = np.random.default_rng([5, seed])
+    random = np.random.default_rng([7, seed])
     history = History(spec, compiled, random)
     away = 2.0 if history.place > 20.0 else 38.0
-    history.hold(random.uniform(1.0, 14.0), bExecute=1.0, fTarget=away)
+    history.hold(random.uniform(0.3, 2.5), bExecute=1.0, fTarget=away)
     stop = history.hold(20.0, bStop=1.0, bPrompt=1.0)
     assert not stop["bPromise"][-1]
     far = 38.0 if stop["fPosition"][-1] < 20.0 else 2.0
