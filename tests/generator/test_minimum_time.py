@@ -142,7 +142,7 @@ def in_cycles(duration):
     return math.ceil(1e3 * duration - 1e-6) / 1e3
 
 
-def searched(excess, start=10.0, most=100.0, search=searching.EXACT):
+def searched(excess, start=10.0, most=100.0, search=searching.EXACT_DURATION):
     """Look for the least duration whose excess is not positive; also list what was tried."""
     tried = []
 
@@ -159,7 +159,7 @@ def searched(excess, start=10.0, most=100.0, search=searching.EXACT):
 def test_a_duration_of_which_only_is_known_whether_it_will_do_is_found_by_bisection(upper, tries):
     """Every try is a design of seconds."""
     value, tried = searched(lambda duration: -math.inf if duration >= upper else math.inf)
-    assert upper <= value <= upper * math.exp(searching.EXACT.precision) + 0.001
+    assert upper <= value <= upper * math.exp(searching.EXACT_DURATION.precision) + 0.001
     assert len(tried) <= tries
 
 
@@ -168,7 +168,7 @@ def test_no_duration_is_looked_for_without_end():
 
 
 def test_where_the_excess_falls_no_more_no_duration_is_looked_for():
-    value, tried = searched(lambda duration: 0.3 + 0.1 / duration, 1.0, 1e9, relaxation.LEAST)
+    value, tried = searched(lambda duration: 0.3 + 0.1 / duration, 1.0, 1e9, relaxation.LEAST_WIDENING)
     assert value is None
     assert len(tried) <= 12
 
@@ -181,7 +181,9 @@ def test_an_excess_that_is_known_leads_to_the_duration_in_few_tries(upper, power
 
     value, tried = searched(excess)
     assert upper <= value
-    assert excess(value) >= -searching.EXACT.close or value <= upper * math.exp(searching.EXACT.precision)
+    assert excess(value) >= -searching.EXACT_DURATION.close or value <= upper * math.exp(
+        searching.EXACT_DURATION.precision
+    )
     assert len(tried) <= 5
 
 
@@ -197,7 +199,7 @@ def test_the_least_value_found_before_the_work_is_used_up_is_taken():
         spend(1.0)
         return -math.inf if value >= 12.0 else math.inf
 
-    search = attrs.evolve(searching.EXACT, stride=math.log(1.5), growth=1.0)
+    search = attrs.evolve(searching.EXACT_DURATION, stride=math.log(1.5), growth=1.0)
     with budget(4.5):
         assert 12.0 <= least(excess, 10.0, search) <= 16.0
     with pytest.raises(OutOfWork), budget(0.5):

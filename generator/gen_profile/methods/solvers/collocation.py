@@ -25,7 +25,7 @@ from gen_profile.support.one_thread import one_thread
 from gen_profile.support.work import spend
 
 STAGES = 4  # of the schemes for fine meshes
-WORK = 3e-10  # s of work for each interval and the cube of its unknowns
+INTERVAL_WORK = 3e-10  # s of work for each interval and the cube of its unknowns
 
 IntArray = NDArray[np.intp]
 
@@ -189,7 +189,7 @@ def newton_step(flow: Array, current: Trajectory, initial: Array, final: Array) 
     """
     nodes, stages, scheme = current.nodes, current.stages, current.scheme
     intervals, count, size = stages.shape
-    spend(WORK * intervals * (count * size) ** 3)
+    spend(INTERVAL_WORK * intervals * (count * size) ** 3)
     lengths = np.diff(current.mesh)[:, None, None]
     values = flow.reshape(intervals, count, size, 1 + size)
     states, costates = slice(0, size // 2), slice(size // 2, size)

@@ -30,7 +30,7 @@ from gen_profile.support.summary import Drawable
 ROOM = 2.0  # times a shaper's delay, which leaves the base move as much time
 # fraction of the limits of residual sway, which leaves room for the setpoints' errors; with 0.9 the shortest
 # move takes 1 % longer
-WITHIN = 0.99
+BASE_WITHIN = 0.99
 
 
 @attrs.frozen(kw_only=True)
@@ -140,7 +140,7 @@ class Plan(Drawable):
         if excess(evaluation.targets, evaluation.overshoot[1]) > 0.0:
             return math.inf
         taken = share_of_residual_sway(self.spec, evaluation)
-        return math.log(taken / WITHIN) if taken > 0.0 else -math.inf
+        return math.log(taken / BASE_WITHIN) if taken > 0.0 else -math.inf
 
 
 def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Plan:

@@ -15,7 +15,13 @@ from gen_profile.dynamics.problem.overshoot import counted
 from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct import solver as direct
 from gen_profile.methods.solvers.direct import worst_case
-from gen_profile.methods.solvers.direct.relaxation import SHORTEST, Relaxation, Relaxed, shortest, wideable
+from gen_profile.methods.solvers.direct.relaxation import (
+    SHORTEST_WITHIN,
+    Relaxation,
+    Relaxed,
+    shortest,
+    wideable,
+)
 from gen_profile.methods.solvers.direct.solver import ProgramSequence
 from gen_profile.methods.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.methods.solvers.indirect import solver as indirect
@@ -32,20 +38,22 @@ ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead
 SOLVING = 2.0  # s of work for a method
 DIRECTLY = 6.0  # likewise for the direct one,
 COMPARING = 3.0  # and for a second start
-NEARLY = 1.1  # times the limits that the motion of least violation may take, for it costs a little, too
-KEPT = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
-REFINING = 0.4  # of the work that is left, for finer meshes that keep the limits
+# times the limits that the motion of least violation may take, for it costs a little, too
+MOST_VIOLATED = 1.1
+KEPT_AS_WIDE = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
+FINER_MESHES = 0.4  # of the work that is left, for finer meshes that keep the limits
 STARTING = 0.85  # likewise, for what begins at rest
 # likewise, for the least cost from two other starts, after which the motion of least violation will do
-SETTLING = 0.4, 0.9
+OTHER_STARTS = 0.4, 0.9
 INEXACT = 1e-3  # share of a limit by which programs may break it for no other reason than their accuracy
-RESERVE, RESERVES = 2.0, 2  # times that share less of the limits is asked for then, and how often
-PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
-LEAST = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
+# times that share less of the limits is asked for then, and how often
+KEPT_FURTHER, KEPT_FURTHER_ROUNDS = 2.0, 2
+SHORTEST_PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
+LEAST_PEAKS = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
 BLEND = 4.0  # order of the norm by which these times and the period count together
 RANGE = 2.0  # times the work for a whole range
 # rad and iterations, from which on a motion may be one of several optimal ones; rad within limits
-FAR, MANY, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
+SWINGS_FAR, MANY_ITERATIONS, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
 BETTER = 1.0 - 1e-3  # times the cost of a motion, below which another one is given in its place
 
 
@@ -93,13 +101,13 @@ def _compared(problem: Problem, solution: Solution) -> Solution:
     elif problem.limits.stated():
         start, several = direct.without_limits, found.angle > FAR_WITHIN_LIMITS
     else:
-        several = found.angle > FAR and solution.iterations >= MANY
+        several = found.angle > SWINGS_FAR and solution.iterations >= MANY_ITERATIONS
     if not several:
         return solution
     settled = problem
     if found is not None:  # so that costs compare
         settled = attrs.evolve(problem, sway_weight=found.sway_weight, sway_scale=found.sway_scale)
-    other = afford(partial(_begun, settled, start), min(COMPARING, SETTLING[-1] * left()))
+    other = afford(partial(_begun, settled, start), min(COMPARING, OTHER_STARTS[-1] * left()))
     if other is None or other.optimum is None or not keeps_limits(other):
         return attrs.evolve(solution, other_costs=())
     if found is None or other.optimum.cost < BETTER * found.cost:
@@ -120,7 +128,7 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
     solution = afford(begin, STARTING * left()) or given_up(problem)
     if problem.limits.stated() and not keeps_limits(solution):
         nearest = least_violation(settled)
-        if nearest is not None and nearest.wider > NEARLY:
+        if nearest is not None and nearest.wider > MOST_VIOLATED:
             return _infeasible(problem, nearest)
         if nearest is not None:
             other = _from_nearest(settled, nearest, coarse=coarse)
@@ -136,11 +144,11 @@ def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Soluti
     both starts fail, the motion of least violation is taken, if it keeps the limits.
     """
     if not coarse:
-        with suppress(OutOfWork), budget(REFINING * left()):
-            while nearest.wider > KEPT and (finer := _refined(problem, nearest)) is not None:
+        with suppress(OutOfWork), budget(FINER_MESHES * left()):
+            while nearest.wider > KEPT_AS_WIDE and (finer := _refined(problem, nearest)) is not None:
                 nearest = finer
         spend(0.0)
-    for start, share in zip((nearest.start, direct.without_limits), SETTLING, strict=True):
+    for start, share in zip((nearest.start, direct.without_limits), OTHER_STARTS, strict=True):
         begun = partial(_begun, problem, start, coarse=coarse)
         solution = afford(begun, share * left()) or given_up(problem)
         if solution.optimum is not None:
@@ -164,11 +172,11 @@ def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:
 def _with_reserve(problem: Problem, near: ProgramSequence | None, *, coarse: bool) -> Solution:
     """Solve directly; where a limit is broken by as much as programs are inexact, ask for so much less."""
     solution = direct.solve(problem, near, coarse=coarse)
-    for _ in range(RESERVES):
+    for _ in range(KEPT_FURTHER_ROUNDS):
         excess = max((broken.excess for broken in _broken(solution)), default=0.0)
         if not 0.0 < excess < INEXACT:
             break
-        other = direct.solve(problem.within(1.0 - RESERVE * excess), near, coarse=coarse)
+        other = direct.solve(problem.within(1.0 - KEPT_FURTHER * excess), near, coarse=coarse)
         if other.optimum is None:
             break
         solution, problem = attrs.evolve(other, problem=solution.problem), other.problem
@@ -197,7 +205,7 @@ def least_violation(problem: Problem) -> Relaxed | None:
 def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
     """Look for the least worst case only where the nominal machine's motion can keep the limits."""
     nearest = least_violation(problem)
-    if nearest is not None and nearest.wider > NEARLY:
+    if nearest is not None and nearest.wider > MOST_VIOLATED:
         return _infeasible(problem, nearest)
     if nearest is None or not coarse:
         return _unproved(worst_case.solve(problem))
@@ -205,7 +213,10 @@ def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
 
 
 def minimum_time(
-    problem: Problem, progress: Progress = no_progress, near: Relaxed | None = None, search: Search = SHORTEST
+    problem: Problem,
+    progress: Progress = no_progress,
+    near: Relaxed | None = None,
+    search: Search = SHORTEST_WITHIN,
 ) -> Relaxed | None:
     """Find the shortest motion for a problem's limits and robustness; None where none was found.
 
@@ -228,13 +239,15 @@ def minimum_time(
 def usual_duration(problem: Problem) -> float:
     """About how long in s the shortest motion takes, which no axis does in less time than by itself."""
     slowest = float(linearize(problem.plant, problem.parameters, problem.target).frequencies[0])
-    times = [PERIODS * 2.0 * math.pi / slowest]
+    times = [SHORTEST_PERIODS * 2.0 * math.pi / slowest]
     if problem.limits.sway is not None:  # a pendulum's, under a constant acceleration
-        times.append(math.sqrt(LEAST[2] * max(map(abs, problem.distance)) / problem.limits.sway) / slowest)
+        times.append(
+            math.sqrt(LEAST_PEAKS[2] * max(map(abs, problem.distance)) / problem.limits.sway) / slowest
+        )
     for axis, way in enumerate(problem.distance):
         limits = problem.limits.of(axis)
         for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
-            times += [] if limit is None else [(LEAST[order] * abs(way) / limit) ** (1.0 / order)]
+            times += [] if limit is None else [(LEAST_PEAKS[order] * abs(way) / limit) ** (1.0 / order)]
     return float(np.linalg.norm(times, BLEND))
 
 

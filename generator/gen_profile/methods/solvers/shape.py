@@ -21,8 +21,8 @@ from gen_profile.support.errors import Code, InfeasibleProblem, Reason, rounded_
 from gen_profile.support.phrase import Phrase
 
 # peaks of a shaped motion fall with the base move's duration, not quite evenly where delayed parts overlap
-SHORTEST = Search(precision=1e-4, close=0.0, stride=math.log(2.0), growth=1.0, downward=True)
-LONGEST = 1e6  # times the shaper's delay, after which a duration is not looked for
+SHORTEST_SHAPED = Search(precision=1e-4, close=0.0, stride=math.log(2.0), growth=1.0, downward=True)
+LONGEST_SHAPED = 1e6  # times the shaper's delay, after which a duration is not looked for
 
 
 def shaped_motion(spec: Spec, name: str) -> Profile:
@@ -91,7 +91,7 @@ def shortest_duration(spec: Spec, shaped: ShapedMove) -> float | None:
         keeps = enough and not _breaches(spec, shaped.profile(duration))
         return -math.inf if keeps else math.inf
 
-    return least(excess, 2.0 * delay, SHORTEST, LONGEST * delay, in_cycles)
+    return least(excess, 2.0 * delay, SHORTEST_SHAPED, LONGEST_SHAPED * delay, in_cycles)
 
 
 def _plausible_stretch(spec: Spec, shaped: ShapedMove) -> float:

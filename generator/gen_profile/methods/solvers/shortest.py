@@ -10,7 +10,7 @@ from gen_profile.dynamics.problem.problem import Problem, problem_of
 from gen_profile.methods.shapers.shaped_move import too_short
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers import transient_sway
-from gen_profile.methods.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed, refined
+from gen_profile.methods.solvers.direct.relaxation import ROUGHLY, SHORTEST_WITHIN, Relaxed, refined
 from gen_profile.methods.solvers.draft import Plan, drafted, in_cycles, lasting, solved, suggested
 from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.methods.solvers.search import Search, least, slope_of
@@ -23,18 +23,22 @@ from gen_profile.support.phrase import Phrase
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.work import OutOfWork, budget, left, spend
 
-SLOW = 2.0  # times the usual duration, which is time enough where no duration keeps the limits
-SEARCHING = 8.0  # s of work to find the shortest duration
+TIME_ENOUGH = 2.0  # times the usual duration, which is time enough where no duration keeps the limits
+SEARCH_WORK = 8.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
-ROUNDING = 1e-9  # of a duration
-NEARLY = 2e-3  # relative, by which it may be another than was supposed
+DURATION_ROUNDING = 1e-9  # of a duration
+NEARLY_SUPPOSED = 2e-3  # relative, by which it may be another than was supposed
 # residual sway falls steeply with the duration, as far as nothing more is known of it
-COARSE = Search(
+COARSE_DURATION = Search(
     precision=5e-3, close=0.06, aim=-0.03, slope=15.0, believed=(1.0, math.inf), growth=8.0, longest=1.0
 )
-EXACT = attrs.evolve(COARSE, precision=1e-3, close=4e-3, aim=-1.5e-3, stride=1e-3, downward=True)
-LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
+EXACT_DURATION = attrs.evolve(
+    COARSE_DURATION, precision=1e-3, close=4e-3, aim=-1.5e-3, stride=1e-3, downward=True
+)
+LONGEST_CALMER = (
+    10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
+)
 
 
 def timed(spec: Spec, progress: Progress = no_progress) -> Spec:
@@ -66,7 +70,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Plan:
         return short_enough(spec, Plan(spec=lasting(spec, motion.duration), solution=None, found=motion))
     problem = problem_of(spec)
     try:
-        with budget(SEARCHING):
+        with budget(SEARCH_WORK):
             least = _within_sway(spec, *_within_limits(spec, problem, progress), progress)
     except OutOfWork as error:
         spend(0.0)
@@ -97,7 +101,7 @@ def short_enough(spec: Spec, shortest_found: Plan) -> Plan:
     InfeasibleProblem
     """
     most, duration = spec.move.bounds.most, shortest_found.motion.duration
-    if most is None or duration <= most * (1.0 + ROUNDING):
+    if most is None or duration <= most * (1.0 + DURATION_ROUNDING):
         return shortest_found
     raise InfeasibleProblem(
         Phrase(
@@ -115,7 +119,7 @@ def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Pr
     _require_short(choice.usual_duration(problem))
     swayed = transient_sway.limited(problem) or bool(problem.targets and problem.ranges)
     least = choice.minimum_time(
-        problem, progress, search=ROUGHLY if transient_sway.limited(problem) else SHORTEST
+        problem, progress, search=ROUGHLY if transient_sway.limited(problem) else SHORTEST_WITHIN
     )
     with suppress(OutOfWork), budget(SPREADING * left()):
         for _ in range(SPREADS):
@@ -125,7 +129,9 @@ def _within_limits(spec: Spec, problem: Problem, progress: Progress) -> tuple[Pr
             margin = problem.overshoot_margin
             if solution.optimum is not None:
                 margin = transient_sway.overshoot_margin(problem, optimal_profile(solution))
-            swayed = abs(more - problem.sway_spread) > NEARLY * more or margin > problem.overshoot_margin
+            swayed = (
+                abs(more - problem.sway_spread) > NEARLY_SUPPOSED * more or margin > problem.overshoot_margin
+            )
             problem = attrs.evolve(problem, sway_spread=more, overshoot_margin=margin)
             least = choice.minimum_time(problem, progress, least)
     if least is None:
@@ -181,7 +187,7 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
         shorter = _drafted(spec, finer)
         if shorter.excess_sway <= 0.0:
             first, shortest_kept = shorter, finer
-    most, start = LONGEST * shortest_kept.duration, first.spec.move.duration
+    most, start = LONGEST_CALMER * shortest_kept.duration, first.spec.move.duration
     # an axis without limits may fling a load about
     near = shortest_kept if first.excess_sway < math.inf else None
     rough, exact = {start: first}, dict[float, Plan]()
@@ -201,9 +207,11 @@ def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress:
     def rounded(duration: float) -> float:
         return max(start, in_cycles(spec, duration))
 
-    guess = least(roughly, start, COARSE, most, rounded) if problem.worst_case is None else None
+    guess = least(roughly, start, COARSE_DURATION, most, rounded) if problem.worst_case is None else None
     slope = slope_of({duration: draft.excess_sway for duration, draft in rough.items()}) or 0.0
-    search = attrs.evolve(EXACT, slope=slope) if slope > EXACT.believed[0] else EXACT
+    search = (
+        attrs.evolve(EXACT_DURATION, slope=slope) if slope > EXACT_DURATION.believed[0] else EXACT_DURATION
+    )
     try:
         duration = least(exactly, guess or start, search, most, rounded)
     except OutOfWork:
@@ -226,4 +234,4 @@ def _drafted(spec: Spec, relaxed: Relaxed) -> Plan:
 
 def _slow(spec: Spec, problem: Problem) -> Spec:
     """Give a spec so much time that it is not the time that it lacks, as far as a move may last so long."""
-    return lasting(spec, min(rounded_up(SLOW * choice.usual_duration(problem)), LONGEST_MOVE))
+    return lasting(spec, min(rounded_up(TIME_ENOUGH * choice.usual_duration(problem)), LONGEST_MOVE))

@@ -28,7 +28,7 @@ from gen_profile.support.errors import CosimulationError, InfeasibleProblem, Spe
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
-COARSE = Search(precision=math.log(1.05), close=0.0, stride=math.log(1.07))
+COARSE_VALUE = Search(precision=math.log(1.05), close=0.0, stride=math.log(1.07))
 AMPLE = math.log(1.3)  # step beyond a value that takes too much work: a smooth motion may do
 NEAR = 1.05  # times the duration, from which on it is worth telling how long a move would take
 IN_VAIN = Phrase(
@@ -68,7 +68,7 @@ class SuggestionOptions:
         s of work, in which a motion without limits is found, or is not worth the while.
     """
 
-    search: Search = COARSE
+    search: Search = COARSE_VALUE
     first: float = 1.03
     most: float = 8.0
     most_later: float = 64.0

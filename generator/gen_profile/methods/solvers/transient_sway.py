@@ -32,7 +32,7 @@ NEARLY_ACCEPTED = 1.008  # likewise where solving again takes long
 # looked at, and the worst machine's sway falls by at least a tenth as much as the nominal one's
 SPREAD = Search(precision=1e-3, aim=-2e-3, believed=(0.1, 10.0), tries=5)
 OVERSHOOT_ROUNDS = 4  # to find by how much less the nominal machine's load may pass its target
-ACCURACY = 1e-6  # of the machines' integration, relative
+SWAY_ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001  # over the motion: n periods of a harmonic are met to (π n / 1000)² / 2
 
 
@@ -133,7 +133,7 @@ def overshoot_margin(problem: Problem, motion: Profile) -> float:
 def overshoots(problem: Problem, motion: Profile) -> tuple[float, float]:
     """Find how far the end load passes its targets in a motion in m: nominal, and on the worst machine."""
     machines = machines_of(problem)
-    found = greatest_overshoot(problem, motion, machines, accuracy=ACCURACY, samples=SAMPLES)
+    found = greatest_overshoot(problem, motion, machines, accuracy=SWAY_ACCURACY, samples=SAMPLES)
     return float(found[0]), float(found.max())
 
 
@@ -193,6 +193,6 @@ def sways(problem: Problem, motion: Profile) -> tuple[float, float]:
     """Find the greatest sway of the end load during a motion in m: nominal, and of the worst machine."""
     machines = machines_of(problem)
     greatest = greatest_sway(
-        problem.plant, motion, machines, problem.initial, accuracy=ACCURACY, samples=SAMPLES
+        problem.plant, motion, machines, problem.initial, accuracy=SWAY_ACCURACY, samples=SAMPLES
     )
     return float(greatest[0]), float(greatest.max())

@@ -17,8 +17,8 @@ from gen_profile.motion.profile import Array
 from gen_profile.support.interrupts import interrupts_collected
 from gen_profile.support.work import spend
 
-TOLERANCE = 1e-10  # of gap and feasibility, relative; 1e-8 changes costs by up to 9e-8
-MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
+PROGRAM_TOLERANCE = 1e-10  # of gap and feasibility, relative; 1e-8 changes costs by up to 9e-8
+PROGRAM_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
 PROGRAM, POSING = 4e-3, 8e-7  # s of work for a program, and for each entry of its constraints
 ITERATION = 6e-8  # s of work for each entry, in each iteration
 
@@ -208,9 +208,9 @@ class ConicProgram:
         """
         settings = clarabel.DefaultSettings()
         settings.verbose = False
-        settings.max_iter = MAX_ITERATIONS
+        settings.max_iter = PROGRAM_ITERATIONS
         settings.max_threads = 1  # the same bits whatever the machine
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = PROGRAM_TOLERANCE
         # refinement takes a third of the time, mostly without effect; equations alone need no more than it
         settings.iterative_refinement_enable = {kind for kind, _ in self._cones} == {"ZeroConeT"}
         settings.presolve_enable = False  # which would forbid to take over its structure
@@ -256,7 +256,9 @@ class ConicProgram:
             workspace.posed = posed
         calls = count()  # for Clarabel can circle without counting its iterations
         with interrupts_collected() as came:
-            posed.solver.set_termination_callback(lambda _: bool(came) or next(calls) > 2 * MAX_ITERATIONS)
+            posed.solver.set_termination_callback(
+                lambda _: bool(came) or next(calls) > 2 * PROGRAM_ITERATIONS
+            )
             solution = posed.solver.solve()
         spend(ITERATION * (len(matrix.values) + len(quadratic.values)) * solution.iterations)
         return solution

@@ -33,23 +33,23 @@ from gen_profile.support.work import OutOfWork, budget, left, spend
 
 # of the effort without limits: ever less sway would take ever more of it
 PRICES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
-ROUGH = 0.5  # step to which the motion without limits is found, at which programs begin
-TOLERANCE = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
-KEPT = 2e-4  # by how much it must fall short of it in the shortest motion; ten times that costs 0.2 %
+ROUGH_START = 0.5  # step to which the motion without limits is found, at which programs begin
+WIDENING_TOLERANCE = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
+SHORT_OF_LIMITS = 2e-4  # by how much it must fall short of it in the shortest motion; ten times costs 0.2 %
 RESTS = 0.985  # fraction of a load's limit, for the worst machine after the move; 0.95 to 0.999 give the same
 NEARBY = math.log(1.2)  # to a duration's logarithm, from where a motion is a start for the next one
-SEARCHING = 0.6  # fraction of the work that is left, to find the shortest duration
-REFINING = 0.3  # likewise, to find a shorter one on bisected intervals
+EVEN_SHARE = 0.6  # fraction of the work that is left, to find the shortest duration
+BISECTED_SHARE = 0.3  # likewise, to find a shorter one on bisected intervals
 WORTH_REFINING = 1e-3  # of the duration, by which it must fall for another round
 FINEST = 1.0 / 320.0  # of the duration: intervals that are no longer are not bisected
 TINY = 1e-6  # below which how little of the limits is taken does not matter
 
 # what limits take falls with the duration's power of 1 to 4: accelerations with 2, more or less
-LEAST = Search(
+LEAST_WIDENING = Search(
     precision=0.02, close=0.04, aim=-0.015, slope=1.8, believed=(1.0, 4.0), stride=math.log(2.0), tries=20
 )
-ROUGHLY = attrs.evolve(LEAST, downward=True)
-SHORTEST = attrs.evolve(ROUGHLY, precision=3e-4, close=6e-4, aim=-3e-4)
+ROUGHLY = attrs.evolve(LEAST_WIDENING, downward=True)
+SHORTEST_WITHIN = attrs.evolve(ROUGHLY, precision=3e-4, close=6e-4, aim=-3e-4)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -132,7 +132,7 @@ class Relaxation:
                 return alike, near
         rest = setup.transcription.rest()
         free = attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec()))
-        return setup, sequence(rest, Goal(setup=free, sway_limit=None), ROUGH)
+        return setup, sequence(rest, Goal(setup=free, sway_limit=None), ROUGH_START)
 
     def _least(self, widened: tuple[str, ...]) -> Relaxed | None:
         """Find how many times as wide limits must be, where those not widened stay as they are.
@@ -204,14 +204,14 @@ def least_duration(relaxation: Relaxation) -> float | None:
         relaxed = lasting.least(places)
         if relaxed is not None:
             settled.append(duration)
-            return math.log(max(relaxed.wider, TINY)) - TOLERANCE
+            return math.log(max(relaxed.wider, TINY)) - WIDENING_TOLERANCE
         unsettled.append(duration)
         return -math.inf if unsettled[0] < duration > max(settled) else math.inf
 
     if not places:
         return problem.duration
-    with budget(SEARCHING * left()):
-        duration = least(excess, problem.duration, LEAST)
+    with budget(EVEN_SHARE * left()):
+        duration = least(excess, problem.duration, LEAST_WIDENING)
     return unsettled[0] if duration in unsettled else duration
 
 
@@ -220,7 +220,7 @@ def shortest(
     guess: float | Relaxed,
     tried: Sequence[Mapping[str, float]] = (),
     progress: Progress = no_progress,
-    search: Search = SHORTEST,
+    search: Search = SHORTEST_WITHIN,
 ) -> Relaxed | None:
     """Find the shortest motion that keeps all limits.
 
@@ -250,9 +250,9 @@ def shortest(
         if last is None:
             return math.inf
         by_duration[duration] = last
-        return math.log(max(last.wider, TINY)) - math.log(1.0 - KEPT)
+        return math.log(max(last.wider, TINY)) - math.log(1.0 - SHORT_OF_LIMITS)
 
-    with budget(SEARCHING * left()):
+    with budget(EVEN_SHARE * left()):
         duration = least(excess, start, search)
     return None if duration is None else by_duration[duration]
 
@@ -272,7 +272,7 @@ def refined(problem: Problem, relaxed: Relaxed, progress: Progress = no_progress
     if problem.worst_case is not None or problem.effort == "snap" or problem.limits.sway is not None:
         return relaxed
     longer = math.inf
-    with suppress(OutOfWork), budget(REFINING * left()):
+    with suppress(OutOfWork), budget(BISECTED_SHARE * left()):
         while (
             relaxed.duration < (1.0 - WORTH_REFINING) * longer and (finer := relaxed.bisected()) is not None
         ):

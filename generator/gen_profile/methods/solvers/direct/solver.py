@@ -39,22 +39,22 @@ from gen_profile.support.one_thread import one_thread
 from gen_profile.support.work import OutOfWork, afford, left
 
 METHOD = "direct"
-COARSE = 1e-2  # step after which a motion on even intervals will do to be measured
+COARSE_STEP = 1e-2  # step after which a motion on even intervals will do to be measured
 # step after which a mesh is refined: what programs on coarse ones end at need not be exact, but programs on
 # finer ones, which take longer, shall settle from there
-ROUGH = 0.1
+ROUGH_STEP = 0.1
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
 # solved exactly; they cost their square, and ten times or a tenth of them give the same motions
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
 BELIEVED = 0.03  # least quotient of steps that is taken for how they go on to shrink
-SLOW = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
+SLOW_STEPS = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
 BISECTING = 0.6  # fraction of the work that is left, after which a motion on the first mesh will do
 # likewise, for one that is not quite of least cost on the last mesh, and for one that is on the first
 NEXT_TO_IT, SETTLING = 0.4, 0.9
 WORTHWHILE = 1e-3  # relative change of the worst case worth another program; 1e-4 changes costs by 4e-7
 LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
-FAR = 1e-2  # likewise of how far that is from 1
+FAR_FROM_ONE = 1e-2  # likewise of how far that is from 1
 TINY = 1e-6  # below which how little it is does not matter
 UNWEIGHTED = SwayCost(beta=0.0, gamma=1.0)
 
@@ -148,7 +148,7 @@ class Goal:
                 before = float(solutions[-2].x[-1])
             noticed = WORTHWHILE * max(abs(last), LEAST_FRACTION)
             if self.widened:
-                noticed = max(CHANGE * abs(last), FAR * abs(last - 1.0), TINY)
+                noticed = max(CHANGE * abs(last), FAR_FROM_ONE * abs(last - 1.0), TINY)
             return self.setup.options.step_tolerance * abs(last - before) / noticed
         columns = slice(0, start.local.size)
         moved = solutions[-2].x[columns] if len(solutions) > 1 else start.local.ravel()
@@ -228,7 +228,7 @@ def solve(
         if problem.limits.stated() and not coarse:
             result = refined(start, goal)
         else:
-            result = sequence(start, goal, COARSE if coarse else None)
+            result = sequence(start, goal, COARSE_STEP if coarse else None)
         setup, start, iterations = result.setup, result.iterate, iterations + result.iterations
         return conclude(result, iterations)
 
@@ -320,7 +320,7 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     solutions: tuple[ConicSolution, ...] = ()
     cost = float("inf")
     for _ in range(goal.setup.options.max_bisections):
-        result = sequence(start, goal, ROUGH)
+        result = sequence(start, goal, ROUGH_STEP)
         solutions += result.solutions
         if result.verdict is not ConicStatus.SOLVED:
             break
@@ -365,12 +365,12 @@ def sequence(start: Iterate, goal: Goal, tolerance: float | None = None) -> Prog
         iterate = transcription.iterate(solutions[-1].x, maps)
         images.append(iterate.flat())
         off = step
-        if goal.effort_price is None and not goal.setup.tried and step < SLOW * before < math.inf:
+        if goal.effort_price is None and not goal.setup.tried and step < SLOW_STEPS * before < math.inf:
             off *= max(step / before, BELIEVED)  # as steps go on to shrink
         if off < tolerance or _stalled(step, before, exact=solutions[-1].exact):
             verdict = ConicStatus.SOLVED
         else:
-            if step > SLOW * before:
+            if step > SLOW_STEPS * before:
                 iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
             iterate = goal.approach(iterate.of_flat(points[-1]), iterate)
     return ProgramSequence(goal=goal, verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)

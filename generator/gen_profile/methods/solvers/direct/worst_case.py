@@ -24,8 +24,8 @@ from gen_profile.methods.solvers.direct.relaxation import Relaxed, shortest
 from gen_profile.methods.solvers.direct.set_up import USUAL as PROGRAMS
 from gen_profile.methods.solvers.direct.set_up import DirectOptions, Setup, set_up
 from gen_profile.methods.solvers.direct.solver import (
-    COARSE,
-    ROUGH,
+    COARSE_STEP,
+    ROUGH_STEP,
     Goal,
     ProgramSequence,
     conclude,
@@ -44,8 +44,8 @@ from gen_profile.support.work import OutOfWork, budget, left, spend
 
 # where programs for the least worst case fail; a better one takes ever more effort
 BISECTION = Search(precision=0.35, close=0.0, stride=math.log(1.5), growth=1.0, downward=True)
-BISECTING = 0.6  # fraction of the work that is left for it
-HOPELESS = 1e3  # times a load's limit, above which the least worst case is not looked for
+CASE_BISECTING = 0.6  # fraction of the work that is left for it
+HOPELESS_CASE = 1e3  # times a load's limit, above which the least worst case is not looked for
 EXCHANGING = 0.8  # fraction of the work that is left, after which the last motion is taken
 
 
@@ -176,7 +176,7 @@ def _rounds(problem: Problem, options: RangeOptions) -> Iterator[Solution]:
     """
     worst_case, problem = _taken_apart(problem)
     sway_cost, iterations = resolve_sway_cost(problem)
-    tried, bound, result, precision = ends(problem, worst_case), 0.0, None, COARSE
+    tried, bound, result, precision = ends(problem, worst_case), 0.0, None, COARSE_STEP
     swaying = problem.nominal_sway
     for _ in range(options.rounds):
         setup, _ = set_up(problem, tried, options.direct)
@@ -211,7 +211,7 @@ def _rounds(problem: Problem, options: RangeOptions) -> Iterator[Solution]:
         worse = worse_machines(problem, worst_case, optimal_profile(solution), upper, options)
         asked, swaying = swaying, to_be_asked(problem, solution, swaying)
         if not worse and asked == swaying:
-            if precision < COARSE:
+            if precision < COARSE_STEP:
                 return
             precision = setup.options.step_tolerance
         tried = [*tried, *worse]
@@ -231,11 +231,11 @@ def _bisected(start: Iterate, goal: Goal) -> float | None:
     """Find about the least worst fraction that motions of least cost keep to, whose programs do not fail."""
 
     def excess(worst: float) -> float:
-        result = sequence(start, attrs.evolve(goal, worst=worst), ROUGH)
+        result = sequence(start, attrs.evolve(goal, worst=worst), ROUGH_STEP)
         return -math.inf if result.verdict is ConicStatus.SOLVED else math.inf
 
-    with budget(BISECTING * left()):
-        return least(excess, 1.0, BISECTION, HOPELESS)
+    with budget(CASE_BISECTING * left()):
+        return least(excess, 1.0, BISECTION, HOPELESS_CASE)
 
 
 def _begun(setup: Setup, result: ProgramSequence | None) -> Iterate:

@@ -6,9 +6,9 @@ import numpy as np
 from gen_profile.dynamics.problem.cost import SwayCost
 from gen_profile.motion.profile import Array
 
-CLOSE = 0.1  # change of the logarithm of the sway's cost, which a parabola follows well
+PARABOLIC = 0.1  # change of the logarithm of the sway's cost, which a parabola follows well
 STEEP = 3.0  # growth of the same, beyond which it misleads
-MAX_ITERATIONS = 30  # of Newton's method, each within `STEEP`
+STEEP_ITERATIONS = 30  # of Newton's method, each within `STEEP`
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -69,7 +69,7 @@ def least_cost(
     gain, weights = machine.gain.reshape(-1, size), machine.weights[:, None]
     controls, outputs = np.zeros(size), moved.copy()
     stiffness = np.broadcast_to(np.eye(moved.shape[1]), (*moved.shape, moved.shape[1])).copy()
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(STEEP_ITERATIONS):
         reached = sway + outputs[:, :sways]
         pull, (slopes, stiffness[:, :sways, :sways]) = outputs.copy(), cost.derivatives(reached)
         pull[:, :sways] = slopes - before
@@ -88,7 +88,7 @@ def least_cost(
         controls += fraction * change
         outputs += fraction * step
         pull += (stiffness @ step[..., None])[..., 0]
-        if np.abs(growth).max() <= CLOSE or cost.beta == 0.0:
+        if np.abs(growth).max() <= PARABOLIC or cost.beta == 0.0:
             break
     return controls, multipliers, weights * pull
 

@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.methods.solvers.collocation import IntArray, Scheme
 from gen_profile.motion.profile import Array
 
-ROUNDING = 1e-12  # of interval lengths, relative to the whole, within which they are equal
+EQUAL_LENGTHS = 1e-12  # of interval lengths, relative to the whole, within which they are equal
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -140,7 +140,7 @@ def linear_response(A: Array, scheme: Scheme, lengths: Array) -> LinearResponse:
         When the equations of an interval are singular.
     """
     lengths = lengths[:, None, None]
-    if (A[0, 0] == A).all() and np.ptp(lengths) < ROUNDING:
+    if (A[0, 0] == A).all() and np.ptp(lengths) < EQUAL_LENGTHS:
         A = A[:1]
     count, stages, n, _ = A.shape
     inner = -np.einsum("kij,kiab->kiajb", lengths[:count] * scheme.A, A).reshape(count, stages * n, -1)

@@ -13,8 +13,8 @@ from gen_profile.methods.solvers.collocation import Trajectory
 from gen_profile.methods.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.motion.profile import Array
 
-STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
-SLOW = 0.5  # fraction of the step before that is no longer Newton's convergence
+ROUNDING_STEP = 1e-5  # step that is taken for rounding noise when it ceases to shrink
+SLOWER_THAN_NEWTON = 0.5  # fraction of the step before that is no longer Newton's convergence
 SMALLEST_DAMPING = 1.0 / 16.0  # below which the motion is not near enough for Newton's method
 
 
@@ -53,10 +53,10 @@ def solve_newton(problem: BoundaryValueProblem, guess: Trajectory) -> NewtonOutc
             return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         trial = _iterate(problem, current.trajectory.blend(current.following, damping))
         if trial is not None and _shortens(problem, current, trial, damping):
-            stalled = trial.step < STALLED and trial.step > SLOW * current.step
+            stalled = trial.step < ROUNDING_STEP and trial.step > SLOWER_THAN_NEWTON * current.step
             current, damping = trial, min(1.0, 2.0 * damping)
         else:
-            stalled, damping = current.step < STALLED, damping / 2.0
+            stalled, damping = current.step < ROUNDING_STEP, damping / 2.0
         if stalled:
             return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         if damping < SMALLEST_DAMPING:

@@ -29,9 +29,9 @@ from gen_profile.methods.solvers.indirect.newton import NewtonOutcome
 from gen_profile.motion.profile import Array
 from gen_profile.support.work import spend
 
-BELIEVED = 0.01  # least quotient of steps that is taken for the rate of convergence
-SLOW = 0.5  # fraction of the step before beyond which another method is the better one
-WORK = 1e-7  # s of work for the square of the number of controls
+BELIEVED_RATE = 0.01  # least quotient of steps that is taken for the rate of convergence
+SLOW_SIMPLIFIED = 0.5  # fraction of the step before beyond which another method is the better one
+CONTROLS_WORK = 1e-7  # s of work for the square of the number of controls
 MOST_CONTROLS = 800  # up to which to solve for all of them at once
 
 
@@ -91,12 +91,13 @@ def solve_simplified(problem: BoundaryValueProblem, start: Trajectory) -> Newton
         return NewtonOutcome(solution=None, iterations=iteration, residual=step)
     model, current = _model(problem, start, _hanging(problem, start)), _consistent(problem, start)
     for iteration in range(1, problem.options.max_iterations + 1):
-        spend(WORK * (len(start.points) * problem.system.layout.m) ** 2)
+        spend(CONTROLS_WORK * (len(start.points) * problem.system.layout.m) ** 2)
         following = _corrected(problem, model, current)
         before, step = step, problem.distance(current.trajectory, following.trajectory)
         current, shrinkage = following, step / before
-        distance = step * max(shrinkage, BELIEVED)  # to the solution, as the last steps let it be foreseen
-        if shrinkage < SLOW and distance < problem.options.tolerance:
+        # to the solution, as the last steps let it be foreseen
+        distance = step * max(shrinkage, BELIEVED_RATE)
+        if shrinkage < SLOW_SIMPLIFIED and distance < problem.options.tolerance:
             return NewtonOutcome(solution=current.trajectory, iterations=iteration, residual=step)
         if not shrinkage < 1.0:
             break
