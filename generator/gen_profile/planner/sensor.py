@@ -40,7 +40,7 @@ from gen_profile_exporters.planner.sensor_constants import (
 # not. A quicker one takes an unknown delay and a wrong rope for sway.
 QUICK, USUAL = 2.5, 1.0
 KNOWN = 0.05  # rad, of both together: the greatest uncertainty at which it is quicker
-FAST = 0.1  # how much other modes are expected to be excited, by what the sensor shows of them
+FAST = 3.0  # how much other modes may swing otherwise than is known, by what the sensor shows of them
 OFFSET_TIME = 0.35  # slow periods, in which an offset is learnt
 NOISE_TIME = 0.01  # s, for which a sensor's noise counts as the same, where cycles are shorter
 LIGHT = 0.02  # damping that modes are taken to have at least, so that one that is not shown is no obstacle
