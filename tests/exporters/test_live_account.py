@@ -283,10 +283,11 @@ def test_plans_are_weighed_committed_foreseen_and_calm_or_not(spec, account):
         shown(spec, 6.0, ahead(spec, np.zeros(4), np.r_[0, 0, 0, trial, 0, 0], 17 * [6.0], s), s)
         for s in stretches(account)
     ]
-    worst = np.max(np.ravel(due) / account.bound)
-    assert account.call(3, trial, nSlots=14, fPart=1.0)[0] == pytest.approx(worst, rel=1e-3)
+    bounds = np.reshape(account.bound, np.shape(due)).sum(axis=1)  # a machine's modes are added
+    left_on = np.sum(due, axis=1)
+    assert account.call(3, trial, nSlots=14)[0] == pytest.approx(np.max(left_on / bounds), rel=1e-3)
     account.call(4)
-    account.call(3, 0.1 * trial, nSlots=14, fPart=1.0)
+    account.call(3, 0.1 * trial, nSlots=14)
     account.call(6)
     _, left, calm, *_ = account.call(22)
     assert left == pytest.approx(np.sum(due, axis=1).max(), rel=1e-3)
@@ -295,9 +296,8 @@ def test_plans_are_weighed_committed_foreseen_and_calm_or_not(spec, account):
     assert account.call(22, bRests=1.0)[2] < calm
     # levels are what is left, where that is more
     levels = np.maximum(np.ravel(due), account.bound)
-    assert account.call(3, 2.0 * trial, nSlots=14, fPart=1.0)[0] == pytest.approx(
-        np.max(2.0 * np.ravel(due) / levels), rel=1e-3
-    )
+    most = np.max(2.0 * left_on / np.maximum(left_on, bounds))
+    assert account.call(3, 2.0 * trial, nSlots=14)[0] == pytest.approx(most, rel=1e-3)
     bounds = account.call(2, nSlots=5, nMet=2, fPart=0.5)[3]
     parts = account.call(2, nSlots=5, nMet=0, fPart=0.5)[3]
     inner = 0.9 * np.cos(np.pi / 12) * 0.5 / SLOT / 2.0
