@@ -1,52 +1,51 @@
-"""Stability margins of a written block's damping by a sensor, from its text, in the frequency domain.
+"""How wrong a sensor may be until damping no longer calms a load, by playing a written block.
 
-What the block does is linear between its least and its greatest motions. The observer leaves e of what a
-sensor shows; where that is M(s) of what was expected of the axis's own motion, e = S (M − 1) P a, with P the
-machine from acceleration to sensor and S = 1/(1 + C (s − A)⁻¹ K e^(−s age)). The law makes a = H e of it: a
-regulator from slot to slot, and the spline of its pulses. So the loop is at its limit where M Q/(1 + Q) = 1,
-Q = H S P e^(−s age), whatever the gains were made for. Gains are those of the text, the machine
-is the spec's.
+What a block does with what a sensor shows is found anew as the load goes on, so it has no frequency response.
+So it is played while the load swings, on the machine's FMU, where that swings most quickly and most slowly
+within the live ranges. Its watch over the sensor is switched off, as that would end the trial.
 """
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, Self
 
 import attrs
 import numpy as np
-from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
-from gen_profile.motion.profile import Array
-from gen_profile.planner.directions import (
-    SensedDirection,
-    linearized,
-    planned_axes,
-    sensed_directions,
-    shown_of_modes,
-)
-from gen_profile.planner.sensor import damping_kernel
+from gen_profile.planner.directions import driven_modes, linearized, planned_axes, sensed_directions
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.sensor import sensed_modes
 from gen_profile.spec.model import Spec
-from gen_profile_exporters.block_source import parse_function_block
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
-from gen_profile_exporters.planner.sensor_constants import ROWS_BEFORE, model_rows
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
+from gen_profile_fmu.running.block_run import BlockFollower, Measurement, Script
 
-POINTS = 3  # of each live range
-FREQUENCIES = np.geomspace(0.02, 9.0, 2001)  # of the slowest mode's
-
-Complex = NDArray[np.complex128]
+PERIODS = 12.0  # of the slowest swing, that are played
+SHARE = 0.4  # of the stated swing, at the beginning
+DELAYS = 0.08  # of that period: steps of a delay until one no longer calms
+GAINS = 1.5  # likewise, the ratio of gains
+MOST_DELAY, MOST_GAIN = 1.0, 12.0  # of the period; and what is tried at most
+HALVINGS = 3  # of the last step
+STEP = 0.05  # rad of the fastest swing, an integration step at most
+WATCHES = re.compile(
+    r"\b((?:cSensor(?:Scale|Frozen|Gate|Most|Noisy)|cDampMost|cMisread|cFrozen|cGate|cMost|cMostNoise|cGrown)"
+    r"\s*:\s*LREAL\s*:=)[^;]*"
+)
 
 
 @attrs.frozen(kw_only=True)
 class Margins:
-    """How wrong a sensor may be, at the worst of the live ranges, before damping excites the load.
+    """How wrong a sensor may be, at the worse of these, before damping no longer calms.
 
     Attributes
     ----------
     delay : float
         s, by which it may be later than `planner.sensor.delay` says in the middle.
     gain : float
-        How many times too much it may show; infinity where nothing excites.
+        How many times too much it may show; infinity where all that were tried calm.
     """
 
     delay: float
@@ -70,99 +69,110 @@ def sensor_margins(spec: Spec, text: str) -> Margins | None:
     -------
     Margins or None
         None where it has no sensor.
+
+    Raises
+    ------
+    ExportError, CosimulationError
+        The text, or the machine's FMU, cannot be executed.
     """
     if spec.planner.sensor is None:
         return None
-    written = {
-        variable.name: np.array([float(value) for value in variable.elements])
-        for variable in parse_function_block(text).variables
-        if variable.array and variable.initial
-    }
-    found = [
-        _margins(_loop(spec, written, point, one), float(linearized(spec, point).distinct_frequencies[0]))
-        for point in product(np.linspace(-1.0, 1.0, POINTS).tolist(), repeat=len(spec.planner.live))
-        for one in sensed_directions(spec).values()
-    ]
-    return Margins(delay=min(one.delay for one in found), gain=min(one.gain for one in found))
+    delay, gain = np.inf, np.inf
+    with SwungMachine(spec, WATCHES.sub(r"\1 1.0E+9", text)) as machine:
+        corners = sorted(product((-1.0, 1.0), repeat=len(spec.planner.live)), key=machine.period)
+        for point in dict.fromkeys((corners[0], corners[-1])):
+            delays = np.arange(0.0, MOST_DELAY, DELAYS) * machine.period(point)
+            delay = _most(partial(machine.calms, point, gain=1.0), delays.tolist(), delay)
+            gains = GAINS ** np.arange(0.0, np.log(MOST_GAIN) / np.log(GAINS))
+            gain = _most(partial(machine.calms, point, 0.0), gains.tolist(), gain)
+    return Margins(delay=float(delay), gain=float(gain))
 
 
-def _margins(open_loop: Complex, slowest: float) -> Margins:
-    """Find where a loop, closed by −1, is at its limit: crossings of the unit circle and of the real axis."""
-    frequencies = slowest * FREQUENCIES
-    size, late = np.abs(open_loop), np.mod(np.angle(-open_loop), 2.0 * np.pi) / frequencies
-    crosses = np.flatnonzero((size[1:] - 1.0) * (size[:-1] - 1.0) <= 0.0)
-    real = np.flatnonzero((open_loop.imag[1:] * open_loop.imag[:-1] <= 0.0) & (open_loop.real[1:] < 0.0))
-    gains = 1.0 / size[real]
-    return Margins(
-        delay=float(late[crosses].min(initial=np.inf)), gain=float(gains[gains >= 1.0].min(initial=np.inf))
-    )
+def _most(calms: Callable[[float], bool], steps: Sequence[float], known: float) -> float:
+    """Find up to where all calm, by these steps and then halves of the last; no more than is known."""
+    if known < np.inf and calms(known):
+        return known
+    low, high = 0.0, np.inf
+    for step in steps:
+        if step >= known or not calms(step):
+            high = step
+            break
+        low = step
+    if high == np.inf:
+        return known
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if calms(middle) else (low, middle)
+    return low
 
 
-def _loop(
-    spec: Spec, written: Mapping[str, Array], point: Sequence[float], direction: SensedDirection
-) -> Complex:
-    """Give −Q/(1 + Q) at all frequencies: the loop from the sensor to itself."""
-    sensor = spec.planner.sensor
-    assert sensor is not None
-    at, axes = linearized(spec, point), list(planned_axes(spec))
-    frequencies = at.distinct_frequencies
-    modes, slowest, rate = len(frequencies), float(frequencies[0]), int(sensor.quantity == "rate")
-    rows = _model(spec, written, point)[(ROWS_BEFORE + len(axes)) * modes :]
-    rows = rows[axes.index(direction.axis) * model_rows(modes) :]
-    push, shown = rows[:modes], rows[modes : 2 * modes]
-    gains = rows[3 * modes : 5 * modes + 1] / spec.export.cycle_time
-    s = 1j * slowest * FREQUENCIES
-    decays = at.distinct_damping_ratios * frequencies
-    moved = shown_of_modes(spec, at, direction)
-    machine, learnt = np.zeros_like(s), gains[-1] / s
-    for mode in range(modes):
-        own = s * s + 2.0 * decays[mode] * s + frequencies[mode] ** 2
-        machine += moved[mode] * s**rate / own
-        position, velocity = gains[mode], gains[modes + mode]
-        estimated = (position * (s + 2.0 * decays[mode]) + velocity) / own
-        if rate:
-            estimated = (velocity * s - position * frequencies[mode] ** 2) / own
-        learnt = learnt + shown[mode] * estimated
-    late = np.exp(-s * sensor.usual_age)
-    answer = _law(spec, written["cDampGain"], (gains[0], gains[modes]), float(push[0]), frequencies)
-    closed = answer * late * machine / (1.0 + learnt * late)
-    return np.asarray(-closed / (1.0 + closed))
+class SwungMachine:
+    """The machine of a spec, which swings and follows a block that is shown it; a context manager."""
 
+    def __init__(self, spec: Spec, text: str) -> None:
+        self._spec, self._block, self._open = spec, BlockInstance(text), ExitStack()
+        self._follower = self._open.enter_context(BlockFollower(plant_fmu(spec.machine())))
 
-def _law(spec: Spec, law: Array, gains: tuple[float, float], push: float, frequencies: Array) -> Complex:
-    """Find H, from what the observer leaves to the acceleration: mode, regulator, pulses."""
-    slowest, cycle = float(frequencies[0]), spec.export.cycle_time
-    slot = max(1, round(2.0 * np.pi / slowest / (SLOTS_PER_PERIOD * cycle))) * cycle
-    kernel = damping_kernel(frequencies)
+    def __enter__(self) -> Self:
+        return self
 
-    def pulse(s: Complex) -> Complex:
-        taps = np.exp(-np.multiply.outer(s * slot, np.arange(len(kernel)))) @ kernel
-        return np.asarray(taps * (-np.expm1(-s * slot) / (s * slot)) ** 3)
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
 
-    effect = push * slowest * slot * abs(pulse(np.array([1j * slowest], dtype=np.complex128))[0])
-    ahead = np.exp(0.5j * slowest * (len(kernel) + 2) * slot)
-    learnt = -1j * (gains[1] + 1j * slowest * gains[0]) * ahead / effect
-    turn = np.exp(1j * slowest * slot)
-    free = np.array([[turn.real, -turn.imag, 0.0], [turn.imag, turn.real, 0.0], [0.0, 0.0, 1.0]])
-    closed = free @ (np.eye(3) - np.outer([1.0, 0.0, 1.0], law))
-    swings = np.array([[0.0, -slowest], [slowest, 0.0]])
-    s = np.asarray(1j * slowest * FREQUENCIES, dtype=np.complex128)
-    each, z = s[:, None, None], np.exp(s * slot)[:, None, None]
-    grown = (z * np.eye(2) - free[:2, :2]) @ np.array([[learnt.real], [learnt.imag]])
-    comes = np.zeros((len(s), 3, 1), dtype=np.complex128)
-    comes[:, :2] = np.linalg.solve(each * np.eye(2) - swings, grown)
-    answer = -(law @ np.linalg.solve(z * np.eye(3) - closed, comes))[:, 0]
-    return np.asarray(answer * s * pulse(s))
+    def period(self, point: Sequence[float]) -> float:
+        """Give the slowest swing's in s, at a point of the live ranges, each from −1 to 1."""
+        return float(2.0 * np.pi / linearized(self._spec, point).distinct_frequencies[0])
 
+    def calms(self, point: Sequence[float], late: float, gain: float) -> bool:
+        """Tell whether the block calms a swing by sensors so many s late that show so many times too much."""
+        spec, cycle, axes = self._spec, self._spec.export.cycle_time, planned_axes(self._spec)
+        sensor, period, given = spec.planner.sensor, self.period(point), self._live(point)
+        assert sensor is not None
+        inputs = self._block.inputs | {f"f{name}": value for name, value in given.items()} | {"bEnable": 1.0}
+        names, sensed = [*inputs], [axes[number] for number in sensed_directions(spec)]
+        quantity = {"angle": "{}", "rate": "{}.rate", "sway": "sway.{}"}[sensor.quantity]
+        cycles, watch = (round(periods * period / cycle) for periods in (PERIODS, 1.0))
+        told = np.tile(
+            [gain, 0.0, round((sensor.usual_age + late) / cycle), 1.0], (cycles + 1, len(sensed), 1)
+        )
+        script = Script(
+            cycle=cycle,
+            start_cycles=[0, cycles],
+            inputs=np.array(2 * [[*inputs.values()]]),
+            actual=[names.index(axis.of("fActPosition")) for axis in axes.values()],
+            longest=0,
+            settle=0,
+            watch=0,
+            measured=Measurement(
+                quantities=[quantity.format(of) for of in sensor.names],
+                shows=[names.index(axis.of("fSensor")) for axis in sensed],
+                valid=[names.index(axis.of("bSensorValid")) for axis in sensed],
+                cycles=told,
+                pushed=np.zeros((cycles + 1, len(axes))),
+                again=cycles,
+            ),
+        )
+        values = self._starts(point, given)
+        run = self._follower.run(self._block.called(), script, values, [*axes], rows=cycles)
+        assert run.trace is not None
+        left = np.abs(run.trace[-watch:, len(self._block.outputs) :]).max(axis=0)
+        return bool((left <= [*spec.check.residual_sway.values()]).all())
 
-def _model(spec: Spec, written: Mapping[str, Array], point: Sequence[float]) -> Array:
-    """Evaluate the text's polynomials at a point of the live ranges, for all but its frequencies."""
-    lives = len(spec.planner.live)
-    exponents = written["cExponent"].astype(np.int64).reshape(max(lives, 1), -1)
-    curvatures = written["cLiveBend"].reshape(2, -1)[1]
-    values = np.ones(exponents.shape[1])
-    for live, t in enumerate(point):
-        bent = (t + curvatures[live]) / (1.0 + curvatures[live] * t)
-        powers = [chebyshev.chebval(bent, np.eye(n + 1)[n]) for n in range(exponents.max() + 1)]
-        values = values * np.array(powers)[exponents[live]]
-    return np.asarray(written["cModel"].reshape(-1, exponents.shape[1]) @ values)
+    def _live(self, point: Sequence[float]) -> dict[str, float]:
+        ranges = zip(self._spec.planner.live.items(), point, strict=True)
+        return {name: 0.5 * (low + high + x * (high - low)) for (name, (low, high)), x in ranges}
+
+    def _starts(self, point: Sequence[float], live: dict[str, float]) -> dict[str, float]:
+        """Give the FMU's start values: a share of the stated swing along each axis with a sensor."""
+        spec, machine, at = self._spec, self._spec.machine(), linearized(self._spec, point)
+        step = STEP / float(at.distinct_frequencies[-1])
+        values = dict(spec.plant.parameters) | live | {TAU: spec.actuator.tau or 0.0, MAX_STEP: step}
+        for number, axis in enumerate(machine.actuated):
+            place = float(np.mean(spec.limits.of(number).travel or 0.0))
+            values |= {f"{axis.name}.start": place, f"{axis.name}.setpoint": place}
+        swings = np.zeros(len(machine.unactuated))
+        for number, direction in sensed_directions(spec).items():
+            modes = sensed_modes(spec, point, direction)
+            swings += SHARE * modes.swing / modes.push[0] * driven_modes(at, number)[:, 0]
+        names = (coordinate.name for coordinate in machine.unactuated)
+        return values | dict(zip(names, swings.tolist(), strict=True))

@@ -115,7 +115,7 @@ def sensor_constants(
         return None
     _refuse_machine(spec)
     directions = sensed_directions(spec)
-    sensed = [_sensed(spec, point, one) for point in points for one in directions.values()]
+    sensed = [sensed_modes(spec, point, one) for point in points for one in directions.values()]
     for one in sensed:
         _refuse(spec, sensor, one)
     least, modes = int(interpolated.exponents.max(initial=0)), len(sensed[0].frequencies)
@@ -197,7 +197,7 @@ def modal_model(spec: Spec, known: Interpolant) -> Interpolant:
     direction = next(iter(sensed_directions(spec).values()))
 
     def rows(point: Sequence[float]) -> Array:
-        one = _sensed(spec, point, direction)
+        one = sensed_modes(spec, point, direction)
         squares = one.frequencies**2 - one.decays**2
         invariants = [squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares
         return np.array([*invariants, *np.diag(squares).ravel(), *one.decays, *one.push])
@@ -217,7 +217,9 @@ def estimation_error(spec: Spec) -> float:
     points, directions = between(len(spec.planner.live)), sensed_directions(spec).values()
     own = 2.0 * max(spec.limits.of(number).acceleration or 0.0 for number in planned_axes(spec))
     return max(
-        _estimation_error_at(spec, _sensed(spec, point, one), own) for point in points for one in directions
+        _estimation_error_at(spec, sensed_modes(spec, point, one), own)
+        for point in points
+        for one in directions
     )
 
 
@@ -264,7 +266,14 @@ def _disturbed(sensor: SensorSpec, disturbance: DisturbanceSpec, one: SensedMode
     return abs(float(one.shown[0])) * slowest ** int(sensor.quantity == "rate") * swing
 
 
-def _sensed(spec: Spec, point: Sequence[float], direction: SensedDirection) -> SensedModes:
+def sensed_modes(spec: Spec, point: Sequence[float], direction: SensedDirection) -> SensedModes:
+    """Find the modes along a direction at a point of the live ranges, each from −1 to 1.
+
+    Raises
+    ------
+    SpecError
+        No load that is stated to swing shows there.
+    """
     at, sensor, disturbance = linearized(spec, point), spec.planner.sensor, spec.planner.disturbance
     assert sensor is not None and disturbance is not None
     slowest, errors = float(at.distinct_frequencies[0]), float(frequency_errors(spec)[0])
@@ -381,7 +390,7 @@ def _rows(spec: Spec, directions: Mapping[int, SensedDirection], point: Sequence
     for number in planned_axes(spec):
         rows.append(np.zeros(model_rows(modes)))
         if number in directions:
-            one = _sensed(spec, point, directions[number])
+            one = sensed_modes(spec, point, directions[number])
             state, _, gain = _filter(sensor, one)
             now = spec.export.cycle_time * expm(state * sensor.usual_age) @ gain
             others = _others(spec, sensor, one)
