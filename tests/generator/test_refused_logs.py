@@ -86,3 +86,12 @@ def test_a_raw_log_of_klipper_is_a_swing(tmp_path):
     log = read_swing(tmp_path / "raw.csv", SPEC, signal="acceleration", unit="mm/s²")
     assert len(log.times) == len(times) and log.times[0] == 0.0
     np.testing.assert_allclose(log.values[:20], (ring + noise[0])[:20] / 1e3, atol=0.3)
+
+
+def test_names_that_look_like_formulas_or_markup_are_drawn_as_they_are(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a $x$ log.csv").write_text("time,$\\frac{a$,<b>&amp;\n1,2,3\n2,3,4\n5,6,x\n", "utf-8")
+    command = ("identify", "--preset", "mass-spring-chain", "--swing", "a $x$ log.csv", "--plot", "seen.svg")
+    outcome = run_here(*command)
+    assert outcome.code == 2 and "Internal error" not in outcome.err
+    assert r"$\frac{a$" in (tmp_path / "seen.svg").read_text("utf-8")

@@ -66,6 +66,8 @@ def test_columns_that_no_name_tells_are_asked_for(swing):
     assert found["log"]["columns"] == [{"name": "Uhr", "meaning": ""}, {"name": "Geber 4", "meaning": ""}]
     assert {"time", "cart_position", "hook_angle"} <= set(found["log"]["meanings"])
     assert "column" in found["unread"]["sentences"][0] and found["log"]["free"] == ["L1"]
+    drawn = {panel["title"]: panel["curves"][0]["y"] for panel in found["unread"]["panels"]}
+    assert [*drawn] == ["Uhr", "Geber 4"] and max(drawn["Geber 4"][1:]) > 3.0  # degrees
 
 
 def test_a_move_is_told_from_a_swing_and_held_against_the_plan():

@@ -120,11 +120,10 @@ def drawn(problem, uncertain, count):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
-def test_no_machine_inside_is_worse_than_those_found(monkeypatch):
+def test_no_machine_inside_is_worse_than_those_found():
     """After one round, a grid along each range and 64 machines within them miss a tenth of the worst sway."""
-    monkeypatch.setattr(worst_case, "ROUNDS", 1)
     problem = ranged(uncertain={"L1": 0.4, "L2": 0.4}, duration=4.5)
-    motion = optimal_profile(choice.attempt(problem))
+    motion = optimal_profile(worst_case.solve(problem, worst_case.RangeOptions(rounds=1)))
     found = worst_case.worse_machines(problem, problem.worst_case, motion, 0.0)
     inside = drawn(problem, problem.worst_case.uncertain, 500)
     shares = worst_case.residual_fractions(problem, problem.worst_case, motion, [*found, *inside])

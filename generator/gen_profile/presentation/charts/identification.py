@@ -17,7 +17,7 @@ LOGGED, FOUND = Style(colour=PALETTE[1], dash="points"), Style(colour=PALETTE[0]
 LEFT, CHANCE = Style(colour=PALETTE[1], width=1.0), Style(colour=INK, dash="dash", width=1.0)
 GAP = 10.0  # times as long as samples are apart: over it no curve is drawn
 BELOW = 1.5  # decades that are shown below what chance does
-MOST_ROWS, MOST_COLUMNS = 2000, 8  # of a table that was refused
+MOST_ROWS, MOST_COLUMNS, LONGEST_NAME = 2000, 8, 60  # of a table that was refused, and characters
 
 
 def log_figure(log: SwingLog) -> Figure:
@@ -40,7 +40,7 @@ def table_figure(table: LogTable) -> Figure:
     for place in range(max(len(table.rows[row]) for row in rows)):
         values = np.array([table.seconds(row, place) for row in rows])
         if np.isfinite(values).any():
-            name: str = table.cell(head, place) if table.is_head(head) else ""
+            name: str = table.cell(head, place)[:LONGEST_NAME] if table.is_head(head) else ""
             name = name or Phrase("column {number}", number=place + 1)
             row = Line("logged", np.array(rows) + 1.0, values, LOGGED)
             panels.append(Panel(name, "as it stands there", [row], x_label="row"))

@@ -18,7 +18,7 @@ from gen_profile.plants.drawing import Drawing, Shape
 from gen_profile.plants.looks import body_size, drawings, pose_of
 from gen_profile.plants.plant import Plant
 from gen_profile.presentation.charts.figure import FRAME, INK, PALETTE
-from gen_profile.presentation.charts.picture import write
+from gen_profile.presentation.charts.picture import plain, write
 
 SWING = 0.35  # rad (or m) of every swinging coordinate
 TURN = 0.6  # rad of an axis that turns
@@ -137,8 +137,8 @@ def draw_machine(plant: Plant, parameters: Mapping[str, float], path: Path, titl
     for axis, view in zip(sides, sides_shown, strict=True):
         _draw(axis, view)
     table.axis("off")
-    table.text(0.0, 1.0, _explained(plant, parameters), va="top", fontsize="small", family="monospace")
-    canvas.suptitle(fill(title, round(10 * sum(widths))))
+    table.text(0.0, 1.0, plain(_explained(plant, parameters)), va="top", fontsize="small", family="monospace")
+    canvas.suptitle(fill(plain(title), round(10 * sum(widths))))
     write(canvas, path, plant.type)
 
 

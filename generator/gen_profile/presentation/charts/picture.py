@@ -79,8 +79,13 @@ def drawn(figures: Sequence[parts.Figure], title: str) -> Any:
     subfigures = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
     for number, (part, figure, width) in enumerate(zip(subfigures, figures, widths, strict=True)):
         _draw(part, figure, width, 1 if number else columns)
-    picture.suptitle(title)
+    picture.suptitle(plain(title))
     return picture
+
+
+def plain(text: str) -> str:
+    """Keep Matplotlib from reading as a formula what stands between two dollars."""
+    return str(text).replace("$", r"\$")
 
 
 def _draw(part: Any, figure: parts.Figure, width: float, columns: int) -> None:
@@ -97,13 +102,13 @@ def _draw(part: Any, figure: parts.Figure, width: float, columns: int) -> None:
                 _bars(axes[name], panel)
             case parts.Map():
                 _map(part, axes[name], panel)
-        axes[name].set_title(panel.title, fontsize="medium")
+        axes[name].set_title(plain(panel.title), fontsize="medium")
     handles: Mapping[str, Any] = {
         label: handle
         for axis in axes.values()
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
-    caption = fill(figure.caption, round(LETTERS * width))
+    caption = plain(fill(figure.caption, round(LETTERS * width)))
     if len(handles) < 2:
         part.supxlabel(caption, fontsize="small")
         return
@@ -127,9 +132,9 @@ def _curves(axis: Any, panel: parts.Panel) -> None:
     for line in shown:
         if line.style.fill:
             look = {"alpha": line.style.fill, "linewidth": 0.0, "zorder": 1}
-            axis.fill(line.x, line.y, label=line.name, color=line.style.colour, **look)
+            axis.fill(line.x, line.y, label=plain(line.name), color=line.style.colour, **look)
         else:
-            axis.plot(line.x, line.y, label=line.name, **_ink(line.style))
+            axis.plot(line.x, line.y, label=plain(line.name), **_ink(line.style))
     for band in panel.bands:
         if band.high > band.low:
             axis.axvspan(band.low, band.high, color=parts.FRAME, alpha=0.2, linewidth=0.0, zorder=0)
@@ -137,7 +142,7 @@ def _curves(axis: Any, panel: parts.Panel) -> None:
             axis.axvline(band.low, color=parts.FRAME, linewidth=0.9, linestyle=":", zorder=1)
     for level in panel.levels:
         _level(axis, level)
-    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    axis.set(xlabel=plain(panel.x_label), ylabel=plain(panel.y_label))
     if panel.even:
         axis.set_aspect("equal")
     else:
@@ -165,7 +170,7 @@ def _bars(axis: Any, panel: parts.Bars) -> None:
         "edgecolor": parts.PAPER,
         "hatch": [HATCHES[style.dash] for style in panel.styles],
     }
-    axis.barh(list(panel.names), panel.values, **look, linewidth=0.0)
+    axis.barh([*map(plain, panel.names)], panel.values, **look, linewidth=0.0)
     for place, (value, text) in enumerate(zip(panel.values, panel.texts, strict=True)):
         arrow = "" if value <= panel.end else "▸ "
         axis.text(min(value, panel.end), place, f" {arrow}{text}", va="center", fontsize="small")
@@ -190,7 +195,7 @@ def _map(part: Any, axis: Any, panel: parts.Map) -> None:
         for colour, dash in ((parts.PAPER, "-"), (parts.INK, ":")):
             corners = ([-width, width, width, -width, -width], [-height, -height, height, height, -height])
             axis.plot(*corners, color=colour, linestyle=dash, linewidth=1.2)
-    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    axis.set(xlabel=plain(panel.x_label), ylabel=plain(panel.y_label))
     part.colorbar(coloured, ax=axis, label=panel.unit, ticks=AutoLocator())  # else at ends of shades
 
 

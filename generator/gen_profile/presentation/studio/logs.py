@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,7 @@ from gen_profile.dynamics.evaluation.motion_evaluation import sketch
 from gen_profile.methods.solvers.plan import draft
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.presentation.charts.figure import Figure
-from gen_profile.presentation.charts.identification import identification_figure
+from gen_profile.presentation.charts.identification import identification_figure, table_figure
 from gen_profile.presentation.report.log import MeasuredLog, column_meanings, parse_log
 from gen_profile.presentation.report.measured import compare_measured
 from gen_profile.presentation.report.measured_section import measured_section, measured_verdict
@@ -24,7 +25,7 @@ from gen_profile.presentation.studio.workers import Part
 from gen_profile.spec.model import Spec
 from gen_profile.studies.identification.estimation import CONFIDENCE
 from gen_profile.studies.identification.identify import Identification, identify
-from gen_profile.studies.identification.log_table import decoded
+from gen_profile.studies.identification.log_table import decoded, read_table
 from gen_profile.studies.identification.measurements import SwingLog, cut_swing
 from gen_profile.support.errors import GenProfileError, InfeasibleProblem, OutputError
 from gen_profile.support.work import OutOfWork
@@ -35,6 +36,7 @@ MOVED = 0.3  # of the planned way, from which on a log is one of a move
 
 def log(asked: LogQuestion) -> Iterator[Part]:
     """Read a log, say how, and what follows from it."""
+    text = ""
     try:
         spec = asked.question.spec()
         text = decoded(asked.content, asked.name)
@@ -45,16 +47,24 @@ def log(asked: LogQuestion) -> Iterator[Part]:
             read = parse_log(text, asked.name, spec, asked.columns)
         except OutputError as error:
             yield _reading(asked, spec, columns, asked.use or "swing")
-            yield {"part": "unread", "sentences": error.sentences}
+            yield _unread(error.sentences, text, asked.name)
             return
         use = asked.use or ("move" if _is_move(spec, read) else "swing")
         yield _reading(asked, spec, columns, use)
         places = _places(asked.columns, columns)
         yield _move(asked, spec, read) if use == "move" else _swing(asked, spec, read, places)
     except OutOfWork:
-        yield {"part": "unread", "sentences": [Status.GIVEN_UP.value]}
+        yield _unread([Status.GIVEN_UP.value], text, asked.name)
     except GenProfileError as error:
-        yield {"part": "unread", "sentences": error.sentences}
+        yield _unread(error.sentences, text, asked.name)
+
+
+def _unread(sentences: Sequence[str], text: str, source: str) -> Part:
+    """Say why nothing follows from a log, and draw its columns, which show a wrong one or a wrong unit."""
+    panels: list[dict[str, Any]] = []
+    with suppress(OutputError):  # of what is no table
+        panels = curves_json(table_figure(read_table(text, source)))
+    return {"part": "unread", "sentences": [*sentences], "panels": panels}
 
 
 def _is_move(spec: Spec, read: MeasuredLog) -> bool:

@@ -180,7 +180,7 @@ const logs = (() => {
     },
     unread(part) {
       tell(...sentences(part.sentences, "bad"));
-      curves.draw($("logged"), [], page.drawing());
+      curves.draw($("logged"), part.panels ?? [], page.drawing({ alone: true }));
     },
   };
   parts.failure = parts.unread;
