@@ -2,7 +2,8 @@
 
 from gen_profile.planner.design import planner_constants
 from gen_profile_exporters.planner.blocks.followed import motion
-from gen_profile_exporters.planner.blocks.texts import Sizes, operations, planner
+from gen_profile_exporters.planner.blocks.sizes import Sizes, operations
+from gen_profile_exporters.planner.blocks.texts import planner
 
 ISSUED = {
     "fPosition": "LREAL", "fVelocity": "LREAL", "fAcceleration": "LREAL", "bMoving": "BOOL", "bLeads": "BOOL",

@@ -8,7 +8,7 @@ from played_planner import played_text
 
 from gen_profile.planner.design import planner_constants
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.texts import operations
+from gen_profile_exporters.planner.blocks.sizes import operations
 
 CYCLE, ALLOWED = 0.004, 0.05  # s, m
 

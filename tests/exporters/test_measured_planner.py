@@ -11,7 +11,7 @@ from gen_profile.planner.design import planner_constants
 from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.planner.blocks.followed import motion
 from gen_profile_exporters.planner.blocks.measured import observer
-from gen_profile_exporters.planner.blocks.texts import operations
+from gen_profile_exporters.planner.blocks.sizes import operations
 
 pytestmark = pytest.mark.slow
 LIVE = "planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}"

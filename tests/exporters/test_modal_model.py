@@ -9,7 +9,8 @@ from gen_profile.planner.design import planner_constants
 from gen_profile.planner.directions import driven_modes, linearized
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.followed import ENDS, LEFT_OUT, account_texts, between, terms
+from gen_profile_exporters.planner.blocks.followed import account_texts
+from gen_profile_exporters.planner.blocks.sizes import ENDS, LEFT_OUT, between, terms
 
 MACHINES = {"flexible-joint": [*JOINT, "plant.c=0.04"], "slosh-tank": TANK}
 CALLED = """FUNCTION_BLOCK Called

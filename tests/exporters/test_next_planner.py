@@ -8,7 +8,7 @@ from played_planner import played_text
 from gen_profile.planner.design import planner_constants
 from gen_profile.planner.machine import frequencies, left_by_errors, live_modes
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.texts import operations
+from gen_profile_exporters.planner.blocks.sizes import operations
 
 PAPER = (
     "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",

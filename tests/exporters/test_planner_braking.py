@@ -7,7 +7,7 @@ from test_whole_block import whole_text
 
 from gen_profile.planner.design import planner_constants
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.texts import operations
+from gen_profile_exporters.planner.blocks.sizes import operations
 
 pytestmark = pytest.mark.slow
 SPEC = preset_spec("bay-crane", ["planner.zones=true"])

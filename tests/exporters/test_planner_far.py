@@ -158,8 +158,9 @@ def test_the_time_to_go_counts_how_fast_pulses_may_become():
     assert (np.abs(out["fTimeToGo"][begun:done] - left) < 0.25 * left + 1.0).all()
 
 
-def test_a_stick_from_rest_is_planned_for_after_half_a_slot(text):
+def test_a_stick_from_rest_is_planned_for_after_half_a_slot():
     """A whole slot was waited for, a twentieth of the slowest period: it took 3.9 s."""
+    text = planner_block(parse_spec(BAY.replace(", operations = 3000", ""))).text
     driver = Driver(text, fActPosition=10.0).hold(4.0, bVelocity=1).hold(3.6, fVelocityCommand=0.22)
     assert driver.outputs["fVelocity"][-1] > 0.9 * 0.22
 

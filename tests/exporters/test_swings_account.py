@@ -9,7 +9,8 @@ from gen_profile.planner.design import planner_constants
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.machine import frequencies, left_by_errors, live_modes
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.texts import Sizes, planner
+from gen_profile_exporters.planner.blocks.sizes import Sizes
+from gen_profile_exporters.planner.blocks.texts import planner
 
 SLOTS = 64  # of the longest programme
 SIZES = Sizes(watched=(-1.0, -0.5, 0.5, 1.0))

@@ -1,6 +1,7 @@
 """The whole block of the folder of blocks: its forms, and what it takes and gives."""
 
 import ctypes
+import re
 import subprocess
 
 import attrs
@@ -10,6 +11,7 @@ from counted_block import CountedBlock, compile_counting
 from driven_block import BAY
 from generator.planned_machines import GANTRY
 from system_parts import program
+from test_planner_far import STACKER
 from test_planner_forms import Exported
 
 from gen_profile.planner.design import planner_block, planner_constants
@@ -19,7 +21,7 @@ from gen_profile.planner.interface import block_axes, live_inputs
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile.support.errors import SpecError
 from gen_profile_exporters.block_source import parse_function_block
-from gen_profile_exporters.planner.blocks.texts import operations
+from gen_profile_exporters.planner.blocks.sizes import operations
 from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
@@ -172,17 +174,61 @@ QUICK = [
 
 @pytest.mark.parametrize(
     ("preset", "changes"),
-    [("paper", QUICK), ("bay-crane", ["planner.live_rate={L1=0.25}", "export.cycle_time=0.001"])],
-    ids=["quick", "followed"],
+    [
+        ("mass-spring-chain", QUICK[:1]),
+        ("bay-crane", ["planner.live_rate={L1=0.25}", "export.cycle_time=0.001"]),
+    ],
+    ids=["three modes", "followed"],
 )
-def test_fewer_operations_than_a_machine_needs_are_refused_and_the_least_are_the_default(preset, changes):
-    least = operations(planner_constants(preset_spec(preset, changes))[1])
+def test_fewer_operations_than_a_machine_needs_are_refused(preset, changes):
+    with pytest.raises(SpecError, match="operations: at least") as refused:
+        whole_text(preset_spec(preset, [*changes, "planner.operations=3000"]))
+    least = int(re.search(r"at least (\d+)", str(refused.value))[1])
     with pytest.raises(SpecError, match=f"operations: at least {least} for this machine, found {least - 1}"):
         whole_text(preset_spec(preset, [*changes, f"planner.operations={least - 1}"]))
     stated = preset_spec(preset, [*changes, f"planner.operations={least}"])
     assert f"cOperations : DINT := {least};" in whole_text(stated)
     more = preset_spec(preset, [*changes, f"planner.operations={least + 500}"])
     assert operations(planner_constants(more)[1]) == least + 500
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("preset", "changes", "number"),
+    [
+        # between 4,500 and 6,500 it planned without end: more machines were watched than it could weigh
+        *[("bay-crane", [], number) for number in (3000, 4000, 5000, 6000, 7000)],
+        ("mass-spring-chain", QUICK[:1], 3192),
+        ("paper", QUICK, 3000),
+        ("bay-crane", ["planner.live_rate={L1=0.25}"], 5600),
+    ],
+)
+def test_an_axis_moves_with_as_many_operations_as_may_be_stated(preset, changes, number):
+    require_moves(preset_spec(preset, [*changes, f"planner.operations={number}"]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mass", [300.0, 1000.0, 1500.0])
+def test_a_drive_that_is_very_slow_beside_the_swing_begins(mass):
+    """No decline was found from the speed of the longest ramp, and no ramp to less was tried."""
+    damped = [
+        "plant.c1=300.0",
+        "plant.c2=150.0",
+        "robustness.uncertain={m2=0.1}",
+        "check.residual_sway=0.005",
+    ]
+    require_moves(parse_spec(STACKER, damped), fm2=mass)
+
+
+def require_moves(spec, **given):
+    (low, high), top, cycle = spec.limits.travel, spec.limits.velocity, spec.export.cycle_time
+    block = CountedBlock(compile_counting(whole_text(spec)), fActPosition=0.5 * (low + high), **given)
+    block.hold(round(2.0 / cycle))
+    block.hold(2, bVelocity=1.0)
+    assert block.hold(round(12.0 / cycle), fVelocityCommand=0.9 * top)["fVelocity"].max() > 0.2 * top
+    out = block.hold(round(60.0 / cycle), bVelocity=0.0, bExecute=1.0, fTarget=0.3 * low + 0.7 * high)
+    assert out["bDone"][-1] and out["fPosition"][-1] == 0.3 * low + 0.7 * high
+    assert out["operations"].max() <= operations(planner_constants(spec)[1])
 
 
 def test_an_axis_whose_stick_is_at_zero_rests_as_after_a_stop_while_the_other_one_is_led():

@@ -4,14 +4,12 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
-from gen_profile.support.errors import SpecError
-from gen_profile.support.phrase import Phrase, placed
 from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE
+from gen_profile_exporters.planner.blocks.sizes import Sizes, longest, model_work, operations
 from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
 
@@ -34,42 +32,10 @@ COSINES = [
     0.0,
     *reversed(QUARTER[1:]),
 ]
-LONGEST, FEWEST = (
-    64,
-    40,
-)  # slots of the longest programme, where there are operations for it, and where there are few
-SLOT_WORK = 8_000  # operations of a slot of the longest programme: eight iterations
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.15  # times that, on any machine that is watched
 LITTLE = 30  # slots in which little is left of what was measured, until it is no more damped
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
-MACHINES = 16  # that are watched, where there are operations for them:
-SWING_WORK, OTHER_WORK = 90, 2_500  # of each swing where a slot begins, and of all else
-QUICK = 2.0  # s; machines whose slowest mode is quicker need more operations in a cycle,
-QUICK_WORK = 600_000  # for so many in a slot
-FOLLOWING_WORK = 2_800  # operations of a cycle for each mode and axis of a machine that is followed, at least
-COPYING = 22, 1_800  # operations for each slot of the longest programme, and more, where a motion was found
-
-
-@attrs.frozen(kw_only=True)
-class Sizes:
-    """What the blocks of a planner are made for.
-
-    Attributes
-    ----------
-    watched : tuple of float
-        Machines that are watched: shares of the stated errors.
-        None for as many as there are operations for.
-    """
-
-    watched: tuple[float, ...] | None = None
-
-    def of(self, constants: PlannerConstants) -> tuple[float, ...]:
-        """Give the machines that are watched."""
-        if self.watched is not None:
-            return self.watched
-        room = (operations(constants) // len(constants.axes) - OTHER_WORK) // (SWING_WORK * constants.modes)
-        return tuple(np.linspace(-1.0, 1.0, max(2, min(MACHINES, room - 1))).tolist())
 
 
 def linear_programme(name: str, *, slots: int, rows: int) -> str:
@@ -108,34 +74,6 @@ def linear_programme(name: str, *, slots: int, rows: int) -> str:
     )
 
 
-def operations(constants: PlannerConstants) -> int:
-    """Give what a cycle may spend; by default no less than quick machines and followed ones need.
-
-    Raises
-    ------
-    SpecError
-        Less is stated than this machine needs.
-    """
-    period = min(constants.periods)
-    cycles = int(period / (SLOTS_PER_PERIOD * constants.cycle))
-    follows = constants.rates or constants.sensor
-    least = FOLLOWING_WORK * constants.modes * len(constants.axes) if follows else 0
-    least = max(least, QUICK_WORK // cycles if period < QUICK else 0)
-    if constants.states_operations and constants.operations < least:
-        template = "at least {least} for this machine, found {found}"
-        problem = Phrase(template, least=least, found=constants.operations)
-        raise SpecError(placed("planner.operations", problem))
-    return max(constants.operations, least)
-
-
-def longest(constants: PlannerConstants) -> int:
-    """Give the slots of the longest programme."""
-    cycles = int(min(constants.periods) / (SLOTS_PER_PERIOD * constants.cycle))
-    each, more = COPYING
-    most = min(LONGEST, (operations(constants) - more) // each)
-    return max(FEWEST, min(most, operations(constants) * cycles // SLOT_WORK))
-
-
 def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = None) -> str:
     """Write a planner of one axis, behind the blocks that it has within it.
 
@@ -170,7 +108,7 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "polygon": literal(float(np.cos(np.pi / SIDES))),
         "bounds": initialiser([literal(float(v)) for v in _share(constants) * _shares(constants)]),
         "most": literal(BETWEEN * _stop_share(constants) * _share(constants)),
-        "model_work": 80 + constants.model.shape[1] * (2 * len(constants.model) + 4) + 4 * lengths["power"],
+        "model_work": model_work(constants),
         "modes_constants": constant_lines(_of_modes(constants, watched)),
         "damping_constants": constant_lines(_damping(constants)),
         "planner_constants": constant_lines(_of_motion(constants, swings, len(shown), slots, plan)),

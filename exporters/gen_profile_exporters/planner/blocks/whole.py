@@ -15,20 +15,13 @@ from gen_profile_exporters.planner.block import (
 )
 from gen_profile_exporters.planner.blocks import followed
 from gen_profile_exporters.planner.blocks.measured import observer
-from gen_profile_exporters.planner.blocks.texts import (
-    FOLDER,
-    Sizes,
-    constant_lines,
-    filled,
-    operations,
-    planner,
-)
+from gen_profile_exporters.planner.blocks.sizes import Sizes, operations, shell_work
+from gen_profile_exporters.planner.blocks.texts import FOLDER, constant_lines, filled, planner
 from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import block_name
 
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command
-SHELL_WORK, ZONES_WORK = 200, 150  # operations of every cycle: of an axis, and where it has zones;
-BRAKE_WORK = 350  # and where it has to brake in time
+BRAKE_WORK = 350  # operations of a cycle in which an axis has to brake in time
 EACH = re.compile(r"(?ms)^ *@each_axis\n(.*?)^ *@end_axis\n")
 TOLERANCE = ("is not the cycle time of this block", "is not within 0.1 % of the cycle time of this block")
 
@@ -108,7 +101,7 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
         "cLives": len(c.live),
         "cCycle": c.cycle,
         "cOperations": operations(c),
-        "cShellWork": len(c.axes) * (SHELL_WORK + (ZONES_WORK if c.zones else 0)) + 15 * len(c.live),
+        "cShellWork": shell_work(c),
         "cBrakeWork": BRAKE_WORK,
         "cHoldCycles": round(HOLD / c.cycle),
         "cGivesUpCycles": round(GIVES_UP * max(c.periods) / c.cycle),
