@@ -1,4 +1,4 @@
-"""The planner of the folder of blocks, within one that is called as today's planner block is."""
+"""The motion of the planner block, within one that is called as the whole one is."""
 
 from gen_profile.planner.design import planner_constants
 from gen_profile_exporters.planner.blocks.followed import motion
@@ -16,7 +16,7 @@ ISSUED = {
 
 
 def played_text(spec, sizes=None):
-    """The planner's blocks, and one that takes commands by the names that today's block has."""
+    """The planner's blocks, and one that takes commands by the names that the whole block has."""
     _, constants = planner_constants(spec)
     sizes = sizes or Sizes()
     (axis,) = constants.axes

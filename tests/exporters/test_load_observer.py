@@ -1,4 +1,4 @@
-"""The observer of a measured load, beside today's block on a nonlinear crane."""
+"""The observer of a measured load, by itself and within the whole block, on a nonlinear crane."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ END_FUNCTION_BLOCK
 
 @pytest.fixture(scope="module", params=["angle", "rate"])
 def observed(request):
-    """Today's block, and the observer's."""
+    """The whole block, and the observer's."""
     spec = preset_spec("bay-crane", [LIVE, SENSOR % request.param, GUSTS])
     return request.param, compile_counting(planner_block(spec).text), text(spec)
 

@@ -25,7 +25,7 @@ OUTPUTS = {
 
 
 def measured_text(constants):
-    """Observer and planner, with inputs by the names that today's block has."""
+    """Observer and planner, with inputs by the names that the whole block has."""
     outputs = "\n".join(f"{name} : {type_};" for name, type_ in OUTPUTS.items())
     given = "\n".join(f"{name} := planner.{name};" for name in OUTPUTS)
     return f"""{observer(constants, constants.sensor)}
@@ -112,7 +112,6 @@ def test_a_swing_that_nobody_computed_is_damped(spec, compiled, rope, delay, pha
 
 @pytest.mark.parametrize("seconds", [2.0, 5.0])
 def test_the_axis_rests_soon_after_a_gust(compiled, seconds):
-    """Today's block needs 8.4 s."""
     blown = crane(compiled)
     run = {"noise": 0.002, "offset": 0.005, "random": np.random.default_rng(4)}
     blown.run(8.0, **run)

@@ -36,7 +36,7 @@ FOLLOWING = ["planner.live_rate={L1=0.25}", "check.residual_sway=0.05"]  # the b
 
 
 @pytest.fixture(scope="module")
-def text(written):
+def text():
     return planner_block(parse_spec(BAY)).text
 
 
@@ -140,7 +140,7 @@ def test_a_new_target_is_reached_sooner_than_by_a_stop(changes, start, target, s
 
 
 @pytest.fixture(scope="module")
-def counted(written):
+def counted():
     return compile_counting(planner_block(parse_spec(BAY, ["export.cycle_time=0.001", *FOLLOWING])).text)
 
 

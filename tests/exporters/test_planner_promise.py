@@ -14,12 +14,12 @@ M1, L2 = 350.0, 1.5
 
 
 @pytest.fixture(scope="module")
-def text(written):
+def text():
     return planner_block(preset_spec("bay-crane")).text
 
 
 @pytest.fixture(scope="module")
-def quiet(written):
+def quiet():
     return planner_block(preset_spec("bay-crane", ["planner.sway_share=0"])).text
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
 from exporters.measured_machines import MeasuredCrane, MeasuredGantry, MeasuredJoint, MeasuredTank
-from test_whole_block import whole_text
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.sensor import damping_kernel, damping_room
@@ -29,15 +28,13 @@ def spec():
     return preset_spec("bay-crane", MEASURED)
 
 
-@pytest.fixture(scope="module", params=["block", "blocks"])
-def written(request):
-    """Spec to text: today's block, or the whole text of the blocks within a block."""
-    return whole_text if request.param == "blocks" else lambda spec: planner_block(spec).text
-
-
 @pytest.fixture(scope="module")
-def compiled(spec, written):
-    return compile_counting(written(spec))
+def compiled(spec):
+    return compile_counting(text_of(spec))
+
+
+def text_of(spec):
+    return planner_block(spec).text
 
 
 def crane(compiled, rope=6.0, *, rope_given=None, **machine):
@@ -235,8 +232,8 @@ def test_a_sensor_that_fails_before_it_showed_anything_withdraws_the_promise(com
     assert not swung.run(0.1, bLoadAtRest=1.0)["nPromise"][-1]  # who knows may say so
 
 
-def test_a_value_that_stays_the_same_may_hide_a_gust(written):
-    compiled = compile_counting(written(preset_spec("bay-crane", [LIVE, SENSOR, GUSTS])))
+def test_a_value_that_stays_the_same_may_hide_a_gust():
+    compiled = compile_counting(text_of(preset_spec("bay-crane", [LIVE, SENSOR, GUSTS])))
     swung, sound = crane(compiled), {"noise": 0.002, "random": np.random.default_rng(4)}
     assert swung.run(10.0, **sound)["nPromise"][-1] == 6.0  # nothing has moved yet
     assert swung.run(0.1, **sound, bLoadAtRest=1.0)["bPromise"][-1]
@@ -280,11 +277,9 @@ def test_a_sensor_that_misreads_the_axis_s_own_motion_is_noticed_within_it(compi
     assert again["nSensorFault"][-1] in SOUND and again["bSensorUsed"][-1] and again["bPromise"][-1]
 
 
-def test_a_rate_sensor_of_the_wrong_sign_is_noticed_on_a_long_rope_as_soon_as_on_a_short_one(
-    written,
-):
+def test_a_rate_sensor_of_the_wrong_sign_is_noticed_on_a_long_rope_as_soon_as_on_a_short_one():
     rate = SENSOR.replace('"angle"', '"rate"').replace("offset=0.005", "offset=0.02")
-    compiled = compile_counting(written(preset_spec("bay-crane", [LIVE, rate, GUSTS])))
+    compiled = compile_counting(text_of(preset_spec("bay-crane", [LIVE, rate, GUSTS])))
     swung = crane(compiled, 9.0, swing=(0.45, 3.0))
     swung.shows = lambda: swung.state[2]
     sound = {"noise": 0.002, "offset": 0.02, "random": np.random.default_rng(0)}
@@ -372,8 +367,8 @@ TANK = [
 ]
 
 
-def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault(written):
-    text = written(preset_spec("flexible-joint", JOINT))
+def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault():
+    text = text_of(preset_spec("flexible-joint", JOINT))
     compiled = compile_counting(text)
     random, sound = np.random.default_rng(0), {"noise": 0.0002, "offset": -0.001, "delay": 0.002}
     arm = MeasuredJoint(CountedBlock(compiled), inertia=0.003368, swing=(0.03, -0.864))
@@ -387,8 +382,8 @@ def test_an_arm_is_damped_by_an_encoder_and_what_swings_at_first_is_no_fault(wri
     assert np.abs(issued["sway"][-500:]).max() < 0.005
 
 
-def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes(written):
-    compiled = compile_counting(written(preset_spec("slosh-tank", TANK)))
+def test_a_liquid_is_damped_by_a_level_probe_that_shows_two_modes():
+    compiled = compile_counting(text_of(preset_spec("slosh-tank", TANK)))
     random = np.random.default_rng(0)
     tank = MeasuredTank(CountedBlock(compiled), fill=0.26, swing=(0.02, 1.0))
     tank.run(1.0, noise=0.0002, delay=0.005, random=random, fTarget=1.0, bExecute=1.0)
@@ -413,8 +408,8 @@ GANTRY = [
 ]
 
 
-def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails(written):
-    compiled = compile_counting(written(preset_spec("gantry-crane", GANTRY)))
+def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails():
+    compiled = compile_counting(text_of(preset_spec("gantry-crane", GANTRY)))
     gantry, random = MeasuredGantry(CountedBlock(compiled), 3.0, swing=(0.45, -0.3), cycle=0.02), np.random
     gantry.inputs |= {"bEnable": 1.0, "fActPosition_x": 20.0, "fActPosition_y": 10.0}
 

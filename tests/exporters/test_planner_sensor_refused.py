@@ -34,7 +34,10 @@ def test_what_a_sensor_cannot_show_is_refused_in_a_sentence(name):
 
 
 REFUSED = {
-    "live": (["planner.live={L1=[3.0, 9.0], m2=[0.0, 2000.0]}"], "1.4 times the frequency of the slowest"),
+    "live": (
+        ["planner.live={L1=[3.0, 9.0], m2=[0.0, 2000.0]}"],
+        "planner.live: over these ranges what the sensor shows",
+    ),
     "of": (['planner.sensor.of="theta3"'], "planner.sensor.of: no coordinate that swings"),
     "noise": (["planner.sensor.noise=0.02"], "planner.sensor.noise: .* take a better sensor"),
     "delay": (["planner.sensor.delay=[0.0, 0.5]"], "planner.sensor.delay: at most 0.45 s, known to 0.32 s"),

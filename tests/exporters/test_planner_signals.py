@@ -212,7 +212,7 @@ class Signals:
 
 
 @pytest.fixture(scope="module")
-def text(written):
+def text():
     return planner_block(parse_spec(BAY)).text
 
 

@@ -100,9 +100,7 @@ def test_a_converter_s_unfiltered_measurements_move_no_axis_that_stands(seed):
 @pytest.mark.slow
 def test_the_proof_takes_over_with_noise_and_refuses_a_block_that_runs_away_then():
     wrong, count = re.subn(
-        r"(aAcceleration\[0\]) := 0\.0;(\s+aPosition\[0\] := aActual\[0\];)",
-        r"\1 := 0.5 * aAccelerationBefore[0];\2",
-        TEXTS["followed"],
+        r"(fVelocity := fSpeed;\s+fAcceleration := )0\.0;", r"\1 100.0 * fSpeed;", TEXTS["followed"]
     )
     assert count == 1
     histories = Histories.of(SPEC)

@@ -35,12 +35,12 @@ SPEEDING = 3.0  # s, after which an axis is fast
 
 
 @pytest.fixture(scope="module")
-def bay(written):
+def bay():
     return parse_function_block(planner_block(parse_spec(BAY)).text)
 
 
 @pytest.fixture(scope="module")
-def gantry(written):
+def gantry():
     return parse_function_block(planner_block(parse_spec(GANTRY)).text)
 
 

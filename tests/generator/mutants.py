@@ -6,8 +6,7 @@ change the block of one of the machines at least; `--seed` draws others.
 
 Others are slower: commands of one kind are carried out later than by the sound block on average. Either is
 noticed. Some are as good: axes move otherwise, without a fault and as quickly. The rest change nothing in the
-first quarter of a machine's histories, after which no more are tried. ``equivalent_mutants.toml`` lists those
-that a proof cannot kill, with the reason why; they are counted apart. Blocks are compiled by ``cc -Og``, if
+first quarter of a machine's histories, after which no more are tried. Blocks are compiled by ``cc -Og``, if
 there is one.
 """
 
@@ -20,7 +19,6 @@ import re
 import shutil
 import sys
 import tempfile
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -46,7 +44,8 @@ from gen_profile.planner import design, execution
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile.support.errors import GenProfileError
-from gen_profile_exporters.planner import block
+from gen_profile_exporters.planner.blocks import texts, whole
+from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.playback.structured_text import literal
 from gen_profile_fmu.building import compiler
 from gen_profile_fmu.building.compiler import Compiler
@@ -66,8 +65,6 @@ CONSTANT = re.compile(r"(?m)^\s*(c\w+) : (ARRAY \[[^]]*\] OF )?LREAL := \[?([^;\
 FACTORS = (0.5, 0.8, 1.25, 2.0)
 FIRST = 2  # numbers of an array: in later ones of a polynomial little is to be seen
 ROUNDING, BEYOND = 1e-5, 1e6  # numbers that are as good half as great again: of rounding, and beyond all
-UNKNOWN = {"interface", "costs"}  # declarations; what a step may cost, which other tests count
-LISTED = Path(__file__).with_name("equivalent_mutants.toml")
 
 
 @attrs.frozen(kw_only=True, order=True)
@@ -85,8 +82,6 @@ class Mutant:
     now : str
         What stands there in place of what stood there.
     before : str
-    place : int
-        Which one it is, from 1, of the changes of its line in this way.
     """
 
     way: str
@@ -94,13 +89,6 @@ class Mutant:
     line: int
     now: str
     before: str
-    place: int = attrs.field(default=1, eq=False)
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What names it: its part, the line before, and the way with its place, or a constant's factor."""
-        change = self.now if self.way == "constant" else f"{self.way} {self.place}"
-        return self.part, self.before.strip(), change
 
     def __str__(self) -> str:
         return f"{self.way:10} {self.part}:{self.line + 1}: {self.before.strip()}  ->  {self.now.strip()}"
@@ -108,13 +96,10 @@ class Mutant:
 
 def mutants(text: str) -> Iterator[Mutant]:
     """Give all that there are of a block with this text (of which only constants matter)."""
-    for path in sorted(block.TEXT.rglob("*.st")):
-        if path.stem not in UNKNOWN:
-            for number, line in enumerate(_code(path.read_text("ascii"))):
-                ways = Counter[str]()
-                for way, now in _changed(line):
-                    ways[way] += 1
-                    yield Mutant(way=way, part=path.stem, line=number, now=now, before=line, place=ways[way])
+    for path in sorted(texts.FOLDER.glob("*.st")):
+        for number, line in enumerate(_code(path.read_text("ascii"))):
+            for way, now in _changed(line):
+                yield Mutant(way=way, part=path.stem, line=number, now=now, before=line)
     for name, _, values in CONSTANT.findall(text):
         for place, value in enumerate(values.split(",")[:FIRST]):
             if float(value):
@@ -129,7 +114,7 @@ def _code(text: str) -> list[str]:
 
 
 def _changed(line: str) -> Iterator[tuple[str, str]]:
-    if "nCost" in line or "nWork" in line:
+    if "nSpent" in line or "nOperations" in line or "nWork" in line:
         return  # what a cycle may cost, which another test counts
     for found in COMPARED.finditer(line):
         yield "comparison", f"{line[: found.start(1)]}{OPPOSITE[found[1]]}{line[found.end(1) :]}"
@@ -142,7 +127,7 @@ def _changed(line: str) -> Iterator[tuple[str, str]]:
     if found := ASSIGNED.fullmatch(line):
         before, name, value, after = found.groups()
         yield "dropped", f"{before}{name} := {name};{after}"
-        if name[0] in "fa" and name != "aShapeSlots" and "LREAL" not in value and value != "0.0":
+        if name[0] in "fa" and "LREAL" not in value and value != "0.0":
             yield "sign", f"{before}{name} := 0.0 - ({value});{after}"
             yield "halved", f"{before}{name} := 0.5 * ({value});{after}"
     for sign, other in ((" + ", " - "), (" - ", " + ")):
@@ -161,7 +146,7 @@ class Machine:
 
     name: str
     spec: Spec
-    constants: block.PlannerConstants
+    constants: PlannerConstants
     text: str
     histories: Histories
     drawn: Sequence[History]
@@ -171,15 +156,6 @@ class Machine:
 
 def machine(name: str, spec: Spec, count: int) -> Machine:
     """Draw a machine's histories."""
-    captured = list[block.PlannerConstants]()
-    text_of, design.block_text = (
-        design.block_text,
-        lambda constants: captured.append(constants) or text_of(constants),
-    )
-    try:
-        text = design.planner_block(spec).text
-    finally:
-        design.block_text = text_of
     histories = Histories.of(spec)
     numbered = numbering(histories, count, seed=5)
     drawn = [(numbered.group(number), numbered.history(number)) for number in range(count)]
@@ -190,8 +166,8 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
     return Machine(
         name=name,
         spec=spec,
-        constants=captured[0],
-        text=text,
+        constants=design.planner_constants(spec)[1],
+        text=design.planner_block(spec).text,
         histories=histories,
         drawn=drawn,
         groups=groups,
@@ -230,21 +206,17 @@ def kinds_of(spec: Spec, one: JudgedHistory) -> set[str]:
 def _parts(mutant: Mutant) -> Iterator[None]:
     """Let the block be written of altered parts."""
     with tempfile.TemporaryDirectory() as folder:
-        altered = Path(folder) / "text"
-        shutil.copytree(block.TEXT, altered)
-        path, sound = next(altered.rglob(f"{mutant.part}.st")), block.TEXT
+        altered, sound = Path(folder) / "blocks", texts.FOLDER
+        shutil.copytree(sound, altered)
+        path = altered / f"{mutant.part}.st"
         lines = path.read_text("ascii").split("\n")
         lines[mutant.line] = mutant.now
         path.write_text("\n".join(lines), "ascii")
-        block.TEXT = altered
-        block._part.cache_clear()
-        block._parts.cache_clear()
+        texts.FOLDER = whole.FOLDER = altered
         try:
             yield
         finally:
-            block.TEXT = sound
-            block._part.cache_clear()
-            block._parts.cache_clear()
+            texts.FOLDER = whole.FOLDER = sound
 
 
 def mutated(machine: Machine, mutant: Mutant) -> str:
@@ -252,7 +224,7 @@ def mutated(machine: Machine, mutant: Mutant) -> str:
     if mutant.way == "constant":
         return altered(machine.text, mutant)
     with _parts(mutant):
-        return block.block_text(machine.constants)
+        return whole.whole_block(machine.constants)
 
 
 def altered(text: str, mutant: Mutant) -> str:
@@ -269,18 +241,6 @@ def altered(text: str, mutant: Mutant) -> str:
     return CONSTANT.sub(changed, text)
 
 
-def listed() -> dict[tuple[str, str, str], str]:
-    """Read why some mutants are equivalent, by their keys."""
-    return {
-        (part, before, change): reason["why"]
-        for reason in tomllib.loads(LISTED.read_text("utf-8"))["reason"]
-        for part, lines in reason.items()
-        if part != "why"
-        for before, changes in lines.items()
-        for change in changes
-    }
-
-
 def changes(one: Machine, mutant: Mutant) -> bool:
     """Whether a mutant is in a machine's block."""
     alone = len(one.constants.axes) == 1 and mutant.way == "axes"
@@ -288,17 +248,17 @@ def changes(one: Machine, mutant: Mutant) -> bool:
 
 
 def chosen(machines: list[Machine], count: int, seed: str) -> Iterator[Mutant]:
-    """Choose mutants, each way as often, until as many are not listed; a list that grows moves no other."""
+    """Choose mutants, each way as often."""
     by_way: dict[str, list[tuple[str, Mutant]]] = {}
     for mutant in {mutant for one in machines for mutant in mutants(one.text)}:
         rank = sha256(f"{seed} {mutant}".encode()).hexdigest()
         by_way.setdefault(mutant.way, []).append((rank, mutant))
-    known, unlisted = listed(), 0
+    found = 0
     for turn in chain.from_iterable(zip_longest(*(sorted(by_way[way]) for way in sorted(by_way)))):
         if turn and any(changes(one, turn[1]) for one in machines):
             yield turn[1]
-            unlisted += turn[1].key not in known
-            if unlisted == count:
+            found += 1
+            if found == count:
                 return
 
 
@@ -373,14 +333,13 @@ MACHINES: Mapping[str, Spec] = {  # between them, they have every part of the te
         HOIST,
         [
             *(CYCLE, "planner.live={hoist=[0.0, 4.0]}", "robustness.uncertain={L0=0.02}"),
-            "planner.operations=3000",  # pulses are weighed in several cycles
             *("limits.velocity=2.0", "limits.acceleration=0.2", "limits.travel=[0.0, 60.0]"),
         ],
     ),
     "wide": parse_spec(
         GANTRY,
         [
-            *(CYCLE, "planner.operations=6000", "planner.zones=true", "planner.sway_share=0.0"),
+            *(CYCLE, "planner.zones=true", "planner.sway_share=0.0"),
             "limits.axis.x={velocity=1.5, acceleration=0.12, jerk=1.0, travel=[0.0, 40.0]}",
             "limits.axis.y={velocity=1.0, acceleration=0.1, jerk=1.0, travel=[0.0, 20.0]}",
         ],
@@ -446,7 +405,7 @@ def tried(numbered: tuple[int, Mutant]) -> tuple[int, Mutant, str, str, float]:
 def main() -> None:
     """Run them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100, help="mutants that are not listed")
+    parser.add_argument("--count", type=int, default=100, help="mutants")
     parser.add_argument("--seed", default="mutants")
     parser.add_argument("--histories", type=int, default=192, help="of each machine")
     parser.add_argument("--machines", nargs="*", choices=MACHINES, help="just these")
@@ -471,26 +430,23 @@ def main() -> None:
 
 def report(arguments: argparse.Namespace) -> None:
     """Try mutants side by side, and print what became of each, and of all."""
-    known, tally, survivors, ways = listed(), Counter[str](), list[str](), Counter[str]()
+    tally, survivors, ways = Counter[str](), list[str](), Counter[str]()
     those = list(enumerate(chosen(_shared, arguments.count, arguments.seed)))
-    asked = [one for one in those if arguments.only is None or one[0] in arguments.only]
-    drawn = [one for one in asked if one[1].key not in known]
-    tally["listed"] = len(asked) - len(drawn)
+    drawn = [one for one in those if arguments.only is None or one[0] in arguments.only]
     with get_context("fork").Pool(arguments.workers) as pool:
         for number, mutant, what, how, took in pool.imap_unordered(tried, drawn):
             tally[what] += 1
             if what == "killed":
                 ways[how.partition(": ")[2].partition(";")[0]] += 1
             elif what not in NOTICED:
-                survivors.append(f"{what}: {number}: {mutant} ({mutant.key[2]}: {how})")
+                survivors.append(f"{what}: {number}: {mutant} ({how})")
             print(f"{number}: {mutant}\n    {what}: {how} ({took:.1f} s)", flush=True)
     noticed = sum(tally[what] for what in NOTICED)
     print(f"by judge: {dict(ways.most_common())}")
     print("not noticed:", *sorted(survivors), sep="\n  ")
     print(
-        f"{noticed} of {len(drawn)} that are not listed as equivalent are noticed: {tally['killed']} killed, "
-        f"{tally['slower']} slower; {tally['as good']} are as good, {tally['unchanged']} change nothing; "
-        f"{tally['listed']} more are listed."
+        f"{noticed} of {len(drawn)} are noticed: {tally['killed']} killed, {tally['slower']} slower; "
+        f"{tally['as good']} are as good, {tally['unchanged']} change nothing."
     )
 
 

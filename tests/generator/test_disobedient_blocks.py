@@ -73,7 +73,8 @@ def disobedient(text):
 
 def around(text, wrong, variables=""):
     """A block around which each of some ways to do wrong, before and after it, is chosen by a number."""
-    head, _, body = text.rpartition("END_VAR\n")
+    at = text.rindex("\nFUNCTION_BLOCK ")  # others are within it
+    head, _, body = text[at:].rpartition("END_VAR\n")
     before, after = (
         "\n".join(f"IF fWrong = {k}.0 THEN {one} END_IF;" for k, one in enumerate(parts, start=1) if one)
         for parts in zip(*wrong, strict=True)
@@ -85,7 +86,8 @@ def around(text, wrong, variables=""):
         before, body = (re.sub(rf"\b{name}\b", f"{name}Own", part) for part in (before, body))
     body = body.replace("END_FUNCTION_BLOCK", f"{after}\nEND_FUNCTION_BLOCK")
     head = head.replace("\nVAR_INPUT\n", "\nVAR_INPUT\n    fWrong : LREAL;\n", 1)
-    return head.replace("\nVAR\n", f"\nVAR\n    {declared}\n", 1) + f"END_VAR\n{copied}{before}\n{body}"
+    head = head.replace("\nVAR\n", f"\nVAR\n    {declared}\n", 1)
+    return f"{text[:at]}{head}END_VAR\n{copied}{before}\n{body}"
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,8 @@
-"""The list of mutants that the proof of the planner block need not kill, and changed constants."""
+"""Mutants of the planner block: changed constants."""
 
-from generator.mutants import altered, listed, mutants
+from generator.mutants import altered, mutants
 
 CONSTANTS = "\tcRoom : LREAL := 0.5; (* m *)\n\tcGain : ARRAY [0..2] OF LREAL := [1.0, 2.0, 3.0];\n"
-
-
-def test_mutants_that_are_listed_as_equivalent_are_those_of_the_text():
-    assert {key for key in listed() if key[1]} <= {mutant.key for mutant in mutants("")}
-    assert all(len(why) > 20 for why in listed().values())
 
 
 def test_each_constant_of_a_block_is_changed_by_each_factor():

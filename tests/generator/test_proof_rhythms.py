@@ -6,7 +6,6 @@ import pytest
 from generator.planned_machines import BAY
 
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
-from gen_profile.assurance.proof.habits import Change
 from gen_profile.assurance.proof.histories import SHIFT, Histories
 from gen_profile.assurance.proof.numbering import DRAWS, LONG, RHYTHMS, SEARCH, Numbering
 from gen_profile.planner.design import planner_block
@@ -75,16 +74,14 @@ def thrown_over(spec):
 
 @pytest.mark.slow
 def test_a_block_that_forgets_what_was_left_is_found_by_a_rhythm(spec, thrown_over):
-    """It forgets where an input is 1, so that one block is compiled."""
     histories, history = thrown_over
-    text, knows = planner_block(spec).text, "nForgotten := 0;"
-    assert knows in text
-    text = text.replace(knows, f"{knows} IF fForgets = 1.0 THEN nForgotten := cModes; END_IF;")
-    text = text.replace("\nVAR_INPUT\n", "\nVAR_INPUT\n    fForgets : LREAL;\n", 1)
-    forgets = Change(time=0.0, lasts=np.inf, inputs={"fForgets": 1.0})
-    forgetful = attrs.evolve(history, changes=(forgets, *history.changes))
-    with ClosedLoop(spec, text, histories) as loop:
-        sound, found = (loop.watched(one, loop.known(one)) for one in (history, forgetful))
+    text, keeps = planner_block(spec).text, "aFade[nSwing] * aPastRe[nSwing] + aUnitRe[nSwing] * fTaken"
+    assert text.count(keeps) == 1
+    found = []
+    for written in (text, text.replace(keeps, f"0.7 * {keeps}")):
+        with ClosedLoop(spec, written, histories) as loop:
+            found.append(loop.watched(history, loop.known(history)))
+    sound, forgetful = found
     assert sound.faults == ()
     assert 0.01 < sound.left < 0.05
-    assert any("fSwayLeft states" in fault for fault in found.faults)
+    assert any("fSwayLeft states" in fault for fault in forgetful.faults)

@@ -1,6 +1,6 @@
 """What a planner block declares of its axes, and tells of them in its header."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import attrs
 
@@ -8,30 +8,15 @@ from gen_profile_exporters.playback.structured_text import literal
 
 ZONES = 8  # intervals of each kind that an axis may have
 PLACE = "fActPosition"
-TAKEN = {  # inputs of each axis, by the arrays that hold them
-    "aTarget": "fTarget",
-    "aCommand": "fVelocityCommand",
-    "aLimit": "fVelocityLimit",
-    "aActual": PLACE,
-    "aActualVelocity": "fActVelocity",
-    "aFollowing": "fFollowingLimit",
-}
-GIVEN = {  # and outputs
-    "aPosition": "fPosition",
-    "aVelocity": "fVelocity",
-    "aAcceleration": "fAcceleration",
-    "aDistanceToGo": "fDistanceToGo",
-    "aStopDistance": "fStopDistance",
-    "aStopLow": "fStopLow",
-    "aStopHigh": "fStopHigh",
-}
-
-ZONE_INPUTS = {  # of each axis, by the arrays that hold them: what is declared of them
-    "aClosedLow": ("aBlockedLow", ", where blocked intervals begin"),
-    "aClosedHigh": ("aBlockedHigh", ", where they end"),
-    "aLimitedLow": ("aSlowLow", ", where slow intervals begin"),
-    "aLimitedHigh": ("aSlowHigh", ", where they end"),
-    "aLimited": ("aSlowLimit", "/s, greatest velocity there"),
+# inputs and outputs of each axis
+TAKEN = ("fTarget", "fVelocityCommand", "fVelocityLimit", PLACE, "fActVelocity", "fFollowingLimit")
+GIVEN = ("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance", "fStopLow", "fStopHigh")
+ZONE_INPUTS = {  # of each axis, and what is declared of them
+    "aBlockedLow": ", where blocked intervals begin",
+    "aBlockedHigh": ", where they end",
+    "aSlowLow": ", where slow intervals begin",
+    "aSlowHigh": ", where they end",
+    "aSlowLimit": "/s, greatest velocity there",
 }
 
 
@@ -100,7 +85,7 @@ def axis_words(axes: Sequence[AxisConstants]) -> dict[str, str]:
 
 
 def axis_interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
-    """Declare what each axis takes and gives, and carry it to and from the arrays."""
+    """Declare what each axis takes and gives."""
 
     def declared(name: str, comment: str) -> str:
         return "\n".join(
@@ -109,11 +94,10 @@ def axis_interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
             for a in axes
         )
 
-    taken = [
-        f"{array}[{k}] := {name}{a.suffix};" for k, a in enumerate(axes) for array, name in TAKEN.items()
-    ]
-    given = [
-        f"{name}{a.suffix} := {array}[{k}];" for k, a in enumerate(axes) for array, name in GIVEN.items()
+    zones = [
+        f"    {name}{a.suffix} : ARRAY [0..{ZONES - 1}] OF LREAL; (* {a.unit}{comment} *)"
+        for a in axes
+        for name, comment in ZONE_INPUTS.items()
     ]
     return {
         "target_inputs": declared("fTarget", ""),
@@ -134,34 +118,5 @@ def axis_interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
                 declared("fStopDistance", ", the farther of them from here"),
             ]
         ),
-        "take_axes": "\n".join(taken),
-        **zone_interface(axes),
-        "give_axes": "\n".join(given),
-    }
-
-
-def zone_interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
-    """Declare the intervals of each axis, and carry them to the arrays where all of them are numbers."""
-    declared = [
-        f"    {name}{a.suffix} : ARRAY [0..{ZONES - 1}] OF LREAL; (* {a.unit}{comment} *)"
-        for a in axes
-        for name, comment in ZONE_INPUTS.values()
-    ]
-
-    def each(line: Callable[[int, str, str], str]) -> str:
-        lines = [
-            line(number * ZONES, array, name + a.suffix)
-            for number, a in enumerate(axes)
-            for array, (name, _) in ZONE_INPUTS.items()
-        ]
-        return "\n".join(
-            ["    FOR nIndex := 0 TO cZones - 1 DO", *(f"        {one}" for one in lines), "    END_FOR;"]
-        )
-
-    return {
-        "zone_inputs": "\n".join(declared),
-        "check_zones": each(
-            lambda _, __, name: f"IF NOT (ABS({name}[nIndex]) <= 1.0E+9) THEN bOutOfRange := TRUE; END_IF;"
-        ),
-        "take_zones": each(lambda first, array, name: f"{array}[nIndex + {first}] := {name}[nIndex];"),
+        "zone_inputs": "\n".join(zones),
     }

@@ -53,8 +53,6 @@ class PlannerConstants:
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
     sway_limit : float
         m, that the loads may sway after a motion.
-    tolerated_sway : float
-        m, sway up to which nothing is done about it at rest; on the way, half of it.
     events : bool
         Whether the last events are outputs.
     zones : bool
@@ -70,10 +68,6 @@ class PlannerConstants:
         order.
     stated_error : float
         Relative error that the frequencies may have.
-    second_order : (modes,) array
-        Weights in 1/m of what errors of the frequencies leave in each mode: of the integral of velocity and
-        wave, in which slots count by the square of their phase from the middle. 1 is worth half a slot at
-        full speed; 0 is no condition.
     degrees : int
         Chebyshev polynomials per live parameter.
     curvatures : sequence of float
@@ -104,7 +98,6 @@ class PlannerConstants:
     rates: Mapping[str, float]
     rope_length_gain: Mapping[str, float]
     sway_limit: float
-    tolerated_sway: float
     events: bool
     zones: bool
     operations: int
@@ -112,7 +105,6 @@ class PlannerConstants:
     periods: Sequence[float]
     sway_share: float
     stated_error: float
-    second_order: Array
     degrees: int
     curvatures: Sequence[float]
     exponents: NDArray[np.int64]

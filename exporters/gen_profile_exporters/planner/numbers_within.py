@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import attrs
 
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
-from gen_profile_exporters.planner.block import narrow, with_while_loops
+from gen_profile_exporters.planner.layout import narrow, with_while_loops
 from gen_profile_exporters.playback.buffers import TABLE
 
 COUNTER = "nTaken"

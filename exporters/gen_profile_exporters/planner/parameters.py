@@ -20,7 +20,7 @@ import attrs
 from gen_profile.support.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, initialiser
 from gen_profile_exporters.planner import numbers_within as within
-from gen_profile_exporters.planner.block import narrow, with_while_loops
+from gen_profile_exporters.planner.layout import narrow, with_while_loops
 from gen_profile_exporters.playback import buffers
 from gen_profile_exporters.templates import filled, left_open
 
@@ -158,7 +158,7 @@ def _own(source: BlockSource) -> tuple[list[BlockVariable], Callable[[str], str]
 def _kind(source: BlockSource) -> int:
     """Hash all of a block but its numbers, which is what two must have in common."""
     parts = [_structure(one) for one in (source, *sorted(source.within, key=lambda one: one.name.lower()))]
-    return zlib.crc32(repr(parts if source.within else parts[0]).encode()) >> 1
+    return zlib.crc32(repr(parts).encode()) >> 1
 
 
 def _structure(source: BlockSource) -> tuple[object, ...]:
@@ -174,9 +174,8 @@ def _around(
     source: BlockSource, types: Mapping[str, BlockSource], distinct: Callable[[str], str]
 ) -> tuple[str, str]:
     """Write what stands ahead of the statements that plan, and behind them."""
-    suffixes, whole = _suffixes(source), bool(types)
-    still = [f"cStill{of}" if whole else f"cStill[{k}]" for k, of in enumerate(suffixes)]
-    moving = "".join(f" OR (ABS(fVelocity{of}) > {least})" for of, least in zip(suffixes, still, strict=True))
+    suffixes = _suffixes(source)
+    moving = "".join(f" OR (ABS(fVelocity{of}) > cStill{of})" for of in suffixes)
     base, counter = map(distinct, ("nBase", "nCheck"))
     taken, begun = _statements(source, base, counter, len(buffers.HEAD))
     anew = distinct("bForget")
@@ -185,18 +184,13 @@ def _around(
         "plays": "(nState <> cDisabled)",
         "taken": "\n".join(f"        {line}" for line in (*taken, *within.calls(source, types, anew, base))),
         "begun": "\n".join(f"            {line}" for line in begun),
-        "unknown": "nLost := cPromiseSway" if whole else "bTakenOver := TRUE",
+        "unknown": "nLost := cPromiseSway",
     }
     # what is put in has the block's names, which are not ours
     text = distinct(left_open("planner/requests.st")).replace("cCycleTime", "cCycle")
     text = _HOLE.sub(lambda hole: values[hole[1]], text.replace("cAxes", str(len(suffixes))))
-    shown = [
-        (
-            *(f"f{name}{of}" for name in ("Position", "Velocity", "Acceleration")),
-            *((f"fGoal{of}", f"fVelocityCommand{of}") if whole else (f"aGoal[{axis}]", f"aWish[{axis}]")),
-        )
-        for axis, of in enumerate(suffixes)
-    ]
+    names = ("Position", "Velocity", "Acceleration", "Goal", "Order")
+    shown = [[f"f{name}{of}" for name in names] for of in suffixes]
     state = distinct(filled("planner/state.st", last=buffers.state_length(len(suffixes)) - 1, axes=shown))
     return narrow(with_while_loops(text)), narrow(with_while_loops(state))
 

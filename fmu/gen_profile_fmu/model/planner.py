@@ -25,7 +25,7 @@ UNITS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "s")
 TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
 MOVES = "fActVelocity"
-OWN = (*TAKEN.values(), *GIVEN.values())  # inputs and outputs of each axis
+OWN = (*TAKEN, *GIVEN)  # inputs and outputs of each axis
 SENSED = (*INPUTS.values(), *OUTPUTS)  # likewise of each of several
 SETPOINTS = {
     "fPosition": "setpoint",

@@ -18,7 +18,6 @@ from gen_profile.planner.machine import (
     least_decay,
     live_modes,
     lowered,
-    second_order_sway,
     sway_model,
 )
 from gen_profile.planner.sensor import between, modal_model, sensor_constants
@@ -29,8 +28,9 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.one_thread import one_thread
 from gen_profile.support.phrase import Phrase, placed
 from gen_profile_exporters.planner.axis_declarations import AxisConstants
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, block_text
+from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.planner.constants import PlannerConstants, SwayConstants
+from gen_profile_exporters.planner.interface import SLOTS_PER_PERIOD
 
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
@@ -38,12 +38,6 @@ FEWEST_CYCLES = 4  # in a slot
 # slowest mode swings faster than once in LEISURELY s, as it waits for plans.
 OPERATIONS, ZONED_OPERATIONS = 3000, 5000
 LEISURELY = 2.0
-TOLERATED_FRACTION = 0.2  # of the allowed sway, which the block leaves at rest; half of it on the way
-HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
-TOLERANT = 3.0  # times that, where plans may spend a share of the allowed sway
-LEAST_ERROR = 1e-3  # of a frequency, that is watched to second order
-SLOTS_PER_MOTION = 20.0  # slots in half a motion
-LITTLE = 0.3  # weight that does not count
 
 
 @attrs.frozen(kw_only=True)
@@ -78,7 +72,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
     """
     refuse_stacks(spec, "a planner block")
     modes_of_live, constants = planner_constants(spec)
-    text = block_text(constants)
+    text = whole_block(constants)
     declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
     if taken := [name for name in modes_of_live.live if declared[f"f{name}".lower()] > 1]:
         problems = {name: Phrase("the block has an {own} of its own", own=f"f{name}") for name in taken}
@@ -130,9 +124,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
             2.0 * np.pi / _rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live)
         ),
         sway_limit=min(spec.check.residual_sway.values()),
-        tolerated_sway=TOLERATED_FRACTION * min(spec.check.residual_sway.values()),
         stated_error=float(frequency_errors(spec).max(initial=0.0)),
-        second_order=_second_order(spec, modes_of_live),
         sway_share=_sway_share(spec),
         degrees=int(exponents.max(initial=0)) + 1,
         curvatures=[*modes_of_live.interpolant.curvatures, *modes_of_live.others.curvatures],
@@ -176,20 +168,6 @@ def _sway_share(spec: Spec) -> float:
     if spec.planner.live_rate or not frequency_errors(spec).max(initial=0.0) > 0.0:
         return 0.0
     return spec.planner.sway_share * min(spec.check.residual_sway.values())
-
-
-def _second_order(spec: Spec, live_modes: LiveModes) -> Array:
-    """Weigh what the stated errors leave in each mode, where it counts in a motion of usual length."""
-    weights = second_order_sway(spec) / (HALF_A_SLOT * min(spec.check.residual_sway.values()))
-    if _sway_share(spec) > 0.0:
-        return np.where(frequency_errors(spec) > LEAST_ERROR, weights / TOLERANT, 0.0)
-    velocity = max(spec.limits.of(number).velocity or 0.0 for number in planned_axes(spec))
-    slot_angle = 2.0 * np.pi / SLOTS_PER_PERIOD
-    usual = [
-        velocity * weights * slot_angle / rates[0] * (SLOTS_PER_MOTION * slot_angle * rates / rates[0]) ** 2
-        for rates, _ in (_rates(live_modes, point) for point in corners(live_modes.live))
-    ]
-    return np.where(np.max(usual, axis=0) > LITTLE, weights, 0.0)
 
 
 def _axis(spec: Spec, number: int, suffix: str) -> AxisConstants:

@@ -10,20 +10,18 @@ from gen_profile.planner.design import PlannerBlock
 from gen_profile.planner.directions import planned_axes
 from gen_profile.planner.planner import Planner
 from gen_profile.spec.model import AxisLimitsSpec, Spec
-from gen_profile_exporters.planner.block import FUTURE, RESERVE, SLOTS_PER_PERIOD
 
 RUN_UP = 1.5  # slow periods in which an axis at its limits is at a speed that it can be left from
 ROOM = 1e5  # m: travel that no axis comes to the end of
 SETTLING = 10.0  # periods after which a held stick's velocity no longer changes
 REACHED = 0.99
-AHEAD = FUTURE / SLOTS_PER_PERIOD
 
 
 def slow_axes(spec: Spec, block: PlannerBlock) -> tuple[str, ...]:
     """Say which axes stay below the velocity of their limits, however far they go.
 
-    A block goes no faster than it can stop within the future that it holds. That is tried, where an axis is
-    slow beside the swing: a stick is held at full speed, at every corner of the live ranges.
+    A block goes no faster than it can stop within the time that it plans ahead. That is tried, where an axis
+    is slow beside the swing: a stick is held at full speed, at every corner of the live ranges.
 
     Parameters
     ----------
@@ -56,14 +54,13 @@ def _sentences(spec: Spec, period: float) -> Iterator[str]:
     for (number, axis), speeds in zip(axes.items(), np.transpose(reached), strict=True):
         own, at = limits.of(number), int(np.argmin(speeds))
         assert own.velocity and own.acceleration and own.jerk
-        if speeds[at] < REACHED * (1.0 - (RESERVE if spec.planner.live_rate else 0.0)) * own.velocity:
+        if speeds[at] < REACHED * own.velocity:
             scarce = "acceleration" if 3.0 * own.acceleration < period * own.jerk else "jerk"
             where = ", ".join(f"{name} = {value:g}" for name, value in corners[at].items())
             yield (
                 f"{limits.place(number, 'velocity')}: of {own.velocity:g} {axis.unit}/s the block reaches "
                 f"{speeds[at]:.2g} {axis.unit}/s{' with ' if where else ''}{where}: a stop from more would "
-                f"take longer than {AHEAD:g} periods of the slowest swing, for which it plans ahead; raise "
-                f"{limits.place(number, scarce)}."
+                f"take longer than it plans ahead; raise {limits.place(number, scarce)}."
             )
 
 

@@ -231,24 +231,6 @@ def _sway_by_modes(spec: Spec, at: Linearization) -> Array:
     )
 
 
-def second_order_sway(spec: Spec) -> Array:
-    """Greatest sway of a load that the stated errors leave in each mode, in m by m, to second order.
-
-    For a motion that leaves the mode at rest whatever its frequency to first order: by the integral of its
-    velocity times a wave of the mode, weighed by the square of the wave's phase.
-    """
-    sways = []
-    for point in corners(spec.planner.live):
-        at = linearized(spec, point)
-        shown = np.abs(at.sway_gain @ at.modes).max(axis=0)
-        excited = np.abs(np.linalg.solve(at.modes, at.input)).max(axis=1)
-        modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
-        amplitude = np.zeros_like(at.distinct_frequencies)
-        np.maximum.at(amplitude, modes, shown * excited)
-        sways.append(0.5 * amplitude * _frequency_errors(spec, point) ** 2)
-    return np.asarray(np.max(sways, axis=0))
-
-
 def corners(live: Collection[str]) -> list[Sequence[float]]:
     """Give the corners of the live ranges, each mapped to −1 … 1."""
     return list(product((-1.0, 1.0), repeat=len(live)))

@@ -27,7 +27,7 @@ from gen_profile.planner.stated import damping_room
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile.support.errors import SpecError
-from gen_profile_exporters.planner.block import KERNEL_SLOTS, SLOTS_PER_PERIOD
+from gen_profile_exporters.planner.interface import SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.sensor_constants import (
     MEMORY,
     SensorConstants,
@@ -476,16 +476,6 @@ def _refuse(spec: Spec, sensor: SensorSpec, one: SensedModes) -> None:
         raise SpecError(
             f"planner.sensor.delay: at most {most:.2g} s, known to {width:.2g} s, for a load that swings "
             "this fast; take a faster sensor, or give the block fSensorAge and state its error alone."
-        )
-    kernel = damping_kernel(one.frequencies)
-    out = np.arange(len(kernel)) - 0.5 * (len(kernel) - 1)
-    effect = float(kernel @ np.cos(2.0 * np.pi / SLOTS_PER_PERIOD * out))
-    if effect < LEAST_EFFECT or len(kernel) > KERNEL_SLOTS:
-        ratio = float(one.frequencies[1] / slowest)
-        raise SpecError(
-            f"planner.sensor: the second mode has {ratio:.2g} times the frequency of the slowest, too near "
-            "to damp one without exciting the other"
-            + (", at an end of the live ranges; narrow planner.live." if spec.planner.live else ".")
         )
 
 

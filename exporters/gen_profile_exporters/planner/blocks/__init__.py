@@ -1,1 +1,1 @@
-"""Function blocks of which the next planner block is made; used by nothing but their tests yet."""
+"""Function blocks of which the planner block is made, and what writes them for a machine."""

@@ -5,7 +5,6 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.blocks.sizes import (
     ENDS,
     Sizes,
@@ -19,6 +18,7 @@ from gen_profile_exporters.planner.blocks.sizes import (
 )
 from gen_profile_exporters.planner.blocks.texts import SIDES, constant_lines, filled, planner
 from gen_profile_exporters.planner.constants import PlannerConstants
+from gen_profile_exporters.planner.interface import SLOTS_PER_PERIOD
 from gen_profile_exporters.playback.structured_text import literal
 
 SHARE = 0.5  # of the allowed sway, that motions may leave by stated errors

@@ -13,7 +13,7 @@ from gen_profile_exporters.planner.sensor_constants import (
     whole_constants,
 )
 
-# names in the block, by those of the constants that today's block has
+# names in the observer, by those of `sensor_constants`
 NAMES = {
     "cSensorOldest": "cOldest", "cSensorMost": "cMost", "cSensorStep": "cStep", "cSensorGate": "cGate",
     "cSensorFrozen": "cFrozen", "cSensorHides": "cHides", "cSensorNoisy": "cMostNoise",

@@ -8,9 +8,9 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile_exporters.block_source import initialiser
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, WHERE
 from gen_profile_exporters.planner.blocks.sizes import Sizes, longest, model_work, operations
 from gen_profile_exporters.planner.constants import PlannerConstants
+from gen_profile_exporters.planner.interface import SLOTS_PER_PERIOD, WHERE
 from gen_profile_exporters.playback.structured_text import literal
 
 FOLDER = Path(__file__).parent

@@ -4,26 +4,19 @@ import re
 from collections.abc import Mapping
 
 from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants
-from gen_profile_exporters.planner.block import (
-    HOLD,
-    ROUNDING,
-    STILL,
-    WHERE,
-    interface,
-    narrow,
-    with_while_loops,
-)
 from gen_profile_exporters.planner.blocks import followed
 from gen_profile_exporters.planner.blocks.measured import observer
 from gen_profile_exporters.planner.blocks.sizes import Sizes, operations, shell_work
 from gen_profile_exporters.planner.blocks.texts import FOLDER, constant_lines, filled, planner
 from gen_profile_exporters.planner.constants import PlannerConstants
+from gen_profile_exporters.planner.interface import HOLD, WHERE, gives_up, interface, reaction
+from gen_profile_exporters.planner.layout import narrow, with_while_loops
 from gen_profile_exporters.playback.structured_text import block_name
 
-GIVES_UP = 4.0  # slow periods in which no motion is found for a command
+STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
+ROUNDING = 1e-3  # of a live parameter's greatest rate
 BRAKE_WORK = 350  # operations of a cycle in which an axis has to brake in time
 EACH = re.compile(r"(?ms)^ *@each_axis\n(.*?)^ *@end_axis\n")
-TOLERANCE = ("is not the cycle time of this block", "is not within 0.1 % of the cycle time of this block")
 
 
 def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
@@ -61,8 +54,6 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
     stated["measured"] = c.sensor is not None
     stated["several"] = len(c.axes) > 1
-    head = interface(c).replace(*TOLERANCE)
-    head = re.sub(r"(?m)^(\s*bStop : BOOL;.*\n)", rf"\1{PROMPT}\n", head, count=1)
     body = (FOLDER / "shell.st").read_text("ascii")
     words = c.sensor.words if c.sensor else {}
 
@@ -80,10 +71,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
         "shell_constants": constant_lines(_constants(c)),
     }
-    return head + re.sub(r"@([a-z_]+)", lambda hole: given[hole[1]], body)
-
-
-PROMPT = "    bPromptStop : BOOL; (* stops are never faster than the axis is then, and may leave more sway *)"
+    return interface(c) + re.sub(r"@([a-z_]+)", lambda hole: given[hole[1]], body)
 
 
 def _of_axis(text: str, number: int, axis: AxisConstants, sensed: str) -> str:
@@ -104,7 +92,8 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
         "cShellWork": shell_work(c),
         "cBrakeWork": BRAKE_WORK,
         "cHoldCycles": round(HOLD / c.cycle),
-        "cGivesUpCycles": round(GIVES_UP * max(c.periods) / c.cycle),
+        "cReaction": reaction(c),
+        "cGivesUp": gives_up(c),
         "cSwayLimit": c.sway_limit,
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
         "cLiveLow": [low for low, _ in lives.values()],

@@ -1,8 +1,8 @@
-"""What a planner block does where no plan is found in time: pulses, which are slower and always there."""
+"""Changes of mind that a planner block obeys in time: it turns round, stops and comes back soon."""
 
 import numpy as np
 import pytest
-from driven_block import CYCLE, Driver, frequencies, residual
+from driven_block import CYCLE, Driver
 from exporters.counted_block import CountedBlock, compile_counting
 from generator.planned_machines import HOIST
 
@@ -18,33 +18,6 @@ def text():
     return planner_block(preset_spec("bay-crane")).text
 
 
-FOUND = "bGood := bMet AND ((fPlanWay > 1.0E-9) OR bWay OR (nJob = cJobStop));"
-
-
-@pytest.fixture(scope="module")
-def helpless(text):
-    """A block whose search never finds a stop, nor a way to another velocity."""
-    assert text.count(FOUND) == 1
-    return text.replace(FOUND, FOUND.replace("bMet", "(nJob <> cJobStop) AND bMet"))
-
-
-@pytest.mark.parametrize("seconds", [1.2, 6.0, 20.0])
-@pytest.mark.parametrize("order", [{"bStop": 1}, {"rOverride": 0.0}, {"bVelocity": 1}])
-def test_an_axis_stops_where_no_stop_can_be_planned(helpless, seconds, order):
-    """By pulses, without sway and within the stated ends: it went on to its old target, 25 m away."""
-    driver = Driver(helpless, fActPosition=2.0, fL1=6.0, fm2=2000.0).hold(5.0)
-    driver.hold(seconds, bExecute=1, fTarget=30.0).hold(CYCLE, bExecute=int("rOverride" in order), **order)
-    driver.parts.append(driver.block.play_on(round(40.0 / CYCLE)))
-    low, high = (driver.parts[1][name][-1] for name in ("fStopLow", "fStopHigh"))
-    place, velocity = (driver.parts[-1][name] for name in ("fPosition", "fVelocity"))
-    assert velocity[round(5.0 / CYCLE)] < 0.96 * velocity[: round(5.0 / CYCLE)].max()
-    assert np.abs(velocity[: round(12.5 / CYCLE)]).min() < 0.1
-    assert place.min() >= low
-    assert place.max() <= min(high, place[0] + 15.0)
-    assert velocity[-1] == 0.0
-    assert residual(driver.outputs, frequencies(6.0, 2000.0)) < 1e-12
-
-
 def last_motion(driver):
     """Cycles until it ends, and the time that was stated to be left in each of them."""
     out = driver.parts[-1]
@@ -52,21 +25,11 @@ def last_motion(driver):
     return cycles, out["fTimeToGo"][:cycles]
 
 
-def test_the_time_to_go_by_pulses_stays_when_a_stop_before_them_cannot_be_planned(text):
-    """It fell by 20 s for one slot, as if the axis came to rest far from its target."""
-    driver = Driver(text, fActPosition=7.039, fL1=5.324894, fm2=1781.942).hold(0.044)
-    driver.hold(45.545, bVelocity=1, fVelocityCommand=1.1, rOverride=0.9774525)
-    driver.hold(45.0, bVelocity=0, bExecute=1, fTarget=9.214942404508728, rOverride=1.0)
-    cycles, stated = last_motion(driver)
-    off = stated - (cycles - np.arange(cycles)) * CYCLE
-    assert np.abs(off[round(3.0 / CYCLE) :]).max() < 4.0
-
-
 TURNS = [  # rope in m, targets and for how long, and the latest time for the last one
-    (7.0, ((27.0, 4.3), (13.0, 23.5))),  # 27.4 s: too few slots were left to turn in
-    (4.0, ((7.0, 5.0), (19.0, 15.0))),  # 18.2 s
-    (6.0, ((5.0, 7.1), (24.0, 22.0))),  # 24.2 s: after a stop, pulses led there
-    (6.0, ((23.0, 5.6), (27.0, 1.5), (11.0, 24.0))),  # 30.5 s
+    (7.0, ((27.0, 4.3), (13.0, 27.5))),
+    (4.0, ((7.0, 5.0), (19.0, 14.0))),
+    (6.0, ((5.0, 7.1), (24.0, 23.5))),
+    (6.0, ((23.0, 5.6), (27.0, 1.5), (11.0, 23.5))),
 ]
 
 
@@ -79,7 +42,7 @@ def test_an_axis_that_must_turn_round_is_at_its_target_soon(text, rope, targets)
 
 
 def test_a_far_target_is_not_put_off_by_what_changes_of_mind_have_left(text):
-    """A plan that makes up for it took 36 s; pulses add little to it."""
+    """A motion that makes up for it took 36 s."""
     late = {"rOverride": 1.0, "fVelocityLimit": 0.6312414434101448, "bStop": 0}
     changes = [  # s, and what is commanded until then
         (1.6110779920588576, {"fTarget": 0.0, "rOverride": 0.31238805813635534, "fVelocityLimit": 0.0}),
@@ -110,7 +73,7 @@ def test_a_far_target_is_not_put_off_by_what_changes_of_mind_have_left(text):
 @pytest.mark.parametrize("seconds", [0.6, 1.5, 3.0])
 def test_a_slow_drive_stops_soon_after_it_has_begun_to_speed_up(seconds):
     """A search in too few slots that came too late was begun again with fewer: 12.2 s from 0.21 m/s."""
-    changes = ["export.cycle_time=0.01", "planner.operations=3000", "robustness.uncertain={L0=0.02}"]
+    changes = ["export.cycle_time=0.01", "robustness.uncertain={L0=0.02}"]
     slow = ["limits.velocity=2.0", "limits.acceleration=0.2", "limits.travel=[0.0, 60.0]"]
     block = BlockInstance(planner_block(parse_spec(HOIST, [*changes, *slow])).text)
     given = block.inputs | {"bEnable": 1.0, "fActPosition": 18.0, "fhoist": 0.5024, "fTarget": 25.3}
