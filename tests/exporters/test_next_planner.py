@@ -245,7 +245,7 @@ def test_a_prompt_stop_shortly_before_the_end_of_travel_stays_in_travel_and_ends
     history.keeps()
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4])
 def test_after_a_prompt_stop_that_leaves_too_much_a_far_target_begins_and_brings_the_promise_back(bay, seed):
     spec, compiled = bay
     random = np.random.default_rng([7, seed])

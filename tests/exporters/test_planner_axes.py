@@ -96,9 +96,10 @@ def test_all_axes_arrive_together_as_soon_as_the_slowest_can(block, target):
     shorter, rate = CYCLE * ends[0] / 1.10, np.sqrt([G / ROPE])
     reached = [farthest(shorter, rate, limits[:3]) for limits in LIMITS.values()]
     assert any(reach < place for reach, place in zip(reached, target, strict=True))
-    begins = [np.argmax(out[f"fVelocity_{axis}"] != 0.0) for axis in LIMITS]
-    assert begins[0] * CYCLE < 0.2 * 2.0 * np.pi / rate[0]
-    assert begins[1] == begins[0] or target[1] < 0.1  # a short way beside a long one begins when it has to
+    first_cycles = [np.argmax(out[f"fVelocity_{axis}"] != 0.0) for axis in LIMITS]
+    assert first_cycles[0] * CYCLE < 0.2 * 2.0 * np.pi / rate[0]
+    together = first_cycles[1] == first_cycles[0]
+    assert together or target[1] < 0.1  # a short way beside a long one begins when it has to
 
 
 @pytest.mark.parametrize(("cycles", "x"), [(6000, 12.0), (8000, 4.0)])

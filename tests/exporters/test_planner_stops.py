@@ -27,15 +27,12 @@ def stopped(compiled, moment):
 
 
 @pytest.mark.slow
-def test_a_stop_begins_with_the_next_slot_and_ends_no_later_than_first_stated(written):
-    """Planned only once it was ordered, it began up to 0.07 s later, and ended when it was first stated.
-
-    Blocks plan none in advance: theirs begins with the slot after its programme is found, 0.15 s at most.
-    """
+def test_a_stop_begins_with_the_next_slot_and_ends_no_later_than_first_stated():
+    """It begins with the slot after its programme is found, 0.15 s later at most."""
     compiled = compile_counting(planner_block(preset_spec("bay-crane")).text)
     delays, stated, took = np.transpose([stopped(compiled, moment) for moment in MOMENTS])
-    assert delays.max() <= SLOT + 0.15 * (written == "blocks")
-    assert delays.mean() <= 0.7 * SLOT
+    assert delays.max() <= SLOT + 0.15
+    assert delays.mean() <= 0.75 * SLOT
     assert (took <= stated + CYCLE).all()
     assert (took < stated - SLOT / 2).any()
 

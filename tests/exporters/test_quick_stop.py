@@ -84,8 +84,8 @@ def test_it_says_between_which_places_it_stays(played):
     said = issued["fLow"][:, 1], issued["fHigh"][:, 1]
     assert np.all(said[0] <= low + 1e-12) and np.all(said[1] >= high - 1e-12)
     ends = np.sort([rows[:, 0], issued["fEnd"][:, 0]], axis=0)
-    turned = said[1] - said[0] > ends[1] - ends[0] + 1e-9
-    assert turned.sum() > 100
+    reversed_ = said[1] - said[0] > ends[1] - ends[0] + 1e-9
+    assert reversed_.sum() > 100
     a = np.abs(rows[:, 2]) + rows[:, 3] + rows[:, 4] * CYCLE  # between cycles by less than these leave
     assert np.all(low - said[0] <= a * CYCLE**2) and np.all(said[1] - high <= a * CYCLE**2)
 

@@ -46,7 +46,7 @@ def test_a_spectrum_without_a_peak_is_refused(tmp_path, rows):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "sentence"),
     [
         (None, "this is a spectrum"),
         ("time,angle\n0,1\n0.1,2\n0.2,1\n", "at least 16 samples"),
@@ -54,13 +54,13 @@ def test_a_spectrum_without_a_peak_is_refused(tmp_path, rows):
         ("time,angle\n" + "".join(f"{k},{'x' * (k % 2) or 1}\n" for k in range(40)), "which is no number"),
     ],
 )
-def test_every_refusal_has_a_picture(tmp_path, monkeypatch, text, told):
+def test_every_refusal_has_a_picture(tmp_path, monkeypatch, text, sentence):
     monkeypatch.chdir(tmp_path)
     log = spectrum(tmp_path) if text is None else tmp_path / "log.csv"
     if text is not None:
         log.write_text(text, "utf-8")
     outcome = run_here("identify", "--preset", "mass-spring-chain", "--swing", log, "--plot", "seen.svg")
-    assert outcome.code == 2 and told in outcome.err
+    assert outcome.code == 2 and sentence in outcome.err
     drawn = (tmp_path / "seen.svg").read_text("utf-8")
     assert "Refused" in drawn and ("psd_x" in drawn or "angle" in drawn)
     assert not (tmp_path / "identified.toml").exists()

@@ -132,7 +132,7 @@ class SwungMachine:
         names, sensed = [*inputs], [axes[number] for number in sensed_directions(spec)]
         quantity = {"angle": "{}", "rate": "{}.rate", "sway": "sway.{}"}[sensor.quantity]
         cycles, watch = (round(periods * period / cycle) for periods in (PERIODS, 1.0))
-        told = np.tile(
+        outputs = np.tile(
             [gain, 0.0, round((sensor.usual_age + late) / cycle), 1.0], (cycles + 1, len(sensed), 1)
         )
         script = Script(
@@ -147,7 +147,7 @@ class SwungMachine:
                 quantities=[quantity.format(of) for of in sensor.names],
                 shows=[names.index(axis.of("fSensor")) for axis in sensed],
                 valid=[names.index(axis.of("bSensorValid")) for axis in sensed],
-                cycles=told,
+                cycles=outputs,
                 pushed=np.zeros((cycles + 1, len(axes))),
                 again=cycles,
             ),

@@ -87,8 +87,8 @@ def shortest_duration(spec: Spec, shaped: ShapedMove) -> float | None:
     quickest = delay + _plausible_stretch(spec, shaped)
 
     def excess(duration: float) -> float:
-        enough = duration > in_cycles(quickest) and duration >= (spec.move.bounds.least or 0.0)
-        keeps = enough and not _breaches(spec, shaped.profile(duration))
+        long_enough = duration > in_cycles(quickest) and duration >= (spec.move.bounds.least or 0.0)
+        keeps = long_enough and not _breaches(spec, shaped.profile(duration))
         return -math.inf if keeps else math.inf
 
     return least(excess, 2.0 * delay, SHORTEST_SHAPED, LONGEST_SHAPED * delay, in_cycles)

@@ -15,7 +15,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.spec.plan_view import Line
 from gen_profile.spec.stacks import PathAxes
 
-ALIKE = 1e-9  # relative difference of what is the same
+EQUAL = 1e-9  # relative difference of what is the same
 TROLLEY = 3  # states of the trolley, which come first: place, velocity and acceleration
 
 
@@ -51,14 +51,14 @@ def swings_along(
     pushes, shown = linear.input, linear.sway_gain[plant.end_load]
     powers = [np.linalg.matrix_power(linear.stiffness, k) for k in range(len(pushes))]
     seen = np.array([shown @ one @ pushes[:, [first, second]] for one in powers])
-    alike = np.abs(seen - seen[:, :1, :1] * np.eye(2)).max(axis=(1, 2)) <= ALIKE * np.abs(seen).max(
+    alike = np.abs(seen - seen[:, :1, :1] * np.eye(2)).max(axis=(1, 2)) <= EQUAL * np.abs(seen).max(
         axis=(1, 2)
     )
     if alike.all():
         line = Line()
     pushed = pushes[:, [first, second]] @ np.array(line.way)
     reached = np.max([np.abs(one @ pushed) / np.abs(one).max() for one in powers], axis=0)
-    return line, tuple(np.flatnonzero(reached > ALIKE * reached.max()).tolist())
+    return line, tuple(np.flatnonzero(reached > EQUAL * reached.max()).tolist())
 
 
 @cache
