@@ -74,6 +74,7 @@ def check(
     document, digest = read_json(certificate), hashlib.sha256(artefact).hexdigest()
     known = isinstance(document, dict) and document.get("format") == FORMAT
     require(known, f"the certificate is none of the kind {FORMAT!r}")
+    require("clearance" not in document, "not covered: the clearance of a path")
     wrong = sorted(KEYS ^ document.keys())
     require(not wrong, f"the certificate lacks {', '.join(wrong)}, or should not have it")
     require(digest == document["artefact_sha256"], "the certificate is about another artefact")

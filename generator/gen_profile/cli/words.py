@@ -150,6 +150,8 @@ def _proved(certificate: Certificate) -> Iterator[tuple[str, str]]:
     said = [f"{bounds}, from {certificate.arrival:.4g} s on"] if bounds else []
     if (way := certificate.on_the_way) is not None and way.bound is not None:
         said.append(f"{way.limit.load} {mm(way.bound)} at any time")
+    if (kept := certificate.clearance) is not None and kept.nearer is not None:
+        said.append(f"{mm(kept.nearer)} nearer than path.clearance at any time")
     most = f"at most {'; '.join(said)}" if said else "no bound"
     yield "proved" if certificate.proved else "not proved", most
     for axis, kinds in (certificate.asked or {}).items():

@@ -28,6 +28,7 @@ from gen_profile.support.bounded_file import DOCUMENT, read_bounded
 from gen_profile.support.phrase import Phrase
 
 MOST_STACKS = 200
+ROOM_TOLERANCE = 5e-4  # m, by which a load may be nearer to a stack than the clearance
 TOUCHING = 1e-3  # m, by which a load may be lower than what it stands on
 NUDGE = 1e-6  # m, by which a machine is moved to see which way an axis carries the load
 

@@ -85,9 +85,9 @@ class Attempt:
     scales : array
         Of `Approximation`, for these boxes.
     bounds : (boxes, limits) array
-        m, of `Theorem.limits`.
+        m, of `Theorem.allowed`.
     largest_met : (limits,) array
-        Greatest sway that was met, in m.
+        Greatest sway that was met, in m, and by how much nearer than the clearance.
     fraction : float
         Of the whole box, of which a bound is proved.
     """
@@ -129,17 +129,17 @@ def attempt(
     theorem, waiting = _prepared(spec, setpoints, options)
     most = options.max_nodes // theorem.nodes  # boxes
     deepest = max(sum(level for level, _ in box) for box in waiting) + options.max_halvings
-    limits = np.array([limit.allowed for limit in theorem.limits])
+    limits = theorem.allowed
     done, tried = dict[DyadicBox, _Proof](), 0
     largest_met, fruitless, before = np.zeros(len(limits)), 0, np.inf
     while waiting:
-        prove = partial(_prove, theorem, _wanted(largest_met, limits, options))
+        prove = partial(_prove, theorem, _wanted(theorem, largest_met, options))
         for batch, proofs, here in in_order(prove, _integrated(theorem, waiting)):
             done.update(zip(batch, proofs, strict=True))
             largest_met = np.fmax(largest_met, here)
             tried += len(batch)
             progress(tried, tried + len(waiting))
-        wanted = _wanted(largest_met, limits, options)
+        wanted = _wanted(theorem, largest_met, options)
         coarse = [box for box, proof in done.items() if not (proof.bound <= wanted).all()]
         coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
         above = np.array([done[box].bound - wanted for box in waiting])
@@ -200,9 +200,11 @@ def _lines(low: Array, high: Array) -> Array:
     return lines
 
 
-def _wanted(largest_met: Array, limits: Array, options: CertificateOptions) -> Array:
-    """Tell how low bounds should be, by the greatest sway seen."""
+def _wanted(theorem: Theorem, largest_met: Array, options: CertificateOptions) -> Array:
+    """Tell how low bounds should be, by the greatest sway seen; a clearance has to be kept, and no more."""
+    limits = theorem.allowed
     wanted = np.maximum(options.close * largest_met, largest_met + options.close_to_limit * limits)
+    wanted[len(theorem.limits) :] = limits[len(theorem.limits) :]
     return np.where(largest_met < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
 
 

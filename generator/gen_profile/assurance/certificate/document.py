@@ -15,7 +15,8 @@ from gen_profile.assurance.certificate.axes.axis_motion import AxisMotion
 from gen_profile.assurance.certificate.axes.setpoint_limits import Asked
 from gen_profile.assurance.certificate.boxes import DyadicBox
 from gen_profile.assurance.certificate.packing import Motions, numbers, pack, unpack
-from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayLimit
+from gen_profile.assurance.certificate.sway_limits import ProvedClearance, ProvedSway, SwayLimit
+from gen_profile.spec.stacks import ROOM_TOLERANCE
 from gen_profile.support.errors import CertificateError
 from gen_profile.support.strict_json import parse_json
 from gen_profile.support.summary import Summarised
@@ -54,6 +55,8 @@ class Certificate(Summarised):
         Of every box, for `gen_profile.assurance.certificate.enclosure.Approximation`.
     scales : (boxes, pieces or 1, 2 n_u, 2 n_u, parameter terms or 1) array
         Likewise.
+    clearance : ProvedClearance or None
+        Of what stands in the way, where the spec states it.
     rounded : bool
         Whether setpoints are rounded to counts, for the reasons where nothing is proved.
     not_rechecked : tuple of str
@@ -75,6 +78,7 @@ class Certificate(Summarised):
     terms: tuple[int, ...]
     motions: tuple[Motions, ...]
     scales: Array
+    clearance: ProvedClearance | None = None
     rounded: bool = False
     not_rechecked: tuple[str, ...] = ()
     unproved: tuple[str, ...] = ()
@@ -109,7 +113,10 @@ class Certificate(Summarised):
                 f"Bounds are proved for {100.0 * self.fraction:.3g} % of the machines; others {others}: "
                 f"narrow the ranges (check.uncertain), or take more time{coarse}.",
             )
-        return tuple(sway.reason for sway in self.sways if sway.reason is not None)
+        reasons = [sway.reason for sway in self.sways]
+        if self.clearance is not None:
+            reasons.append(self.clearance.reason)
+        return tuple(reason for reason in reasons if reason is not None)
 
     def warnings(self) -> tuple[str, ...]:
         """Say which limits it does not speak of, and that it, if it is one, cannot be proved again."""
@@ -176,6 +183,7 @@ class Certificate(Summarised):
                 "limit_m": way.limit.allowed,
                 "largest_met_m": way.largest_met,
             },
+            "clearance": None if self.clearance is None else self.clearance.to_dict(),
             "setpoints": self.asked,
             "ranges": {name: list(ends) for name, ends in self.ranges.items()},
             "share_proved": self.fraction,
@@ -218,6 +226,9 @@ def encode(certificate: Certificate) -> bytes:
         "motions": [{"quanta": list(one.quanta), **one.packed} for one in certificate.motions],
         "scales": pack(certificate.scales.astype("<f8"), 2),
     }
+    if said["clearance"] is not None:
+        del said["clearance"]["largest_met_m"]
+        document["clearance"] = said["clearance"]
     return (json.dumps(document, allow_nan=False) + "\n").encode("ascii")
 
 
@@ -233,7 +244,7 @@ def parse(content: bytes) -> Certificate:
         document = parse_json(content)
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise CertificateError(f"This is no certificate that can be read here ({FORMAT!r}).")
-        if wrong := sorted(KEYS ^ document.keys()):
+        if wrong := sorted(KEYS ^ (document.keys() - {"clearance"})):
             raise ValueError(f"{', '.join(wrong)} missing, or of no certificate")
         axes = {name: numbers(nested) for name, nested in document["axes"].items()}
         return Certificate(
@@ -243,6 +254,7 @@ def parse(content: bytes) -> Certificate:
             arrival=_number(document["from_s"]),
             until=_number(document["until_s"]),
             sways=tuple(_sways(document)),
+            clearance=_clearance(document.get("clearance")),
             asked=document["setpoints"],
             fraction=1.0,
             axes=AxisMotion(**axes),
@@ -271,6 +283,14 @@ def _part(level: int, number: int) -> tuple[int, int]:
     if not 0 <= index(level) <= MOST_HALVINGS:
         raise ValueError("a box of no such kind")
     return index(level), index(number)
+
+
+def _clearance(claim: Any) -> ProvedClearance | None:
+    if claim is None:
+        return None
+    if claim.keys() != {"nearer_m", "allowed_m"} or claim["allowed_m"] != ROOM_TOLERANCE:
+        raise ValueError("a clearance of another kind")
+    return ProvedClearance(nearer=_number(claim["nearer_m"]), largest_met=nan)
 
 
 def _sways(document: Mapping[str, Any]) -> Iterator[ProvedSway]:

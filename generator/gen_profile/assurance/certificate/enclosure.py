@@ -25,6 +25,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.assurance.certificate.approximate_motions import Approximation
 from gen_profile.assurance.certificate.arithmetic import balls, chebyshev
 from gen_profile.assurance.certificate.arithmetic.affine import Affine
 from gen_profile.assurance.certificate.arithmetic.balls import Array, Ball, ball, matmul, shared
@@ -41,9 +42,11 @@ from gen_profile.assurance.certificate.arithmetic.matrices import (
     times,
 )
 from gen_profile.assurance.certificate.axes.axis_motion import AxisMotion, Gap, powers, widened
+from gen_profile.assurance.certificate.clearance import rooms
 from gen_profile.assurance.certificate.equations import EnclosedEquations
 from gen_profile.assurance.certificate.scaling import Scaling, affine_entries
 from gen_profile.assurance.certificate.sway_limits import SwayBounds, WatchedSway
+from gen_profile.spec.stacks import StackZone
 
 TIME_NODES, FEW_TIME_NODES = 12, 8  # for the defect, and for what need not be as close
 # more nodes than terms in each parameter, as what interpolation misses is bounded roughly; fewer of few terms
@@ -61,35 +64,6 @@ def nodes_for(terms: int) -> int:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Approximation:
-    """Motions of machines as Chebyshev series of time and parameters.
-
-    Attributes
-    ----------
-    lower, upper : (boxes, ranges) Balls
-        Of the parameters that vary.
-    varied : (ranges,) tuple of int
-        Which of the machine's parameters these are.
-    nominal : (parameters,) array
-        Values of all others.
-    series : (boxes, pieces, 2 n_u, time terms, terms of each parameter …) array
-        Of x = (q_u, w).
-    scaling : Scaling
-        S, of the norm |S e| in which errors are measured.
-    start : (2 n_u,) array
-        x at time 0.
-    """
-
-    lower: Ball
-    upper: Ball
-    varied: tuple[int, ...]
-    nominal: Array
-    series: Array
-    scaling: Scaling
-    start: Array
-
-
-@attrs.frozen(kw_only=True, eq=False)
 class Enclosure:
     """One batch of boxes.
 
@@ -101,6 +75,8 @@ class Enclosure:
         How far the axes are from `axes`.
     watches : tuple of WatchedSway
     approximation : Approximation
+    zones : tuple of StackZone
+        Where bodies may not be, at any time.
     """
 
     equations: EnclosedEquations
@@ -108,6 +84,7 @@ class Enclosure:
     gap: Gap
     watches: tuple[WatchedSway, ...]
     approximation: Approximation
+    zones: tuple[StackZone, ...] = ()
 
     @property
     def variables(self) -> int:
@@ -130,7 +107,7 @@ class Enclosure:
         Parameters
         ----------
         targets : (watches,) array
-            Bounds in m below which lower ones are not sought.
+            Bounds in m below which lower ones are not sought; a clearance takes none.
         """
         with np.errstate(all="ignore"):  # what is not finite proves nothing
             return self._bounds(targets)
@@ -462,7 +439,8 @@ class Enclosure:
 
     def _sway(self, off: Array, targets: Array) -> SwayBounds:
         """Bound every sway that is watched; approximate ones are off by so much, (boxes, pieces, loads)."""
-        begun, n_u = min(watch.first for watch in self.watches), self.approximation.series.shape[2] // 2
+        n_u = self.approximation.series.shape[2] // 2
+        begun = 0 if self.zones else min(watch.first for watch in self.watches)
         pieces = slice(begun, None)
         x, q_a, _, p = self._state_at(self.fine, pieces)
         at_nodes = [self._whole(row[0], self.fine, pieces) for row in self.equations.sway(x[:n_u], q_a, p)]
@@ -476,7 +454,22 @@ class Enclosure:
                 [one[:, since] for one in at_nodes[loads]], far[loads], watch.first, targets[column] - away
             )
             bounds[:, column] = (bounds[:, column] + away) * ROUND_UP
+        if self.zones:
+            nearer, met = self._nearer(at_nodes, far, off)
+            bounds, largest_met = np.column_stack([bounds, nearer]), np.column_stack([largest_met, met])
         return SwayBounds(sway=bounds, largest_met=largest_met)
+
+    def _nearer(self, at_nodes: list[Ball], far: list[Affine], off: Array) -> tuple[Array, Array]:
+        """Bound by how much less than they must bodies are away from zones, and tell what is met, in m."""
+        shape, bodies = self._range.shape[:3], 1 + max(zone.body for zone in self.zones)
+        sways = max(watch.loads.stop for watch in self.watches)
+        each = []
+        for row in range(sways, sways + 3 * bodies):
+            series, rounding = chebyshev.interpolated(at_nodes[row], self.variables)
+            missed = self._interpolation_error(np.broadcast_to(far[row].rad, shape), self.fine)
+            each.append((series, (rounding + missed + off[:, :, row]) * ROUND_UP))
+        bounds, met = rooms(each, self.zones)
+        return np.maximum(-bounds, 0.0), np.maximum(-met, 0.0)
 
     def _greatest(
         self, at_nodes: list[Ball], far: list[Affine], first: int, targets: Array

@@ -179,12 +179,12 @@ class EnclosedEquations:
         P = J G + ∂f/∂q_a − dG/dt along the smooth motion, of (x, q_a, v, p, q̈_a).
     pull_change : 2 n_u × m
         dP/dt, of (x, q_a, v, p, q̈_a), ẋ and the jerk of the axes.
-    sway : loads × 1
-        Of (q_u, q_a, p).
-    sway_slopes : loads × n_u
-        ∂sway/∂q_u.
-    sway_by_position : loads × m
-        ∂sway/∂q_a.
+    sway : loads × 1, and perhaps 3 more of every body
+        Sways, and places in m, of (q_u, q_a, p).
+    sway_slopes : as many × n_u
+        Its derivatives by q_u.
+    sway_by_position : as many × m
+        Its derivatives by q_a.
     jump : n_u × m
         D, of (q_u, q_a, p).
     """
@@ -205,8 +205,8 @@ class EnclosedEquations:
 
 
 @cache
-def enclosed_equations(plant: Plant) -> EnclosedEquations:
-    """Derive a machine's equations for balls.
+def enclosed_equations(plant: Plant, places: bool = False) -> EnclosedEquations:
+    """Derive a machine's equations for balls, with the places of its bodies behind the sways if wanted.
 
     Raises
     ------
@@ -228,6 +228,7 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
     state = {"x": x, "q_a": q_a, "v": v, "p": d.p}
     smooth = {**state, "ddq_a": ddq_a}
     arguments = {"q_u": d.q_u, "q_a": q_a, "p": d.p}
+    seen = sym.column([d.sway, d.place]) if places else d.sway
     d_x = sym.symbols("d_x", 2 * n_u)
     motion = sym.column([x, q_a, v, ddq_a])
 
@@ -250,9 +251,9 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
         "curvature": (curvature, state),
         "pull": (pull, smooth),
         "pull_change": (pull_change, {**smooth, "d_x": d_x, "jerk": jerk}),
-        "sway": (d.sway, arguments),
-        "sway_slopes": (sym.jacobian(d.sway, d.q_u), arguments),
-        "sway_by_position": (sym.jacobian(d.sway, q_a), arguments),
+        "sway": (seen, arguments),
+        "sway_slopes": (sym.jacobian(seen, d.q_u), arguments),
+        "sway_by_position": (sym.jacobian(seen, q_a), arguments),
     }
     functions = {name: Function(name, inputs, one) for name, (one, inputs) in expressions.items()}
     return EnclosedEquations(

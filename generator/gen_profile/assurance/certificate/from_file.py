@@ -17,7 +17,13 @@ from gen_profile.assurance.certificate.certify import SLACK, Attempt, Progress, 
 from gen_profile.assurance.certificate.document import Certificate, certificate_path, damaged, encode, parse
 from gen_profile.assurance.certificate.in_order import in_order
 from gen_profile.assurance.certificate.rechecking import not_covered
-from gen_profile.assurance.certificate.sway_limits import ProvedSway, SwayBounds, limits_of, unproved
+from gen_profile.assurance.certificate.sway_limits import (
+    ProvedClearance,
+    ProvedSway,
+    SwayBounds,
+    limits_of,
+    unproved,
+)
 from gen_profile.assurance.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.assurance.verification.origin import spec_and_manifest
 from gen_profile.assurance.verification.plausibility import another_move
@@ -80,7 +86,8 @@ def check_certificate(
     artefact = _read(path, spec)
     claimed = parse(read_artefact(certificate))
     theorem = _require_about(claimed, artefact)
-    stated = np.array([sway.bound for sway in claimed.sways])
+    nearer = [] if claimed.clearance is None else [claimed.clearance.nearer]
+    stated = np.array([*(sway.bound for sway in claimed.sways), *nearer], dtype=np.float64)
     bounds, largest_met, done = np.zeros(len(stated)), np.zeros(len(stated)), 0
     for count, again in in_order(
         partial(_bound_again, theorem, claimed, stated), theorem.batches(range(len(claimed.boxes)))
@@ -89,22 +96,25 @@ def check_certificate(
         largest_met = np.fmax(largest_met, again.largest_met.max(axis=0))
         done += count
         progress(done, len(claimed.boxes))
-    for sway, said, bound in zip(claimed.sways, stated.tolist(), bounds.tolist(), strict=True):
+    names = [*(sway.limit.load for sway in claimed.sways), "missing clearance"]
+    for name, said, bound in zip(names, stated.tolist(), bounds.tolist(), strict=False):
         if math.isnan(bound):
             raise CertificateError(
-                f"The certificate does not prove what it says: no bound of the {sway.limit.load} follows "
+                f"The certificate does not prove what it says: no bound of the {name} follows "
                 f"from its boxes, and it states {1e3 * said:.4g} mm."
             )
         if not bound <= said:
             raise CertificateError(
-                f"The certificate does not prove what it says: the {sway.limit.load} is bounded by "
+                f"The certificate does not prove what it says: the {name} is bounded by "
                 f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
             )
-    met = zip(claimed.sways, largest_met.tolist(), strict=True)
+    met = zip(claimed.sways, largest_met.tolist(), strict=False)
     sways = tuple(attrs.evolve(sway, largest_met=most) for sway, most in met)
+    clearance = claimed.clearance and attrs.evolve(claimed.clearance, largest_met=float(largest_met[-1]))
     return attrs.evolve(
         claimed,
         sways=sways,
+        clearance=clearance,
         not_rechecked=not_covered(artefact.path, artefact.spec),
         unproved=unproved(artefact.spec),
     )
@@ -141,10 +151,13 @@ def _read(path: Path, spec: Spec | None) -> _Artefact:
 def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certificate:
     """State what came out."""
     theorem = result.theorem
-    bounds = [None] * len(theorem.limits)
+    bounds, met = [None] * len(theorem.allowed), result.largest_met.tolist()
     if result.boxes:
         bounds = (result.bounds.max(axis=0) * (1.0 + SLACK)).tolist()
-    sways = zip(theorem.limits, bounds, result.largest_met.tolist(), strict=True)
+    sways = zip(theorem.limits, bounds, met, strict=False)
+    clearance = None
+    if artefact.spec.path is not None:
+        clearance = ProvedClearance(nearer=bounds[-1], largest_met=met[-1])
     return Certificate(
         spec_sha256=artefact.spec_sha256,
         artefact_sha256=artefact.sha256,
@@ -156,6 +169,7 @@ def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certific
             ProvedSway(limit=limit, bound=bound, largest_met=largest_met)
             for limit, bound, largest_met in sways
         ),
+        clearance=clearance,
         fraction=result.fraction,
         axes=theorem.axes,
         boxes=result.boxes,
@@ -194,7 +208,9 @@ def _require_about(claimed: Certificate, artefact: _Artefact) -> Theorem:
     if not len(claimed.boxes) == len(claimed.motions) == len(claimed.scales):
         raise CertificateError("The certificate is damaged: its arrays do not fit together.")
     whole = dict(claimed.ranges) == theorem.ranges.ends and covers(claimed.boxes)
-    if not (whole and theorem.limits == limits_of(artefact.spec) and claimed.proved):
+    same = theorem.limits == limits_of(artefact.spec)
+    same = same and (claimed.clearance is None) == (artefact.spec.path is None)
+    if not (whole and same and claimed.proved):
         raise CertificateError("The certificate does not cover all machines and limits of the spec.")
     watched = (
         isclose(claimed.until, theorem.until, rel_tol=SAME_TIME) and claimed.until <= claimed.axes.knots[-1]

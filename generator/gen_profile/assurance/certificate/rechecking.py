@@ -13,6 +13,7 @@ def not_covered(path: PurePath, spec: Spec) -> tuple[str, ...]:
     table = export.csv_dialect == "rfc4180" and "position" in export.csv_columns
     covered = {
         f"machines of type {plant.type}": plant.file is None and is_built_in(plant.type),
+        "the clearance of a path": spec.path is None,
         "drives that lag behind their setpoints": spec.actuator.tau is None,
         f"such {format_of(path)} files": {"plc": True, "csv": table}.get(format_of(path), False),
     }

@@ -5,6 +5,7 @@ import attrs
 from gen_profile.assurance.certificate.arithmetic.balls import Array
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE
 from gen_profile.spec.model import Spec
+from gen_profile.spec.stacks import ROOM_TOLERANCE
 
 
 @attrs.frozen(kw_only=True)
@@ -67,6 +68,37 @@ def limits_of(spec: Spec) -> tuple[SwayLimit, ...]:
     return (*after, SwayLimit(load=spec.machine().end_load_name, allowed=allowed, on_the_way=True))
 
 
+@attrs.frozen(kw_only=True)
+class ProvedClearance:
+    """What is proved of how near bodies come to what stands in their way.
+
+    Attributes
+    ----------
+    nearer : float or None
+        Proved bound in m of by how much nearer than the clearance any body comes, on any machine.
+    largest_met : float
+        By how much nearer one was met, in m; of it nothing is proved.
+    """
+
+    nearer: float | None
+    largest_met: float
+    allowed: float = ROOM_TOLERANCE
+
+    def to_dict(self) -> dict[str, float | None]:
+        """Give plain values for JSON."""
+        return {"nearer_m": self.nearer, "allowed_m": self.allowed, "largest_met_m": self.largest_met}
+
+    @property
+    def reason(self) -> str | None:
+        """Say that it is not proved to be kept; nothing where it is, or where there is no bound."""
+        if self.nearer is None or self.nearer <= self.allowed:
+            return None
+        return (
+            f"Loads are proved to come nearer than path.clearance by at most {1e3 * self.nearer:.4g} mm, and "
+            f"{1e3 * self.allowed:.4g} mm are allowed; they were met {1e3 * self.largest_met:.4g} mm nearer."
+        )
+
+
 def unproved(spec: Spec) -> tuple[str, ...]:
     """List the limits that no bound is proved of: bounds are of sways, and not of where loads are."""
     return () if spec.limits.overshoot is None else ("limits.overshoot",)
@@ -95,9 +127,9 @@ class SwayBounds:
     Attributes
     ----------
     sway : (boxes, watches) array
-        Greatest sway in m.
+        Greatest sway in m; where clearances are watched, one more column of by how much less they are.
     largest_met : (boxes, watches) array
-        Greatest sway in m that the approximation has at some nodes; nothing is proved of it.
+        Likewise what the approximation has at some nodes; nothing is proved of it.
     """
 
     sway: Array

@@ -8,18 +8,21 @@ from typing import TypeVar
 import attrs
 import numpy as np
 
+from gen_profile.assurance.certificate.approximate_motions import Approximation
 from gen_profile.assurance.certificate.arithmetic.balls import Array
 from gen_profile.assurance.certificate.axes.axis_motion import AxisMotion, Gap, gap_between
 from gen_profile.assurance.certificate.axes.axis_track import Track, track_of
 from gen_profile.assurance.certificate.boxes import DyadicBox, Ranges
-from gen_profile.assurance.certificate.enclosure import TIME_NODES, Approximation, Enclosure, nodes_for
+from gen_profile.assurance.certificate.enclosure import TIME_NODES, Enclosure, nodes_for
 from gen_profile.assurance.certificate.equations import EnclosedEquations, enclosed_equations
 from gen_profile.assurance.certificate.scaling import Scaling
 from gen_profile.assurance.certificate.sway_limits import SwayLimit, WatchedSway
+from gen_profile.dynamics.evaluation.clearance import zones_of
 from gen_profile.dynamics.evaluation.residual_sway import observation_time
 from gen_profile.dynamics.problem.initial_state import initial_state
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
+from gen_profile.spec.stacks import ROOM_TOLERANCE
 from gen_profile.support.errors import CertificateError
 
 T = TypeVar("T")
@@ -135,7 +138,13 @@ class Theorem:
     @cached_property
     def equations(self) -> EnclosedEquations:
         """Of the machine."""
-        return enclosed_equations(self.spec.machine())
+        return enclosed_equations(self.spec.machine(), self.spec.path is not None)
+
+    @property
+    def allowed(self) -> Array:
+        """Limits in m, and where there are zones by how much nearer than the clearance bodies may come."""
+        nearer = [] if self.spec.path is None else [ROOM_TOLERANCE]
+        return np.array([*(limit.allowed for limit in self.limits), *nearer])
 
     @cached_property
     def track(self) -> Track:
@@ -157,6 +166,7 @@ class Theorem:
             axes=self.axes,
             gap=self.gap,
             watches=self._watches(),
+            zones=zones_of(self.spec),
             approximation=Approximation(
                 lower=lower,
                 upper=upper,

@@ -10,14 +10,13 @@ from gen_profile.dynamics.evaluation.clearance import Nearest
 from gen_profile.dynamics.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
 from gen_profile.dynamics.evaluation.static_deflection import StaticDeflection
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE
-from gen_profile.spec.stacks import StacksSpec
+from gen_profile.spec.stacks import ROOM_TOLERANCE, StacksSpec
 from gen_profile.support.errors import CheckFailed
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.summary import Drawable, Tabled
 
 QUANTILES = (0.5, 0.9, 0.99)  # of the residual sways of a group, as they are reported
 FINE = 1e3  # µm, up to which an error is shown in these
-ROOM_TOLERANCE = 5e-4  # m, by which a load may be nearer to a stack than the clearance
 MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed: a manifest must not hold thousands
 
 

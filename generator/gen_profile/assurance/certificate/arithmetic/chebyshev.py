@@ -211,7 +211,7 @@ def greatest(series: Array, off: Array, target: float) -> float:
         items, missing = waiting.pop()
         if not (np.isfinite(items).all() and np.isfinite(missing).all()):
             return float("nan")
-        largest = max(largest, float(np.abs(_turned([_ends(n) for n in items.shape[1:]], items)).max()))
+        largest = max(largest, float(np.abs(_turned([ends(n) for n in items.shape[1:]], items)).max()))
         sizes = (_sum(np.abs(items), variables).ravel() + missing) * ROUND_UP
         wide = sizes > max(target, NEAR * largest)
         work += items.size
@@ -255,7 +255,7 @@ def _halved(items: Array, off: Array) -> list[tuple[Array, Array]]:
 
 
 @cache
-def _ends(terms: int) -> Array:
+def ends(terms: int) -> Array:
     """Matrix from coefficients to values at −1, 0 and 1."""
     power = np.arange(terms)
     return np.array([(-1.0) ** power, np.cos(0.5 * np.pi * power), np.ones(terms)])
