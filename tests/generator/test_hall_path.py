@@ -104,6 +104,10 @@ class TestMotion:
         plan = gp.plan(hall(move=move))
         assert worst_of(plan, plan.motion, (0.9, 1.0, 1.1)) <= NEARER
 
+    def test_without_robustness(self):
+        found = gp.plan(hall(robustness={"method": None, "uncertain": None}))
+        assert worst_of(found, found.motion, (1.0,)) <= NEARER
+
     @pytest.mark.slow
     def test_a_gantry_without_a_hook(self):
         """Its load is a hook block of the oracle's with next to nothing below it."""

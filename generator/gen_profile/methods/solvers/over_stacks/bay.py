@@ -99,7 +99,7 @@ class Bay:
         """State of the nominal machine at the start, sensitivities included."""
         state = np.zeros(self.nominal.states)
         state[0] = self._along(self.spec.move.start)
-        swing = initial_state(self.plant, self.spec.move.initial)
+        swing = initial_state(self.plant, self.spec.move.initial).reshape(2, -1)[:, list(self.moving)].ravel()
         state[3 : 3 + len(swing)] = swing
         return state
 

@@ -270,6 +270,7 @@ def sketched(spec: Spec) -> Array | None:
         m, along the line and above the suspension.
     """
     bay = bay_of(spec, RESERVE).alone()
+    bay = attrs.evolve(bay, nominal=bay.others)  # without sensitivities
     planner, lifted = _Planner(bay=bay), partial(bay.lifted, top=bay.top)
     course: Course | None = None
     if spec.move.shortest:
