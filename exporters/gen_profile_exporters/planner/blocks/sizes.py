@@ -20,7 +20,7 @@ from gen_profile_exporters.planner.sensor_constants import cycle_work
 LONGEST, SLOWEST, FEWEST = 64, 96, 40
 FOLLOWED_WORK = 3_700  # operations of a slot for each of them, of a machine that is followed
 AROUND = 16  # slots more than an axis takes to rest, of a decline
-MACHINES = 33  # that are watched, where there are operations for them
+MACHINES = 28  # that are watched, where there are operations for them
 ENDS = (-1.0, 1.0)  # shares of the errors, of the machines that programmes have rows of
 BETWEEN = 14  # more that are weighed of a machine that is followed, where there are operations for them:
 OF_CYCLE, OF_MODEL, OF_SLOT = 10, 4, 12  # parts of operations: to follow them, for a model, to foresee them
