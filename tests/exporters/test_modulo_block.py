@@ -309,6 +309,17 @@ def test_vendors_forms_are_read_back_and_have_no_cam(name, layout, tables):
         exporter.replay(files[0].content, attrs.evolve(goal, axes=(attrs.evolve(axis, modulo=None),)))
 
 
+@pytest.mark.parametrize("tables", ["constants", "variables"])
+@pytest.mark.parametrize("name", ["plc", "plcopen-xml", "twincat", "siemens-scl"])
+def test_forms_of_two_axes_are_read_back(name, tables):
+    options = {"cycle_time": CYCLE, "unit": "deg", "start": 0.0, "export": {"plc_tables": tables}}
+    goal = target("slew", "radius", **options)
+    goal = attrs.evolve(goal, axes=(attrs.evolve(goal.axes[0], modulo=360.0), goal.axes[1]))
+    move, exporter = quintic((6.0, 20.0), (-0.5, 7.0), duration=3.0), find_exporter(name)
+    back = exporter.replay(exporter.encode(move, goal)[0].content, goal)
+    assert back.position[-1] == pytest.approx(move.target, abs=1e-6)
+
+
 @pytest.mark.parametrize("turn", [0, 3, -2])
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("move", MOVES)

@@ -129,8 +129,10 @@ def _portable(match: re.Match[str], text: str, target: Target) -> BlockSource:
     )
     tables = [variable for variable in source.variables if _is_table(variable)]
     others = [variable for variable in source.variables if not _is_table(variable)]
-    section = "VAR" if is_buffered(source) else "VAR CONSTANT"  # of arrays, which SCL has no constants of
-    constants = [attrs.evolve(variable, section=section) for variable in tables]
+    # of arrays, which SCL has no constants of; what an axis is, is no number that a buffer holds
+    sections = dict.fromkeys(("cModulo", "cModuloLow"), "VAR CONSTANT")
+    section = "VAR" if is_buffered(source) else "VAR CONSTANT"
+    constants = [attrs.evolve(v, section=sections.get(v.name, section)) for v in tables]
     back = attrs.evolve(source, variables=(*others, *constants))
     has_modulo = any(variable.name == "cModulo" for variable in source.variables)
     names = variable_names(BlockShape(layout_of(text), len(target.axes), has_modulo=has_modulo))
