@@ -5,7 +5,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from generator.hall import BOXES, LIMITS, MACHINE, hall, shortage, two_masses
+from generator.hall import BOXES, LIMITS, MACHINE, RAIL, hall, shortage, two_masses
 from generator.quay import quay
 
 import gen_profile as gp
@@ -20,6 +20,7 @@ from gen_profile.presentation.studio.curves_json import side_json
 from gen_profile.spec.plan_view import Area, Line
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
+BESIDE = [8.0, 10.0, 6.0, 9.0, 8.0]  # ropes run past it, and the load is below it in part
 NEARER = 5e-4  # m, by which no machine may come nearer to a stack than the clearance
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -109,6 +110,21 @@ class TestMotion:
         assert worst_of(found, found.motion, (1.0,)) <= NEARER
 
     @pytest.mark.slow
+    def test_below_what_is_overhead_beside_the_way(self):
+        spec = hall(path={"overhead": [BESIDE], "stacks": [BOXES[1]]})
+        plan = gp.plan(spec)
+        times, (wide, deep, high) = np.linspace(0.0, plan.motion.duration, 12001), spec.path.size(1, 2)
+        west, east, south, north, under = BESIDE
+        for rope in (0.9, 1.0, 1.1):
+            _, load = two_masses(plan.motion, {**MACHINE, "L0": rope * MACHINE["L0"]}, times)
+            x, y, z = load.T
+            gaps = [west - x - wide / 2.0, x - wide / 2.0 - east]
+            gaps += [south - y - deep / 2.0, y - deep / 2.0 - north]
+            below = under - RAIL - (z + high / 2.0) - 0.5
+            assert np.maximum(np.maximum.reduce(gaps) - 0.3, below).min() >= -NEARER
+        assert worst_of(plan, plan.motion, (0.9, 1.1)) <= NEARER
+
+    @pytest.mark.slow
     def test_a_gantry_without_a_hook(self):
         """Its load is a hook block of the oracle's with next to nothing below it."""
         document, axes = hall().to_dict(), ("bridge", "trolley", "hoist")
@@ -151,7 +167,7 @@ class TestCheck:
         assert -judged.check.nearest.room == pytest.approx(worst, abs=2e-3)
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("overhead", [[], [[8.0, 14.0, 0.0, 15.0, 8.0]]])
+    @pytest.mark.parametrize("overhead", [[], [BESIDE]])
     def test_the_compiled_loop_finds_the_same_room(self, plan, overhead):
         spec, setpoints = gp.evolve_spec(plan.spec, path={"overhead": overhead}), sample(plan.command, 0.01)
         plant, feed = spec.machine(), Feed(times=setpoints.times, position=setpoints.position)
@@ -175,6 +191,11 @@ class TestRefusals:
             ({"path": {"stacks": [[8.0, 12.0, 9.0, 2.0, 4.0]]}}, "path.stacks.0: must begin before where"),
             ({"path": {"stacks": [[8.0, 12.0, 9.0, 2.0]]}}, "path.stacks.0: must be three numbers in m"),
             ({"path": {"load": [1.0, 2.0, 3.0, 4.0]}}, "path.load: must be two numbers in m"),
+            (
+                {"path": {"overhead": [[20.0, 21.0, 10.0]]}},
+                "path.overhead.0: ropes would run through it, from 18.9 m on along the straight way of 25.6",
+            ),
+            ({"path": {"overhead": [[*BESIDE[:2], 5.2, *BESIDE[3:]]]}}, "path.overhead.0: ropes would run"),
             ({"move": {"initial": {"theta1_x": 0.1}}}, "move.initial: a path of two horizontal axes begins"),
             (
                 {"move": {"start": [10.0, 5.0, 6.0]}},
@@ -186,6 +207,10 @@ class TestRefusals:
         with pytest.raises(gp.SpecError) as refusal:
             hall(**tables)
         assert any(fault.startswith(sentence) for fault in refusal.value.faults), refusal.value.faults
+
+    def test_ropes_run_past_what_is_overhead_beside_the_way_or_behind_its_ends(self):
+        beyond = [[0.0, 1.0, 10.0], [28.0, 30.0, 10.0]]
+        assert len(hall(path={"overhead": [*beyond, BESIDE]}).path.overhead) == 3
 
     def test_boxes_are_not_for_one_horizontal_axis(self):
         with pytest.raises(gp.SpecError, match=r"path\.stacks\.0: the machine has one horizontal axis"):

@@ -6,7 +6,16 @@ import numpy as np
 
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
-from gen_profile.spec.stacks import MOST_STACKS, PathAxes, Place, StackZone, hanging, path_axes, zones
+from gen_profile.spec.stacks import (
+    MOST_STACKS,
+    PathAxes,
+    Place,
+    StacksSpec,
+    StackZone,
+    hanging,
+    path_axes,
+    zones,
+)
 from gen_profile.support.errors import SpecError
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
@@ -92,12 +101,27 @@ def _in_plan_view(spec: Spec, axes: PathAxes) -> Iterator[Fault]:
                 "move.initial",
                 "a path of two horizontal axes begins with the load hanging still; remove it",
             )
+        yield from _ropes(spec, spec.path, axes)
         return
     for key, rows in (("stacks", spec.path.stacks), ("overhead", spec.path.overhead)):
         for number, row in enumerate(rows):
             if len(row) != 3:
                 template = "the machine has one horizontal axis; state three numbers: from, to and height"
                 yield f"path.{key}.{number}", template
+
+
+def _ropes(spec: Spec, path: StacksSpec, axes: PathAxes) -> Iterator[Fault]:
+    """Refuse a straight way on which ropes, in the plane above it, would run through what is overhead."""
+    line, sideways = axes.line(spec.move.start, spec.move.target), path.clearances[0]
+    whole = float(line.along(np.array([spec.move.target[axis] for axis in axes.along])))
+    for number in range(len(path.overhead)):
+        span = line.span(path.area(len(path.stacks) + number).widened(sideways, sideways))
+        if span is not None and span[0] < whole and span[1] > 0.0:
+            template = (
+                "ropes would run through it, from {low:.3g} m on along the straight way of {whole:.3g} m; "
+                "move the start or the target, or allow a smaller path.clearance"
+            )
+            yield f"path.overhead.{number}", Phrase(template, low=max(span[0], 0.0), whole=whole)
 
 
 def _rates(spec: Spec, plant: Plant, hoist: int) -> Iterator[Fault]:
