@@ -25,7 +25,8 @@ def rows() -> list[list[str]]:
         for cell in line:
             nearest = min(range(len(columns)), key=lambda column: abs(columns[column] - cell.start()))
             cells[nearest] = cell[0]
-        if cells[0] and cells[1]:
+        goes_on = bool(laid_out) and laid_out[-1][0] == "prompt"  # to a prompt stop
+        if cells[0] and cells[1] and not goes_on:
             laid_out.append(cells)
         else:
             laid_out[-1] = [
