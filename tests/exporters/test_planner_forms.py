@@ -90,6 +90,13 @@ def test_a_block_of_variables_reads_back_from_every_container(block, name, tmp_p
     assert back.program() == parse_function_block(block.text).program()
 
 
+@pytest.mark.parametrize("name", containers())
+def test_a_block_reads_back_before_its_files_stand_in_a_folder(block, name):
+    first, *_ = files = block_files(block, SPEC, [name])
+    back = block_in(Path(first.filename), first.content, {file.filename: file.content for file in files})
+    assert parse_function_block(back).program() == parse_function_block(block.text).program()
+
+
 @pytest.mark.parametrize("tables", ["constants", "variables"])
 def test_a_block_larger_than_a_data_block_is_told_what_makes_a_planner_smaller(block, monkeypatch, tables):
     monkeypatch.setattr(siemens_scl, "MOST_BYTES", 1000)

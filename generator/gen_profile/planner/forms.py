@@ -146,18 +146,19 @@ def read_block(path: Path) -> str:
     return text
 
 
-def block_in(path: Path, content: bytes) -> str:
+def block_in(path: Path, content: bytes, written: Mapping[str, bytes] | None = None) -> str:
     """Read a function block's text out of what a file holds; raises as `read_block` does.
 
-    A planner block whose numbers are variables is given with constants, as it plans by these.
+    A planner block whose numbers are variables is given with constants, as it plans by these. Files of blocks
+    within it are read beside it, where what was written does not hold them by name.
     """
-    text = _text_in(path, content)
+    text = _text_in(path, content, written or {})
     if TABLE in text and is_planner(text) and is_buffered(source := parse_function_block(text)):
         return constant_planner(source).text()
     return text
 
 
-def _text_in(path: Path, content: bytes) -> str:
+def _text_in(path: Path, content: bytes, written: Mapping[str, bytes]) -> str:
     try:
         format_ = container_of(path)
     except SpecError:
@@ -168,7 +169,9 @@ def _text_in(path: Path, content: bytes) -> str:
     container = find_container(format_)
 
     def beside(name: str) -> BlockSource:
-        return container.unwrap(read_artefact(path.with_name(f"{name}{path.suffix}"), what=WHAT), target)
+        file = path.with_name(f"{name}{path.suffix}")
+        content = written[file.name] if file.name in written else read_artefact(file, what=WHAT)
+        return container.unwrap(content, target)
 
     source = container.unwrap(content, target)
     return (_with_others(source, beside) if is_planner(source.text()) else source).text()

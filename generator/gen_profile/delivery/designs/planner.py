@@ -138,5 +138,7 @@ def deploy_planner(
 
 def _executed(block: PlannerBlock, written: Mapping[str, bytes]) -> str:
     """Read the text that is proved out of the first file that holds it; programs hold its translation."""
-    texts = (block_in(Path(name), content) for name, content in written.items() if not is_program(name))
+    texts = (
+        block_in(Path(name), content, written) for name, content in written.items() if not is_program(name)
+    )
     return next(texts, block.text)
