@@ -11,7 +11,7 @@ TEXTS = [
     path
     for suffix in ("st", "c", "h", "xml", "txt")
     for path in FOLDER.rglob(f"*.{suffix}")
-    if path.parent.name != "blocks" and "planner/text" not in path.as_posix()
+    if path.parent.name != "blocks"
 ]
 
 

@@ -13,7 +13,7 @@ SLOTS_PER_PERIOD = 20.0  # of the slowest mode
 REACTION = 4.0  # slots, in which a new command is obeyed
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command
 WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
-TEXT = Path(__file__).with_name("interface.st")
+TEXT = Path(__file__).parent / "blocks/interface.st"
 
 
 def interface(constants: PlannerConstants) -> str:
