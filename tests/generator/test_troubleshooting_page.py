@@ -27,7 +27,7 @@ PLAYBACK, PLAYBACK_WRAPPER = (
     (BLOCKS / "playback" / "text" / name).read_text("utf-8") for name in ("block.st", "axis_wrapper.st")
 )
 PLANNER, PLANNER_WRAPPER = (
-    (BLOCKS / "planner" / name).read_text("utf-8") for name in ("interface.st", "axis_wrapper.st")
+    (BLOCKS / "planner" / name).read_text("utf-8") for name in ("blocks/interface.st", "axis_wrapper.st")
 )
 WRAPPERS = numbers(PLAYBACK_WRAPPER, "nErrorId")
 LISTED = [
