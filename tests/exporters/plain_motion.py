@@ -4,7 +4,7 @@ TEXT = """
 FUNCTION_BLOCK @name
 VAR_INPUT
     bBegin : BOOL; bForget : BOOL; fBeginAt : LREAL; nAxis : DINT; nOperations : DINT; nCommand : DINT;
-    fGoal : LREAL; bNew : BOOL; fLimit : LREAL; fLowest : LREAL; fHighest : LREAL;
+    fGoal : LREAL; bNew : BOOL; bPrompt : BOOL; fLimit : LREAL; fLowest : LREAL; fHighest : LREAL;
 END_VAR
 VAR_IN_OUT aLive : ARRAY [0..@last_live] OF LREAL; END_VAR
 VAR_OUTPUT

@@ -117,14 +117,23 @@ def test_a_speed_is_another_one_beyond_its_band_and_the_end_where_there_is_no_ro
     assert table.command(SPEED, 0.0)["nDoes"] == STOP
 
 
-def test_a_prompt_stop_that_fails_may_leave_four_times_as_much_and_then_is_a_quiet_one(blocks):
-    table, eases = Table(blocks), [1.0]
-    assert table.command(PROMPT)["fEase"] == 1.0
+def test_a_prompt_stop_that_fails_may_leave_16_times_as_much_and_then_is_a_quiet_one(blocks):
+    table, eases = Table(blocks), []
+    assert table.command(PROMPT)["fEase"] == 2.0  # half of what is allowed is for plans
     while (tried := table.ask(CHOOSE, nNow=30.0, fSpeed=1.0))["nKind"] == PROMPTLY:
         assert tried["nLength"] == 29
-        eases.append(table.fails(tried)["fEase"])
-    assert eases[:3] == [1.0, 4.0, 16.0] and eases[-1] > 100.0
+        eases.append(tried["fEase"])
+        table.fails(tried)
+    assert eases == [2.0, 32.0, 512.0]
     assert (tried["nDoes"], tried["nKind"], tried["bThere"]) == (STOP, REST, 1.0)
+
+
+def test_a_stick_that_is_let_go_stops_promptly_where_that_is_asked_for(blocks):
+    for prompt, does in ((0.0, STOP), (1.0, PROMPT)):
+        table = Table(blocks)
+        table.command(SPEED, 0.5, fPlace=20.0, bPrompt=prompt)
+        table.ask(COMMAND, bNew=0.0)
+        assert table.ask(COMMAND, fGoal=0.0)["nDoes"] == does
 
 
 def test_a_prompt_stop_takes_no_more_slots_than_are_committed(blocks):
@@ -133,7 +142,7 @@ def test_a_prompt_stop_takes_no_more_slots_than_are_committed(blocks):
     assert table.ask(CHOOSE, nNow=12.0, fSpeed=1.0)["nLength"] == 12
 
 
-def test_a_prompt_stop_within_levels_is_sought_in_fewer_slots_until_none_is_left_between(blocks):
+def test_a_prompt_stop_that_leaves_what_plans_may_is_sought_in_fewer_slots_until_none_is_left_between(blocks):
     for fewest in range(4, 29):
         table, now = Table(blocks), 29
         table.command(PROMPT)
@@ -149,13 +158,12 @@ def test_a_prompt_stop_within_levels_is_sought_in_fewer_slots_until_none_is_left
         assert now == fewest
 
 
-def test_a_prompt_stop_beyond_levels_is_sought_with_half_the_sway_until_that_fails(blocks):
+def test_a_prompt_stop_that_leaves_more_is_sought_with_half_the_sway_until_that_fails(blocks):
     table = Table(blocks)
     table.command(PROMPT)
-    for _ in range(2):
-        table.fails(table.ask(CHOOSE, nNow=40.0, fSpeed=1.0))
+    table.fails(table.ask(CHOOSE, nNow=40.0, fSpeed=1.0))
     table.ask(CHOOSE)
-    assert table.ask(FOUND, nOfKind=PROMPTLY)["fEase"] == 8.0  # 16 was found
+    assert table.ask(FOUND, nOfKind=PROMPTLY)["fEase"] == 16.0
     tried = table.ask(CHOOSE, nNow=29.0, bLeadsNow=1.0)
     assert (tried["nKind"], tried["nLength"]) == (PROMPTLY, 29)
     table.fails(tried)

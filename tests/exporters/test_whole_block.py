@@ -110,6 +110,17 @@ def test_every_container_reads_back_as_the_same_blocks(spec, block, format_, tmp
     assert parse_function_block(read_block(tmp_path / files[0].filename)).program() == source.program()
 
 
+def test_nothing_is_negated_that_strucpp_takes_for_a_number(block):
+    """It takes two comparisons that are joined for one, and negates flags only."""
+    text = re.sub(r"(?s)\(\*.*?\*\)", "", block.text)
+    for found in re.finditer(r"\bNOT \(", text):
+        end, depth = found.end(), 1
+        while depth:
+            depth += {"(": 1, ")": -1}.get(text[end], 0)
+            end += 1
+        assert len(re.findall(r" (?:<>|[<>]=?|=) ", text[found.end() : end])) <= 1, text[found.start() : end]
+
+
 @pytest.mark.slow
 def test_exported_c_issues_the_same_bits_without_a_warning(spec, block, tmp_path):
     files = [tmp_path / file.filename for file in block_files(block, spec, ["c"])]
@@ -149,6 +160,28 @@ def test_a_target_from_rest_is_reached_to_the_last_bit(changes, rope):
     issued = block.call(np.array([list(row.values()) for row in rows]))[-1]
     last = dict(zip(block.outputs, issued.tolist(), strict=True))
     assert (last["bDone"], last["fPosition"], last["bPromise"]) == (1.0, 12.0, 1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("moves", "stops"),
+    [
+        ({"bExecute": 1.0, "fTarget": 30.0}, {"bStop": 1.0}),
+        ({"bVelocity": 1.0, "fVelocityCommand": 1.0}, {"bVelocity": 1.0}),
+    ],
+    ids=["stop", "stick let go"],
+)
+def test_a_prompt_stop_that_leaves_more_than_is_allowed_withdraws_the_promise_without_stated_errors_too(
+    moves, stops
+):
+    block = BlockInstance(whole_text(parse_spec(BAY, ["planner.operations=12000"])))
+    given = block.inputs | {"fActPosition": 10.0, "bEnable": 1.0, "bPromptStop": 1.0}
+    rows = 400 * [given] + 350 * [given | moves] + 2500 * [given | stops]
+    rows += 8000 * [given | {"bExecute": 1.0, "fTarget": 38.0}]
+    issued = block.call(np.array([list(row.values()) for row in rows]))
+    promise, speed = (issued[:, block.outputs.index(name)] for name in ("nPromise", "fVelocity"))
+    assert promise[749] == 0.0 and promise[3249] == 5.0 and promise[-1] == 0.0
+    assert np.abs(speed[750:3250]).max() < speed[749] + 0.12 and not speed[3000:3250].any()
 
 
 @pytest.mark.slow

@@ -107,6 +107,7 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "slots": slots,
         "polygon": literal(float(np.cos(np.pi / SIDES))),
         "bounds": initialiser([literal(float(v)) for v in _share(constants) * _shares(constants)]),
+        "allowed": literal(constants.sway_limit / (len(constants.axes) * _share(constants))),
         "most": literal(BETWEEN * _stop_share(constants) * _share(constants)),
         "model_work": model_work(constants),
         "modes_constants": constant_lines(_of_modes(constants, watched)),

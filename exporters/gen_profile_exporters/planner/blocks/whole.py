@@ -52,7 +52,7 @@ def _renamed(text: str, name: str, own: str) -> str:
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     varied = c.stated_error > 0.0 and not c.rates
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
-    stated["measured"] = c.sensor is not None
+    stated |= {"exact": not varied, "measured": c.sensor is not None}
     stated["several"] = len(c.axes) > 1
     body = (FOLDER / "shell.st").read_text("ascii")
     words = c.sensor.words if c.sensor else {}
@@ -67,6 +67,8 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         # where a sensor is, it stands to damp
         "goes_on": "(nState = cMoving) OR (nState = cStanding)" if c.sensor else "nState = cMoving",
         "together": "nTogether := nTogether, bHeld := bHeld, " if len(c.axes) > 1 else "",
+        # a rope that changes is calmed on the way, and then while nothing forbids to move
+        "left_for_good": "(nState = cStanding) AND" if c.rates else "",
         "first_suffix": c.axes[0].suffix,
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
         "shell_constants": constant_lines(_constants(c)),
