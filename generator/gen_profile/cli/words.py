@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from gen_profile.studies.sweep.run import Sweep
 
 
+WORTH_TELLING = 1.001  # times the cost, from which on a motion is another one
+VERY_FAR = 0.7  # rad, from which on others were found to cost less although two starts led to the same one
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
 
@@ -65,7 +67,7 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         solver = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
         for cost in solution.other_costs or ():
             times = cost / solution.raise_for_status().cost
-            solver += f"; another start led to {times:.4g} times the cost" if times > 1.001 else ""
+            solver += f"; another start led to {times:.4g} times the cost" if times > WORTH_TELLING else ""
     nominal, worst = (mm(figures[f"sway_residual_{which}_m"]) for which in ("peak", "worst"))
     load = outcome.spec.machine().end_load_name
     rows = [
@@ -365,9 +367,13 @@ def _move(spec: Spec) -> str:
 def alone(outcome: Design) -> Iterator[str]:
     """Warn of a motion that was found from one start only, where others may cost less."""
     solution = outcome.plan.solution
-    if solution is not None and solution.other_costs == ():
+    if solution is None or solution.optimum is None or solution.other_costs is None:
+        return
+    same = all(other < WORTH_TELLING * solution.optimum.cost for other in solution.other_costs)
+    if not solution.other_costs or (same and solution.optimum.angle > VERY_FAR):
+        which = "both starts led to this one" if solution.other_costs else "one start led to one"
         yield (
-            "The load swings so far that there may be several optimal motions, and one start led to one; "
+            f"The load swings so far that there may be several optimal motions, and {which}; "
             "another may cost less. Allow more time (move.duration) if this one asks for too much."
         )
 

@@ -8,7 +8,12 @@ from functools import partial
 import attrs
 import numpy as np
 
-from gen_profile.dynamics.evaluation.simulation import greatest_overshoot
+from gen_profile.dynamics.evaluation.residual_sway import modal_amplitudes
+from gen_profile.dynamics.evaluation.simulation import (
+    TRANSIENT_SAMPLES,
+    PlantSimulation,
+    greatest_overshoot,
+)
 from gen_profile.dynamics.problem.limits import Breach, breaches
 from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.dynamics.problem.overshoot import counted
@@ -31,6 +36,7 @@ from gen_profile.methods.solvers.solution import SIMPLER, WIDER, Solution, Statu
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.values import SolverName
+from gen_profile.support.errors import CosimulationError
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
@@ -54,6 +60,7 @@ BLEND = 4.0  # order of the norm by which these times and the period count toget
 RANGE = 2.0  # times the work for a whole range
 # rad and iterations, from which on a motion may be one of several optimal ones; rad within limits
 SWINGS_FAR, MANY_ITERATIONS, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
+REST = 1e-2  # of the greatest sway on the way, which is left where intervals are too long for a motion
 BETTER = 1.0 - 1e-3  # times the cost of a motion, below which another one is given in its place
 
 
@@ -154,7 +161,24 @@ def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Soluti
         if solution.optimum is not None:
             first = start is not direct.without_limits
             return solution if first else attrs.evolve(solution, other_costs=())
-    return attrs.evolve(nearest.solution, other_costs=()) if nearest.wider <= 1.0 else solution
+    if nearest.wider > 1.0 or not _followed(nearest.solution):
+        return solution
+    return attrs.evolve(nearest.solution, other_costs=())
+
+
+def _followed(solution: Solution) -> bool:
+    """Whether a motion leaves the nominal machine at rest, as it does not on intervals that are too long."""
+    problem = solution.problem
+    if solution.optimum is None:
+        return False
+    motion, machine = optimal_profile(solution), [problem.parameters]
+    try:
+        swing = PlantSimulation(problem.plant, motion, machine, motion.duration, problem.initial)
+        (end,) = swing.at(np.array([motion.duration]))
+        most = np.abs(swing.sway(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))).max()
+    except CosimulationError:
+        return False
+    return bool((modal_amplitudes(problem.plant, problem.parameters, end) <= REST * most).all())
 
 
 def _begun(

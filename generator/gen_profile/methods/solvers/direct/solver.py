@@ -10,6 +10,7 @@ motion can do where angles are small.
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import attrs
 import numpy as np
@@ -48,9 +49,9 @@ ROUGH_STEP = 0.1
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
 BELIEVED = 0.03  # least quotient of steps that is taken for how they go on to shrink
 SLOW_STEPS = 0.3  # fraction of the step before from which on steps are combined; 0.1 and 0.6 change nothing
-BISECTING = 0.6  # fraction of the work that is left, after which a motion on the first mesh will do
+BISECTING = 0.5  # fraction of the work that is left, after which a motion on the first mesh will do
 # likewise, for one that is not quite of least cost on the last mesh, and for one that is on the first
-NEXT_TO_IT, SETTLING = 0.4, 0.9
+NEXT_TO_IT, SETTLING = 0.6, 0.9
 WORTHWHILE = 1e-3  # relative change of the worst case worth another program; 1e-4 changes costs by 4e-7
 LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
 CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
@@ -229,6 +230,8 @@ def solve(
             result = refined(start, goal)
         else:
             result = sequence(start, goal, COARSE_STEP if coarse else None)
+            if result.verdict is ConicStatus.FAILED and not coarse:
+                result = settled(result)
         setup, start, iterations = result.setup, result.iterate, iterations + result.iterations
         return conclude(result, iterations)
 
@@ -292,11 +295,12 @@ def refined(start: Iterate, goal: Goal) -> ProgramSequence:
         return result
     if not begun:
         raise OutOfWork
-    others = (
-        afford(lambda: near_by(*begun[-1]), NEXT_TO_IT * left()),
-        afford(lambda: sequence(*begun[0]), SETTLING * left()),
-    )
-    ends = [end for end in (*others, result) if end is not None]
+    # where the finest mesh takes too much work, one of half as many bisections may do
+    near = None
+    for mesh in dict.fromkeys([len(begun) - 1, len(begun) // 2]):
+        near = near or afford(partial(near_by, *begun[mesh]), NEXT_TO_IT * left())
+    first = afford(lambda: sequence(*begun[0]), SETTLING * left())
+    ends = [end for end in (near, first, result) if end is not None]
     if not ends:
         raise OutOfWork
 
@@ -313,6 +317,15 @@ def near_by(start: Iterate, goal: Goal) -> ProgramSequence:
     for the least departure do so in a few steps, and cost hardly more if the motion was nearly the cheapest.
     """
     return sequence(start, attrs.evolve(goal, nearest=start))
+
+
+def settled(result: ProgramSequence) -> ProgramSequence:
+    """Begin again at the motion next to one at which programs did not settle."""
+    near = near_by(result.iterate, result.goal)
+    if near.verdict is not ConicStatus.SOLVED:
+        return result
+    again = sequence(near.iterate, result.goal)
+    return attrs.evolve(again, solutions=result.solutions + near.solutions + again.solutions)
 
 
 def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> ProgramSequence:
