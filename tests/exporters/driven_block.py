@@ -1,7 +1,12 @@
 """The planner block of a bay crane, driven: what it issues, its limits, and what it leaves swinging."""
 
+import re
+
 import numpy as np
 from exporters.counted_block import CountedBlock, compile_counting
+
+from gen_profile.planner.design import planner_constants
+from gen_profile_exporters.planner.blocks.sizes import operations
 
 G = 9.81
 VELOCITY, ACCELERATION, JERK, LOW, HIGH = 1.0, 0.3, 1.0, 0.0, 40.0
@@ -11,7 +16,7 @@ name = "bay 3"
 plant = {{ type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }}
 move = {{ distance = 8.0, duration = 14.0 }}
 limits = {{ velocity = {VELOCITY}, acceleration = {ACCELERATION}, jerk = {JERK}, travel = [{LOW}, {HIGH}] }}
-planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }}, operations = 3000 }}
+planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
 export = {{ cycle_time = {CYCLE} }}
 """
 
@@ -31,6 +36,16 @@ class Driver:
     @property
     def outputs(self):
         return {name: np.concatenate([part[name] for part in self.parts]) for name in self.block.outputs}
+
+
+def most_operations(spec):
+    """Those that a cycle may take."""
+    return operations(planner_constants(spec)[1])
+
+
+def reaction(text):
+    """Time in s within which a new command is obeyed, as the block's header states it."""
+    return float(re.search(r"obeyed\s+within ([\d.e+-]+) s", text)[1])
 
 
 def frequencies(L1, m2, m1=350.0, L2=1.5):

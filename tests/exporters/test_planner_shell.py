@@ -19,8 +19,7 @@ from gen_profile_exporters.planner.blocks.whole import around
 pytestmark = pytest.mark.slow
 
 CYCLE, START = 0.004, 10.0
-MACHINE = BAY.replace("operations = 3000", "operations = 5000")
-SPEC = parse_spec(MACHINE, ["planner.zones=true", "planner.events=true"])
+SPEC = parse_spec(BAY, ["planner.zones=true", "planner.events=true"])
 LIMITS = {"fVelocity": 1.0, "fAcceleration": 0.3}
 
 
@@ -275,7 +274,7 @@ def test_random_inputs_keep_the_rules_of_the_signals(text):
 
 
 def test_the_interpreter_issues_the_same_bits():
-    constants = planner_constants(parse_spec(MACHINE))[1]
+    constants = planner_constants(parse_spec(BAY))[1]
     text = around(plain_motion(constants), constants)
     block = CountedBlock(compile_counting(text), bEnable=0.0)
     rows = random_rows(block.inputs, 100_000, seed=3)
