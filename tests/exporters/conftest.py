@@ -38,11 +38,6 @@ def tc6_schema():
 
 # What the planner block does not do yet, by name: one that it does is to be taken out.
 NOT_YET = {
-    "test_planner_obedience": {
-        # the promise is withdrawn
-        "test_what_an_axis_does_by_hand_is_followed_and_calmed[8.0-1.0-1]",
-        "test_what_an_axis_does_by_hand_is_followed_and_calmed[3.0-1.0-1]",
-    },
     "test_planner_promise": {
         # alters today's text
         "test_a_block_that_forgets_what_was_left_breaks_it",

@@ -151,7 +151,7 @@ def test_what_an_axis_does_by_hand_is_followed_and_calmed(hoisting, seconds, sca
     way = scale * CYCLE * np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2.0)])
     for v, x in zip(velocity, 5.0 + way, strict=True):
         driver.hold(CYCLE, bEnable=0, fActPosition=x, fActVelocity=v)
-    driver.hold(90.0, bEnable=1, fActPosition=x + CYCLE * v)
+    driver.hold(130.0, bEnable=1, fActPosition=x + CYCLE * v)
     assert (last(driver, "bPromise"), last(driver, "bBusy")) == (promise, 0)
     out = driver.outputs
     acceleration = np.diff(out["fVelocity"], prepend=0.0) / CYCLE  # by hand, too

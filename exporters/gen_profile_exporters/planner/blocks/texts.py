@@ -132,10 +132,11 @@ def _following(constants: PlannerConstants, account: str | None) -> dict[str, st
     """Fill what depends on whether an account follows the machine, and on whether the load is measured."""
     several = len(constants.axes) > 1
     straight = several or constants.sensor is not None
+    left = f"damping.nLittle < {LITTLE}" if constants.sensor else "table.bCalms AND (table.nPartly > 0)"
     return {
         "follows": int(account is not None),
         "is_measured": int(constants.sensor is not None),
-        "measured": f"bMeasured := damping.nLittle < {LITTLE}," if constants.sensor else "",
+        "left": f"bLeft := {left}," if account else "",
         "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
         "unmeasured": "bUncalm" if constants.rates else "FALSE",
         "calm_slots": LITTLE,

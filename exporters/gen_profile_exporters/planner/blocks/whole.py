@@ -52,7 +52,7 @@ def _renamed(text: str, name: str, own: str) -> str:
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     varied = c.stated_error > 0.0 and not c.rates
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
-    stated |= {"exact": not varied, "measured": c.sensor is not None}
+    stated |= {"exact": not varied, "measured": c.sensor is not None, "stays": not c.rates}
     stated["several"] = len(c.axes) > 1
     body = (FOLDER / "shell.st").read_text("ascii")
     words = c.sensor.words if c.sensor else {}
