@@ -5,10 +5,9 @@ import pytest
 from exporters.counted_block import CountedBlock, compile_counting
 from exporters.measured_machines import MeasuredCrane
 
-from gen_profile.planner.design import planner_block, planner_constants
+from gen_profile.planner.design import planner_block
 from gen_profile.planner.margins import WATCHES, sensor_margins
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.whole import whole_block
 
 ROPE, AGE = 4.0, 0.1
 SENSOR = f'planner.sensor={{quantity="angle", of="theta1", noise=0.002, delay=[{AGE}, {AGE}]}}'
@@ -23,11 +22,9 @@ def spec():
     return preset_spec("bay-crane", CHANGES)
 
 
-@pytest.fixture(scope="module", params=["one body", "blocks"])
-def text(request, spec):
-    return (
-        planner_block(spec).text if request.param == "one body" else whole_block(planner_constants(spec)[1])
-    )
+@pytest.fixture(scope="module")
+def text(spec):
+    return planner_block(spec).text
 
 
 @pytest.mark.slow

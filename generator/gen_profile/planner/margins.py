@@ -30,10 +30,7 @@ GAINS = 1.5  # likewise, the ratio of gains
 MOST_DELAY, MOST_GAIN = 1.0, 12.0  # of the period; and what is tried at most
 HALVINGS = 3  # of the last step
 STEP = 0.05  # rad of the fastest swing, an integration step at most
-WATCHES = re.compile(
-    r"\b((?:cSensor(?:Scale|Frozen|Gate|Most|Noisy)|cDampMost|cMisread|cFrozen|cGate|cMost|cMostNoise|cGrown)"
-    r"\s*:\s*LREAL\s*:=)[^;]*"
-)
+WATCHES = re.compile(r"\b((?:cMisread|cFrozen|cGate|cMost|cMostNoise|cGrown)\s*:\s*LREAL\s*:=)[^;]*")
 
 
 @attrs.frozen(kw_only=True)
