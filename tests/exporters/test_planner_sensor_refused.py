@@ -41,7 +41,6 @@ REFUSED = {
     "of": (['planner.sensor.of="theta3"'], "planner.sensor.of: no coordinate that swings"),
     "noise": (["planner.sensor.noise=0.02"], "planner.sensor.noise: .* take a better sensor"),
     "delay": (["planner.sensor.delay=[0.0, 0.5]"], "planner.sensor.delay: at most 0.45 s, known to 0.32 s"),
-    "rate": (["planner.live_rate={L1=0.1}"], "not together with planner.live_rate"),
     "zones": (["planner.zones=true"], "not together with planner.zones"),
     "travel": (
         ["limits.travel=[0.0, 1.0]", "move={start=0.0, target=1.0, duration=8.0}"],
@@ -56,6 +55,11 @@ def test_what_cannot_be_served_is_refused_in_a_sentence(name):
     changes, words = REFUSED[name]
     with pytest.raises(SpecError, match=words):
         planner_block(preset_spec("bay-crane", [*MEASURED, *changes]))
+
+
+def test_a_rope_that_changes_on_the_way_may_hold_a_load_that_is_measured():
+    text = planner_block(preset_spec("bay-crane", [*MEASURED, "planner.live_rate={L1=0.1}"])).text
+    assert "fSensor" in text and "cLiveStep" in text
 
 
 def test_a_sensor_needs_a_disturbance():

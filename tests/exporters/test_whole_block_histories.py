@@ -1,6 +1,5 @@
 """The planner block under histories of its proof, judged by its verdicts."""
 
-import attrs
 import pytest
 from generator.planned_machines import GANTRY, HOIST
 from test_next_planner import PAPER as WIDE_ERRORS
@@ -27,6 +26,7 @@ TWO = [
     "planner.disturbance.settle=15.0",
     *("planner.live={L=[3.0, 9.0]}", "export.cycle_time=0.004"),
 ]
+HOISTED = ["planner.live_rate={L1=0.3}", "check.uncertain={L1=0.01}"]
 SWUNG = [
     'planner.sensor={quantity="angle", of="theta1", noise=0.002, delay=[0.0, 0.02], drop_out=0.1}',
     "planner.disturbance={swing={payload=0.05}, gust={acceleration=0.1, longest=1.5}, settle=6.0}",
@@ -42,7 +42,7 @@ MACHINES = {
     "quick hoisting": lambda: preset_spec("paper", PAPER),
     "a sensor": lambda: preset_spec("bay-crane", MEASURED),
     "a sensor, wide errors": lambda: preset_spec("paper", [*WIDE_ERRORS, *SWUNG]),
-    "a sensor while hoisting": lambda: both(0.3),
+    "a sensor while hoisting": lambda: preset_spec("bay-crane", [*MEASURED, *HOISTED]),
     "two sensors": lambda: preset_spec("gantry-crane", TWO),
     "two sensors at 1 ms": lambda: preset_spec("gantry-crane", TWO[:-1]),
     "an encoder at an arm": lambda: preset_spec("flexible-joint", JOINT),
@@ -62,15 +62,6 @@ FORMER = {
     "wide errors": (2, 90, 122, 145, 217),  # from rest nothing was found for seconds
     "a sensor, wide errors": (13, 25, 46, 55, 98),  # fast swings were damped as slow ones, on and on
 }
-
-
-def both(rate):
-    """A bay crane whose rope changes on the way and whose load is measured: no spec may state both so far."""
-    measured = preset_spec("bay-crane", MEASURED).planner
-    hoists = [MEASURED[0], f"planner.live_rate={{L1={rate}}}", "check.uncertain={L1=0.01}"]
-    spec = preset_spec("bay-crane", hoists)
-    planned = attrs.evolve(spec.planner, sensor=measured.sensor, disturbance=measured.disturbance)
-    return attrs.evolve(spec, planner=planned)
 
 
 @pytest.mark.parametrize("machine", MACHINES)

@@ -336,10 +336,9 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
             yield "planner.sensor.of", Phrase(template, hint=suggestion(name, known))
     if not disturbance.swing:
         yield "planner.disturbance.swing", "must name a load"
-    for name in ("live_rate", "zones"):
-        if getattr(spec.planner, name):
-            problem = Phrase("not together with planner.{name} so far; leave one out", name=name)
-            yield "planner.sensor", problem
+    if spec.planner.zones:
+        problem = Phrase("not together with planner.{name} so far; leave one out", name="zones")
+        yield "planner.sensor", problem
 
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
