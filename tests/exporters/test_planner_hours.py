@@ -100,15 +100,12 @@ def rests(out):
     return (np.flatnonzero(stands[1:] & ~stands[:-1]) + 1)[1:]
 
 
-BETWEEN = 1.1  # of what is stated: what machines between those that are watched may be left with
-
-
 def require_true(out, at, rope, load, decay=0.0):
-    """Require that little more is left than is stated, and than allowed while the block promises."""
+    """Require that no more is left than is stated, and no more than allowed while the block promises."""
     found = worst(out["fVelocity"][:at], rope, load, decay)
     counted = 0.97 * found if decay else found  # the decays are 8 % and 60 % greater
-    assert counted <= BETWEEN * out["fSwayLeft"][at]
-    assert counted <= BETWEEN * LIMIT or not out["bPromise"][at]
+    assert counted <= out["fSwayLeft"][at]
+    assert counted <= LIMIT or not out["bPromise"][at]
     assert out["nPromise"][at] == (5.0 if out["fSwayLeft"][at] > LIMIT else 0.0)
 
 

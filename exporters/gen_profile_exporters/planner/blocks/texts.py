@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,9 @@ COSINES = [
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.15  # times that, on any machine that is watched
 LITTLE = 30  # slots in which little is left of what was measured, until it is no more damped
+APART = 2.0  # rad
+FADED = 1.6  # exponent by which a swing decays to a fifth
+FOREVER = 1e9  # s
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 
 
@@ -173,12 +177,31 @@ def _shares(c: PlannerConstants) -> Array:
     """
     modes, lives = c.modes, len(c.live)
     middles = np.array(c.curvatures[lives:]) if lives else np.zeros(1)  # where the middle is bent to
-    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in middles])
-    exponents = c.exponents if lives else np.zeros((1, c.model.shape[1]), dtype=np.int64)
-    terms = np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
-    errors, sways = (c.model @ terms)[2 * modes : 4 * modes].reshape(2, modes)
+    errors, sways = _model_at(c, middles)[2 * modes : 4 * modes].reshape(2, modes)
     roots = np.sqrt(np.maximum(errors * sways, 0.0))
     return np.asarray(roots / roots.sum()) if roots.any() else np.full(modes, 1.0 / modes)
+
+
+def _model_at(c: PlannerConstants, bent: Array) -> Array:
+    """Evaluate the model's rows at live parameters, bent, from −1 to 1."""
+    powers = np.array([[np.cos(k * np.arccos(bend)) for k in range(c.degrees)] for bend in bent])
+    exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
+    return np.asarray(
+        c.model @ np.prod([row[taken] for row, taken in zip(powers, exponents, strict=True)], axis=0)
+    )
+
+
+def known_for(c: PlannerConstants) -> float:
+    """Give the time in s for which machines between those that are watched are known to swing as these.
+
+    In it, neighbours come apart by `APART` in the slowest mode, where damping does not end it before.
+    """
+    times, steps = [FOREVER], len(Sizes().of(c)) - 1
+    for period, end in zip(c.periods, product((-1.0, 1.0), repeat=len(c.live)), strict=True):
+        time = APART * steps * period / (4.0 * np.pi * c.stated_error)
+        decay = c.least_decay * _model_at(c, np.array(end or (0.0,)))[c.modes]
+        times += [float(time)] if decay * time < FADED else []
+    return min(times)
 
 
 def _of_modes(c: PlannerConstants, watched: Sequence[float]) -> dict[str, object]:

@@ -7,7 +7,14 @@ from gen_profile_exporters.planner.axis_declarations import ZONES, AxisConstants
 from gen_profile_exporters.planner.blocks import followed
 from gen_profile_exporters.planner.blocks.measured import observer
 from gen_profile_exporters.planner.blocks.sizes import Sizes, operations, shell_work
-from gen_profile_exporters.planner.blocks.texts import FOLDER, constant_lines, filled, planner
+from gen_profile_exporters.planner.blocks.texts import (
+    FOLDER,
+    FOREVER,
+    constant_lines,
+    filled,
+    known_for,
+    planner,
+)
 from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.planner.interface import HOLD, WHERE, gives_up, interface, reaction
 from gen_profile_exporters.planner.layout import narrow, with_while_loops
@@ -109,6 +116,8 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
             "cRoused": c.sensor.roused,
             "cKnown": c.sensor.end,
         }
+    if c.stated_error > 0.0 and not c.rates:
+        common["cKnownFor"] = known_for(c) if c.sensor is None else FOREVER  # which shows what swings
     if c.rates:
         common["cLiveStep"] = [(1.0 + ROUNDING) * c.rates.get(name, 0.0) * c.cycle for name in c.live]
     for axis in c.axes:
