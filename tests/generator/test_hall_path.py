@@ -17,7 +17,7 @@ from gen_profile.methods.solvers.over_stacks.bay import bay_of
 from gen_profile.motion.profile import sample
 from gen_profile.presentation.charts.side_view import path_figure, standing_on
 from gen_profile.presentation.studio.curves_json import side_json
-from gen_profile.spec.plan_view import Area, Line
+from gen_profile.spec.plan_view import Area, StraightWay
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 BESIDE = [8.0, 10.0, 6.0, 9.0, 8.0]  # ropes run past it, and the load is below it in part
@@ -234,7 +234,7 @@ class TestPlanView:
         random, fine = np.random.default_rng(4), np.linspace(-40.0, 40.0, 80001)
         met = 0
         for _ in range(60):
-            line = Line.between(random.uniform(-5.0, 5.0, 2), random.uniform(-5.0, 5.0, 2))
+            line = StraightWay.between(random.uniform(-5.0, 5.0, 2), random.uniform(-5.0, 5.0, 2))
             (a, b), (c, d) = np.sort(random.uniform(-8.0, 8.0, (2, 2)), axis=1)
             area = Area((a, b)) if random.uniform() < 0.3 else Area((a, b), (c, d))
             places = np.array(line.origin) + fine[:, None] * np.array(line.way)
@@ -247,7 +247,7 @@ class TestPlanView:
         assert 20 < met < 60
 
     def test_a_line_along_an_axis_may_be_beside_an_area(self):
-        line = Line.between((0.0, 3.0), (10.0, 3.0))
+        line = StraightWay.between((0.0, 3.0), (10.0, 3.0))
         assert line.span(Area((2.0, 4.0), (0.0, 3.0))) is None  # at its edge
         assert line.span(Area((2.0, 4.0), (0.0, 3.1))) == (2.0, 4.0)
 
@@ -264,7 +264,7 @@ class TestPlanView:
         assert (covered.x.min(), covered.y.max()) == pytest.approx((1.0, 11.75), abs=0.2)
 
     def test_a_box_is_seen_where_the_load_meets_it(self):
-        spec, line = hall(), Line.between((2.0, 4.0), (26.0, 4.0))  # along x it is seen as it is
+        spec, line = hall(), StraightWay.between((2.0, 4.0), (26.0, 4.0))  # along x it is seen as it is
         assert standing_on(spec.path, line)[0] == pytest.approx((6.0, 10.0, 4.0))
         assert set(standing_on(spec.path, line)) == {0}
 

@@ -6,7 +6,7 @@ from generator.quay import HEIGHT, RAIL, ROPE, STACKS, WIDTH, followed, quay
 
 import gen_profile as gp
 from gen_profile.presentation.charts.side_view import path_figure, skyline, standing_on, swept
-from gen_profile.spec.plan_view import Line
+from gen_profile.spec.plan_view import StraightWay
 
 FINE = np.linspace(0.0, 1.0, 20001)
 
@@ -33,7 +33,7 @@ def test_a_box_that_goes_straight_up_sweeps_its_own_width():
 
 def test_the_skyline_is_the_highest_stack_with_its_clearance():
     path = quay().path
-    x, z = skyline([*standing_on(path, Line(), path.clearances).values()], 0.0)
+    x, z = skyline([*standing_on(path, StraightWay(), path.clearances).values()], 0.0)
     assert np.all(np.diff(x) >= 0.0)
     for place in np.linspace(15.0, 40.0, 211):
         heights = [top + 1.0 for low, high, top in STACKS if low - 0.5 <= place <= high + 0.5]

@@ -35,7 +35,7 @@ class Direction:
 
 
 @attrs.frozen(kw_only=True)
-class Target:
+class BoundedTarget:
     """What the end load may pass by little only.
 
     Attributes
@@ -90,7 +90,7 @@ def directions(plant: Plant) -> tuple[Direction, ...]:
     return tuple(found)
 
 
-def targets(spec: Spec) -> tuple[Target, ...]:
+def targets(spec: Spec) -> tuple[BoundedTarget, ...]:
     """List what ``limits.overshoot`` keeps the end load from passing; nothing without it.
 
     After the move loads may sway by ``check.residual_sway`` off nominal, so they may pass it by as much.
@@ -100,7 +100,7 @@ def targets(spec: Spec) -> tuple[Target, ...]:
         return ()
     remaining = max(spec.check.residual_sway[load] for load in plant.loads[plant.end_load])
     return tuple(
-        Target(
+        BoundedTarget(
             direction=one, at=move.target[one.axis], way=move.distance[one.axis], most=max(limit, remaining)
         )
         for one in directions(plant)

@@ -40,7 +40,7 @@ class Area:
 
 
 @attrs.frozen(kw_only=True)
-class Line:
+class StraightWay:
     """A straight way in plan view, both axes in step; of one axis alone, that axis itself.
 
     Attributes
@@ -55,7 +55,7 @@ class Line:
     way: tuple[float, float] = (1.0, 0.0)
 
     @classmethod
-    def between(cls, start: Sequence[float], target: Sequence[float]) -> "Line":
+    def between(cls, start: Sequence[float], target: Sequence[float]) -> "StraightWay":
         """Lay it from a place to another one, each of one axis or two."""
         if len(start) == 1:
             return cls()

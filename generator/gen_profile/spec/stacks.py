@@ -21,7 +21,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.plan_view import Area, Line
+from gen_profile.spec.plan_view import Area, StraightWay
 from gen_profile.spec.structure import Checked, Faults, Structurer, kinds_of
 from gen_profile.spec.values import Distance, NotNegative, Words
 from gen_profile.support.bounded_file import DOCUMENT, read_bounded
@@ -297,7 +297,7 @@ class StackZone:
         """Tell by how much more than it must a body is above the stack, or below what is overhead, in m."""
         return self.top - z if self.overhead else z - self.top
 
-    def on(self, line: Line) -> "StackZone | None":
+    def on(self, line: StraightWay) -> "StackZone | None":
         """Take what of it is along a line, as if that were the only axis; none where the line goes past."""
         spans = [line.span(one) for one in (self.area, *self.own)]
         if spans[0] is None:
@@ -348,9 +348,9 @@ class PathAxes:
     along: tuple[int, ...]
     hoist: int
 
-    def line(self, start: Sequence[float], target: Sequence[float]) -> Line:
+    def line(self, start: Sequence[float], target: Sequence[float]) -> StraightWay:
         """Lay the way in plan view from where all axes start to their targets."""
-        return Line.between(*([end[axis] for axis in self.along] for end in (start, target)))
+        return StraightWay.between(*([end[axis] for axis in self.along] for end in (start, target)))
 
 
 def path_axes(plant: Plant, parameters: Mapping[str, float]) -> PathAxes | None:

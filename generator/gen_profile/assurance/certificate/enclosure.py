@@ -466,8 +466,8 @@ class Enclosure:
         each = []
         for row in range(sways, sways + 3 * bodies):
             series, rounding = chebyshev.interpolated(at_nodes[row], self.variables)
-            missed = self._interpolation_error(np.broadcast_to(far[row].rad, shape), self.fine)
-            each.append((series, (rounding + missed + off[:, :, row]) * ROUND_UP))
+            interpolation = self._interpolation_error(np.broadcast_to(far[row].rad, shape), self.fine)
+            each.append((series, (rounding + interpolation + off[:, :, row]) * ROUND_UP))
         bounds, met = rooms(each, self.zones)
         return np.maximum(-bounds, 0.0), np.maximum(-met, 0.0)
 

@@ -15,7 +15,7 @@ from gen_profile.dynamics.evaluation.clearance import zones_of
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
-from gen_profile.spec.passed_target import Target, targets
+from gen_profile.spec.passed_target import BoundedTarget, targets
 from gen_profile.spec.plan_view import EVERYWHERE, Area
 from gen_profile.support.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
@@ -136,7 +136,7 @@ def _zone(body: int, top: float, up: float, *areas: Area) -> list[float]:
     return [*(3.0 * body + along for along in range(3)), top, up, *edges]
 
 
-def _behind(target: Target) -> list[float]:
+def _behind(target: BoundedTarget) -> list[float]:
     """Write what is behind a target as a zone of all heights."""
     beyond = (target.at, np.inf) if target.way > 0.0 else (-np.inf, target.at)
     area = Area(beyond) if target.direction.coordinate == 0 else Area(EVERYWHERE, beyond)

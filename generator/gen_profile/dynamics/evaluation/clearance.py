@@ -5,7 +5,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.spec.model import Spec
-from gen_profile.spec.plan_view import Line
+from gen_profile.spec.plan_view import StraightWay
 from gen_profile.spec.stacks import StackZone, hanging, path_axes, zones
 
 
@@ -39,7 +39,7 @@ def zones_of(spec: Spec) -> tuple[StackZone, ...]:
     return zones(spec.path, ends)
 
 
-def line_of(spec: Spec) -> Line:
+def line_of(spec: Spec) -> StraightWay:
     """Lay the way of a spec's path in plan view, along which loads go."""
     axes = path_axes(spec.machine(), spec.plant.parameters)
     assert axes is not None  # as the spec's rules hold

@@ -26,7 +26,7 @@ from gen_profile.motion.metrics import (
 )
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
-from gen_profile.spec.passed_target import Target, targets
+from gen_profile.spec.passed_target import BoundedTarget, targets
 from gen_profile.support.errors import InfeasibleProblem, SpecError, rounded_down
 from gen_profile.support.summary import Summarised
 
@@ -54,7 +54,7 @@ class MotionEvaluation(Summarised):
         Of machines all over the ranges, less accurately; of the same where nothing has a range.
     watch : float
         How long a residual is watched, in s.
-    targets : tuple of Target
+    targets : tuple of BoundedTarget
         What the end load may pass by little only.
     """
 
@@ -64,7 +64,7 @@ class MotionEvaluation(Summarised):
     swing: PlantSimulation
     everywhere: PlantSimulation
     watch: float
-    targets: tuple[Target, ...] = ()
+    targets: tuple[BoundedTarget, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""

@@ -6,15 +6,15 @@ import numpy as np
 
 from gen_profile.dynamics.problem.limits import SWAY_TOLERANCE
 from gen_profile.motion.profile import Array
-from gen_profile.spec.passed_target import Target
+from gen_profile.spec.passed_target import BoundedTarget
 
 
-def beyond(targets: Sequence[Target], q_a: Array, end_sway: Array) -> Array:
+def beyond(targets: Sequence[BoundedTarget], q_a: Array, end_sway: Array) -> Array:
     """Tell how far the end load is past its targets in m, shape (targets, …); negative before them.
 
     Parameters
     ----------
-    targets : sequence of Target
+    targets : sequence of BoundedTarget
     q_a : (…, axes) array
     end_sway : (…, directions) array
         Of the end load in m.
@@ -27,7 +27,7 @@ def beyond(targets: Sequence[Target], q_a: Array, end_sway: Array) -> Array:
     )
 
 
-def counted(targets: Sequence[Target], nominal: float, worst: float = -np.inf) -> float:
+def counted(targets: Sequence[BoundedTarget], nominal: float, worst: float = -np.inf) -> float:
     """Tell what of an overshoot counts against the limit: the nominal machine's, or the worst's if too great.
 
     Parameters
@@ -42,6 +42,6 @@ def counted(targets: Sequence[Target], nominal: float, worst: float = -np.inf) -
     )
 
 
-def excess(targets: Sequence[Target], worst: float, accepted: float = SWAY_TOLERANCE) -> float:
+def excess(targets: Sequence[BoundedTarget], worst: float, accepted: float = SWAY_TOLERANCE) -> float:
     """Tell by how much in m the worst machine's load passes its targets farther than it may."""
     return worst - min((accepted * one.most for one in targets), default=np.inf)

@@ -10,7 +10,7 @@ import attrs
 from gen_profile.dynamics.problem.held_axes import reduced
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import AxisLimitsSpec, LimitsSpec, Spec
-from gen_profile.spec.passed_target import Target, targets
+from gen_profile.spec.passed_target import BoundedTarget, targets
 from gen_profile.support.units import RATES
 
 Effort = Literal["jerk", "snap", "reference"]
@@ -63,7 +63,7 @@ class Problem:
         γ in 1/m; None lets the solver take `AUTO_SWAY` over the peak sway of the same move with β = 0.
     limits : LimitsSpec
         Of the command and of the sway on the way.
-    targets : tuple of Target
+    targets : tuple of BoundedTarget
         What the end load may pass by `limits.overshoot`, with the problem's own axes.
     overshoot_margin : float
         m, by which less the nominal machine may pass them, since others pass them farther.
@@ -91,7 +91,7 @@ class Problem:
     sway_scale: float | None
     order: int = 1
     limits: LimitsSpec = attrs.field(factory=LimitsSpec)
-    targets: tuple[Target, ...] = ()
+    targets: tuple[BoundedTarget, ...] = ()
     overshoot_margin: float = 0.0
     sway_spread: float = 1.0
     worst_case: WorstCase | None = None

@@ -11,7 +11,7 @@ from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Array
 from gen_profile.presentation.charts.figure import FRAME, LIMIT, PALETTE, Figure, Line, Panel, Style
 from gen_profile.spec.model import Spec
-from gen_profile.spec.plan_view import Line as Way
+from gen_profile.spec.plan_view import StraightWay
 from gen_profile.spec.stacks import StacksSpec, path_axes
 from gen_profile.support.phrase import Phrase
 
@@ -141,7 +141,7 @@ def _looks(path: StacksSpec, bodies: Sequence[str]) -> list[tuple[tuple[float, f
 
 
 def standing_on(
-    path: StacksSpec, way: Way, clearances: tuple[float, float] = (0.0, 0.0)
+    path: StacksSpec, way: StraightWay, clearances: tuple[float, float] = (0.0, 0.0)
 ) -> dict[int, tuple[float, float, float]]:
     """Tell what is in a load's way, as it meets it: from and to along the way, and height, by number.
 

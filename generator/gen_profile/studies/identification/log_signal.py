@@ -6,7 +6,6 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
 
 from gen_profile.motion.profile import Array
 from gen_profile.studies.identification.log_table import LogTable
@@ -72,6 +71,8 @@ def refuse_spectrum(table: LogTable, head: int, time: int) -> None:
     frequencies, power = values[:, min(time, values.shape[1] - 1)], np.zeros(len(values))
     for column in np.nan_to_num(np.delete(values, time, axis=1)).T if values.shape[1] > 1 else ():
         power = max(power, column, key=np.ptp)
+    from scipy.signal import find_peaks  # noqa: PLC0415  (half of what the command line takes to start)
+
     peaks, _ = find_peaks(power, prominence=PEAK * max(float(power.max()), 1e-300))
     found = [(float(frequencies[at]), float(np.ptp(frequencies[at - 1 : at + 2]) / 4.0)) for at in peaks]
     cure: str = "log a swing over the time"

@@ -15,7 +15,7 @@ from gen_profile.methods.solvers.direct.condensing import IntervalMaps
 from gen_profile.methods.solvers.direct.conic import ConicProgram, Entries, place, squares
 from gen_profile.methods.solvers.direct.transcription import Iterate, Transcription
 from gen_profile.motion.profile import Array
-from gen_profile.spec.passed_target import Target
+from gen_profile.spec.passed_target import BoundedTarget
 from gen_profile.support.one_thread import one_thread
 
 WITHIN = 1.0 - 1e-6  # fraction of a limit that a program may use: its own tolerance must not break the limit
@@ -201,7 +201,7 @@ def passed(transcription: Transcription, iterate: Iterate, problem: Problem) -> 
 
 def keep_behind(
     program: ConicProgram,
-    targets: Sequence[Target],
+    targets: Sequence[BoundedTarget],
     transcription: Transcription,
     iterate: Iterate,
     maps: IntervalMaps,

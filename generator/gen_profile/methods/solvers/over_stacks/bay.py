@@ -15,7 +15,7 @@ from gen_profile.methods.solvers.over_stacks.swing import Swing, swing_of, swing
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant, decides
 from gen_profile.spec.model import AxisLimitsSpec, Spec
-from gen_profile.spec.plan_view import Area, Line
+from gen_profile.spec.plan_view import Area, StraightWay
 from gen_profile.spec.stacks import PathAxes, StackZone, hanging, path_axes, zones
 from gen_profile.support.units import RATES
 
@@ -34,7 +34,7 @@ class Bay:
     spec : Spec
     plant : Plant
     axes : PathAxes
-    line : Line
+    line : StraightWay
         In plan view, along which the load goes: the trolley's places are along it.
     moving : tuple of int
         Coordinates of the machine that move as the load goes along the line.
@@ -51,7 +51,7 @@ class Bay:
     spec: Spec
     plant: Plant
     axes: PathAxes
-    line: Line
+    line: StraightWay
     moving: tuple[int, ...]
     nominal: Swing
     others: Swing

@@ -12,7 +12,7 @@ from gen_profile.dynamics.problem.sensitivities import sensitivities
 from gen_profile.dynamics.problem.symbolic import Function, Symbol
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.plan_view import Line
+from gen_profile.spec.plan_view import StraightWay
 from gen_profile.spec.stacks import PathAxes
 
 EQUAL = 1e-9  # relative difference of what is the same
@@ -38,8 +38,8 @@ class Swing:
 
 
 def swings_along(
-    plant: Plant, axes: PathAxes, line: Line, linear: Linearization
-) -> tuple[Line, tuple[int, ...]]:
+    plant: Plant, axes: PathAxes, line: StraightWay, linear: Linearization
+) -> tuple[StraightWay, tuple[int, ...]]:
     """Choose a line on which the load swings as on this one, and tell which coordinates move on it.
 
     A machine that swings alike along both axes does on any line what it does along the first; what is
@@ -55,7 +55,7 @@ def swings_along(
         axis=(1, 2)
     )
     if alike.all():
-        line = Line()
+        line = StraightWay()
     pushed = pushes[:, [first, second]] @ np.array(line.way)
     reached = np.max([np.abs(one @ pushed) / np.abs(one).max() for one in powers], axis=0)
     return line, tuple(np.flatnonzero(reached > EQUAL * reached.max()).tolist())
@@ -63,7 +63,7 @@ def swings_along(
 
 @cache
 def swing_of(
-    plant: Plant, axes: PathAxes, line: Line, moving: tuple[int, ...], names: tuple[str, ...]
+    plant: Plant, axes: PathAxes, line: StraightWay, moving: tuple[int, ...], names: tuple[str, ...]
 ) -> Swing:
     """Compile a machine that goes along a line, with sensitivities to some parameters.
 
@@ -71,7 +71,7 @@ def swing_of(
     ----------
     plant : Plant
     axes : PathAxes
-    line : Line
+    line : StraightWay
     moving : tuple of int
         Numbers of the coordinates that are states; others stay at 0.
     names : tuple of str
