@@ -89,7 +89,8 @@ class _Planner:
             if course is None:
                 return math.inf
             found[duration] = course
-            return (max(-course.room, course.miss) - ENOUGH) / max(self.bay.way, 1.0)
+            lacking = max(-course.room, course.miss) if course.miss > ENOUGH else -course.room
+            return (lacking - ENOUGH) / max(self.bay.way, 1.0)
 
         duration = least(excess, start, search, LONGEST_MOVE)
         return None if duration is None else found[duration]
