@@ -34,18 +34,3 @@ def tc6_schema():
     if path is None:
         missing("PLCopen's tc6_xml_v201.xsd (name it in the environment variable TC6_SCHEMA)")
     return etree.XMLSchema(etree.parse(path))
-
-
-# What the planner block does not do yet, by name: one that it does is to be taken out.
-NOT_YET = {
-    "test_planner_promise": {
-        # alters today's text
-        "test_a_block_that_forgets_what_was_left_breaks_it",
-    },
-}
-
-
-def pytest_collection_modifyitems(items):
-    for item in items:
-        if item.name in NOT_YET.get(item.path.stem, ()):
-            item.add_marker(pytest.mark.xfail(strict=True, reason="not of the blocks yet"))

@@ -110,7 +110,8 @@ def test_a_stick_has_its_velocity_soon_and_stops_without_speeding_up(text, rope,
 
 def test_a_block_that_forgets_what_was_left_breaks_it(text):
     """By what a hand in time with the swing leaves."""
-    forgets = text.replace("nForgotten := 0;", "nForgotten := cModes;")
+    keeps = "aFade[nSwing] * aPastRe[nSwing] + aUnitRe[nSwing] * fTaken"
+    forgets = text.replace(keeps, f"0.7 * {keeps}")
     assert forgets != text
     driver = standing(forgets, 9.0, 2000.0).hold(0.1, bVelocity=1, fVelocityCommand=0.0)
     for number in range(64):

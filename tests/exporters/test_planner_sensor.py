@@ -6,7 +6,7 @@ from exporters.counted_block import CountedBlock, compile_counting
 from exporters.measured_machines import MeasuredCrane, MeasuredGantry, MeasuredJoint, MeasuredTank
 
 from gen_profile.planner.design import planner_block
-from gen_profile.planner.sensor import damping_kernel, damping_room
+from gen_profile.planner.sensor import damping_room
 from gen_profile.spec.reading import preset_spec
 
 pytestmark = pytest.mark.slow
@@ -339,16 +339,6 @@ def test_what_errors_may_have_left_is_forgotten_once_the_load_was_damped(compile
     (ends,) = np.flatnonzero(np.diff(issued["bDamping"]) < 0.0)
     assert issued["fSwayLeft"][ends - 100] > 0.005
     assert issued["fSwayLeft"][ends + 100] <= 0.27 * ALLOWED  # at which damping ends
-
-
-def test_the_kernel_leaves_the_fast_mode_alone():
-    for ratio in (1.8, 4.0, 9.0):
-        frequencies = np.array([1.0, ratio])
-        kernel = damping_kernel(frequencies)
-        out = np.arange(len(kernel)) - 0.5 * (len(kernel) - 1)
-        assert kernel.sum() == pytest.approx(1.0)
-        for error, most in ((0.0, 1e-12), (0.03, 6e-3)):  # to first order
-            assert abs(kernel @ np.exp(0.1j * np.pi * ratio * (1.0 + error) * out)) < most
 
 
 JOINT = [

@@ -5,27 +5,14 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 
-from gen_profile.motion.profile import Array
-from gen_profile_exporters.block_source import initialiser
 from gen_profile_exporters.playback.structured_text import literal
 
-LEAST_SLOTS = 9  # of a damping kernel: with fewer the velocity that can be stopped within it is low
 GROWN = 1.5  # of the stated swing, which a load that is damped does not reach: the sensor shows another one
-LARGEST_PULSE = 4.0  # by what the greatest acceleration makes in a slot: a larger one keeps the next ones out
-KERNEL_PERIODS = 36.0  # its slots by the ratio of the slowest frequency to the next: nearly two fast periods
 NOISE_WATCHED = 0.5  # s, over which the sensor's noise is averaged
 CORRELATED = 0.15  # of what else may differ: a misreading where nothing differs otherwise for a period
-STEADY = 0.03  # share by which a live parameter may be another than planned with, while motions are judged
 MEMORY = 1.0  # slow periods, over which what it shows of the axis's own motions is
-ROWS_BEFORE = 3  # of the model by mode: frequency, decay and error; then sway, axis by axis
-INPUTS = {"aSensor": "fSensor", "bNews": "bSensorValid", "aSensorAge": "fSensorAge"}  # by the arrays
-OUTPUTS = {
-    "fSwayEstimated": "aSwayEstimated[{}]",
-    "fSwayUncertainty": "aSwayUncertainty[{}]",
-    "bSensorUsed": "bUsed[{}]",
-    "nSensorFault": "aSensorTold[{}]",
-    "fSensorScale": "1.0 + aOwnScale[{}]",
-}
+INPUTS = ("fSensor", "bSensorValid", "fSensorAge")
+OUTPUTS = ("fSwayEstimated", "fSwayUncertainty", "bSensorUsed", "nSensorFault", "fSensorScale")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -45,11 +32,9 @@ class SensorConstants:
     most, step, gate, frozen, noisy : float
         In its unit: what it may show; change from cycle to cycle; difference from what is expected, and
         the change of that while the value stays the same; mean square change.
-    swing, hides, floor, begin, again, roused, end : float
+    swing, hides, floor, again, roused, end : float
         m, of the slowest mode: what is unknown at first, where the value stays the same, and later; where
-        damping begins as the axis arrives, where later at rest, where once it hung still, and where it ends.
-    gains : (3,) sequence of float
-        Of sway, its rate and position, in pulses of a slot.
+        damping begins, where once it hung still, and where it ends.
     misread : float
         By which share the axis's own motions may show otherwise than expected.
     room : float
@@ -73,31 +58,17 @@ class SensorConstants:
     swing: float
     hides: float
     floor: float
-    begin: float
     again: float
     roused: float
     end: float
-    gains: Sequence[float]
     misread: float
     room: float
     estimation_error: float
 
 
-def damping_slots(frequencies: Array) -> int:
-    """Slots of the damping kernel at some frequencies, rising."""
-    if len(frequencies) == 1:
-        return LEAST_SLOTS
-    return max(LEAST_SLOTS, round(KERNEL_PERIODS * float(frequencies[0] / frequencies[1])))
-
-
 def model_rows(modes: int) -> int:
     """Rows of the model for the sensor of an axis."""
     return 5 * modes + 2
-
-
-def damping_rows(modes: int) -> int:
-    """Conditions of the damping kernel."""
-    return 2 * modes - 1
 
 
 def values(sensor: SensorConstants | None, suffixes: Sequence[str]) -> dict[str, str]:
@@ -124,80 +95,41 @@ def values(sensor: SensorConstants | None, suffixes: Sequence[str]) -> dict[str,
         f"    fSensorScale{of} : LREAL := 1.0; (* what it shows of the axis's motions, by what is due *)"
         for of, words in sensed.values()
     ]
-    taken = [
-        f"{array}[{k}] := {name}{of};" for k, (of, _) in sensed.items() for array, name in INPUTS.items()
-    ]
-    given = [
-        f"{name}{of} := {value.format(k)};"
-        for k, (of, _) in sensed.items()
-        for name, value in OUTPUTS.items()
-    ]
     return {
         "measured": " and ".join(f"fSensor{of} is {words}" for of, words in sensed.values()),
         "sensor_inputs": "\n".join(inputs),
         "sensor_outputs": "\n".join(outputs),
-        "take_sensors": "\n".join(taken),
-        "give_sensors": "\n".join(given),
         "drop_out": f"{sensor.drop_out:g}",
         "room": f"{sensor.room:.3g}",
     }
 
 
-def lengths(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -> dict[str, int]:
-    """Lengths of arrays."""
-    if sensor is None:
-        return {}
-    rows = damping_rows(modes)
-    expected = axes * _expected(sensor, cycle)
-    return {"expected": expected, "own": 6 * axes, "damp_row": rows, "damp_gram": rows**2}
-
-
-def whole_constants(sensor: SensorConstants | None, modes: int, axes: int, cycle: float) -> dict[str, int]:
-    """Give the constants that are whole numbers."""
-    if sensor is None:
-        return {}
+def observer_constants(sensor: SensorConstants, modes: int, cycle: float) -> dict[str, float | int]:
+    """Give the observer's constants."""
     return {
-        "cSensorRow": (ROWS_BEFORE + axes) * modes,
-        "cSensorRows": model_rows(modes),
-        "cExpectedLength": _expected(sensor, cycle),
-        "cDropOutCycles": max(1, round(sensor.drop_out / cycle)),
-        "cDampRows": damping_rows(modes),
-        "cDampLeastSlots": LEAST_SLOTS,
-    }
-
-
-def real_constants(sensor: SensorConstants | None, cycle: float) -> dict[str, float]:
-    """Give the other constants."""
-    if sensor is None:
-        return {}
-    return {
-        "cSensorOldest": sensor.oldest,
-        "cSensorMost": sensor.most,
-        "cSensorStep": sensor.step,
-        "cSensorGate": sensor.gate,
-        "cSensorFrozen": sensor.frozen,
-        "cSensorHides": sensor.hides,
-        "cSensorNoisy": sensor.noisy,
-        "cSensorSmoothing": min(1.0, cycle / NOISE_WATCHED),
-        "cSensorScale": sensor.misread,
-        "cSensorAlike": CORRELATED,
-        "cSensorSteady": STEADY,
-        "cSensorForgets": 1.0 / (2.0 * np.pi * MEMORY),
-        "cSensorFloor": sensor.floor,
+        "cRate": int(sensor.rate),
+        "cOldest": sensor.oldest,
+        "cMost": sensor.most,
+        "cStep": sensor.step,
+        "cGate": sensor.gate,
+        "cFrozen": sensor.frozen,
+        "cHides": sensor.hides,
+        "cMostNoise": sensor.noisy,
+        "cSmoothing": min(1.0, cycle / NOISE_WATCHED),
+        "cMisread": sensor.misread,
+        "cCorrelated": CORRELATED,
+        "cForgets": 1.0 / (2.0 * np.pi * MEMORY),
+        "cFloor": sensor.floor,
         "cSwing": sensor.swing,
-        "cDampFrom": sensor.begin,
-        "cDampAgain": sensor.again,
-        "cDampRoused": sensor.roused,
-        "cDampOnWay": 2.0 * sensor.roused,
-        "cDampTo": sensor.end,
-        "cDampRoom": sensor.room,
-        "cDampMost": GROWN * sensor.swing + sensor.estimation_error,
-        "cDampLength": KERNEL_PERIODS,
-        "cDampPulse": LARGEST_PULSE,
+        "cGrown": GROWN * sensor.swing + sensor.estimation_error,
+        "cStill": sensor.roused,
+        "cSensorRows": model_rows(modes),
+        "cLength": expected(sensor, cycle),
+        "cDropOut": max(1, round(sensor.drop_out / cycle)),
     }
 
 
-def _expected(sensor: SensorConstants, cycle: float) -> int:
+def expected(sensor: SensorConstants, cycle: float) -> int:
     """Cycles in which a value may be as old as the oldest."""
     return int(sensor.oldest / cycle) + 3
 
@@ -205,14 +137,3 @@ def _expected(sensor: SensorConstants, cycle: float) -> int:
 def cycle_work(sensor: SensorConstants | None, modes: int) -> int:
     """Floating-point operations of every cycle for each axis."""
     return 0 if sensor is None else 120 + 40 * modes
-
-
-def other_constants(sensor: SensorConstants | None) -> list[str]:
-    """Declare the constants that are no single numbers."""
-    if sensor is None:
-        return []
-    gains = initialiser([literal(gain) for gain in sensor.gains])
-    return [
-        f"    cSensorRate : BOOL := {str(sensor.rate).upper()}; (* it measures a rate *)",
-        f"    cDampGain : ARRAY [0..{len(sensor.gains) - 1}] OF LREAL := {gains};",
-    ]

@@ -26,7 +26,7 @@ TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
 MOVES = "fActVelocity"
 OWN = (*TAKEN, *GIVEN)  # inputs and outputs of each axis
-SENSED = (*INPUTS.values(), *OUTPUTS)  # likewise of each of several
+SENSED = (*INPUTS, *OUTPUTS)  # likewise of each of several
 SETPOINTS = {
     "fPosition": "setpoint",
     "fVelocity": "setpoint_velocity",

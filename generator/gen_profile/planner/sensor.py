@@ -10,7 +10,7 @@ from itertools import accumulate, product
 
 import attrs
 import numpy as np
-from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
+from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.chebyshev import Interpolant, interpolate
@@ -27,12 +27,9 @@ from gen_profile.planner.stated import damping_room
 from gen_profile.spec.model import Spec
 from gen_profile.spec.planner import DisturbanceSpec, SensorSpec
 from gen_profile.support.errors import SpecError
-from gen_profile_exporters.planner.interface import SLOTS_PER_PERIOD
 from gen_profile_exporters.planner.sensor_constants import (
     MEMORY,
     SensorConstants,
-    damping_rows,
-    damping_slots,
     model_rows,
 )
 
@@ -53,8 +50,6 @@ MISREAD = 0.5  # share by which what it shows of the axis's own motions may diff
 FADES = 0.35  # rate by which fSwayUncertainty declines, by the slowest frequency (sensor.st)
 SURE_OTHERS = 6.0  # standard deviations of the noise that look like own motions
 UPDATE = 0.1  # s between new values at most, from which steps are judged
-POSITION_WEIGHT, PULSE_WEIGHT = 0.2, 3.0  # of the law, beside a weight of 1 of the sway
-LEAST_EFFECT = 0.3  # of damping pulses on the slowest mode, by what one without a kernel would do
 LEAST_SHOWN = 1e-3  # of the slowest mode, by what the sensor shows of the others
 LARGEST_DELAY, UNKNOWN_DELAY = 0.7, 0.25  # rad of the slowest mode
 ACCURATE = 5e-3  # of what the sensor shows, between the points of interpolation
@@ -176,11 +171,9 @@ def _constants(
         swing=swing,
         hides=swing if disturbance.gust else 0.0,
         floor=floor,
-        begin=BEGIN * allowed,
         again=AGAIN * allowed,
         roused=ROUSED * allowed,
         end=END * allowed,
-        gains=_law().tolist(),
         misread=MISREAD,
         room=damping_room(spec),
         estimation_error=estimation_error(spec),
@@ -396,32 +389,6 @@ def _rows(spec: Spec, directions: Mapping[int, SensedDirection], point: Sequence
             others = _others(spec, sensor, one)
             rows[-1][:] = *one.push, *one.shown, *one.end_load, *now[:-1:2], *now[1:-1:2], now[-1], others
     return np.concatenate(rows)
-
-
-def _law() -> Array:
-    """Gains of a pulse by sway, rate and place, in pulses: a linear-quadratic regulator from slot to slot."""
-    angle = 2.0 * np.pi / SLOTS_PER_PERIOD
-    c, s = np.cos(angle), np.sin(angle)
-    turn, pushed = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([[c], [s], [1.0]])
-    weight = np.diag([1.0, 1.0, POSITION_WEIGHT])
-    cost = solve_discrete_are(turn, pushed, weight, np.array([[PULSE_WEIGHT]]))
-    gains: Array = np.linalg.solve(PULSE_WEIGHT + pushed.T @ cost @ pushed, pushed.T @ cost @ turn)[0]
-    return gains
-
-
-def damping_kernel(frequencies: Array) -> Array:
-    """Make the kernel of damping pulses as the block does, shape (slots,), at slots of the usual length."""
-    slots = damping_slots(frequencies)
-    angles = 2.0 * np.pi / SLOTS_PER_PERIOD * frequencies / frequencies[0]
-    out = np.arange(slots) - 0.5 * (slots - 1)
-    weight = 1.0 - (out / (0.5 * (slots + 1))) ** 2
-    rows = [np.ones(slots)]
-    for angle in angles[1:]:
-        rows += [np.cos(angle * out), out * np.sin(angle * out)]
-    conditions = np.array(rows)
-    wanted = np.eye(damping_rows(len(frequencies)))[0]
-    factors = np.linalg.solve(conditions * weight @ conditions.T, wanted)
-    return np.asarray(weight * (conditions.T @ factors))
 
 
 def _refuse_machine(spec: Spec) -> None:

@@ -8,20 +8,10 @@ from gen_profile_exporters.planner.constants import PlannerConstants
 from gen_profile_exporters.planner.sensor_constants import (
     SensorConstants,
     cycle_work,
+    expected,
     model_rows,
-    real_constants,
-    whole_constants,
+    observer_constants,
 )
-
-# names in the observer, by those of `sensor_constants`
-NAMES = {
-    "cSensorOldest": "cOldest", "cSensorMost": "cMost", "cSensorStep": "cStep", "cSensorGate": "cGate",
-    "cSensorFrozen": "cFrozen", "cSensorHides": "cHides", "cSensorNoisy": "cMostNoise",
-    "cSensorSmoothing": "cSmoothing", "cSensorScale": "cMisread", "cSensorAlike": "cCorrelated",
-    "cSensorForgets": "cForgets", "cSensorFloor": "cFloor", "cSwing": "cSwing", "cDampMost": "cGrown",
-    "cDampRoused": "cStill", "cSensorRows": "cSensorRows",
-    "cExpectedLength": "cLength", "cDropOutCycles": "cDropOut",
-}  # fmt: skip
 
 
 def observer(c: PlannerConstants, sensor: SensorConstants) -> str:
@@ -29,11 +19,9 @@ def observer(c: PlannerConstants, sensor: SensorConstants) -> str:
     modes, lives, axes = c.modes, c.live or NO_LIVE, len(c.axes)
     one = model_rows(modes)
     model = np.vstack([c.model[: 2 * modes], c.model[-axes * one :]])
-    known = real_constants(sensor, c.cycle) | whole_constants(sensor, modes, axes, c.cycle)
     exponents = c.exponents if c.live else np.zeros((1, model.shape[1]), dtype=np.int64)
     constants = {
-        **{name: known[ours] for ours, name in NAMES.items()},
-        "cRate": int(sensor.rate),
+        **observer_constants(sensor, modes, c.cycle),
         "cMostPush": [axis.quick_deceleration for axis in c.axes],
         "cModes": modes,
         "cCycle": c.cycle,
@@ -50,7 +38,7 @@ def observer(c: PlannerConstants, sensor: SensorConstants) -> str:
     }
     lengths = {
         "live": len(lives), "mode": modes, "observed": 2 * modes + one, "power": len(lives) * c.degrees,
-        "expected": int(known["cExpectedLength"]),
+        "expected": expected(sensor, c.cycle),
     }  # fmt: skip
     return filled(
         "observer",
