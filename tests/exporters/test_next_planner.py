@@ -262,6 +262,24 @@ def test_after_a_prompt_stop_that_leaves_too_much_a_far_target_begins_and_leaves
     history.keeps()
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_an_axis_is_not_kept_standing_by_what_a_prompt_stop_left(bay, seed):
+    """A stick that was thrown over, and a stop: a third of a metre swings on, also as given."""
+    spec, compiled = bay
+    random = np.random.default_rng([9, seed])
+    history = History(spec, compiled, random)
+    speed = (1.0 if history.place < 20.0 else -1.0) * random.uniform(0.2, 1.0)
+    history.hold(random.uniform(2.0, 8.0), bVelocity=1.0, fVelocityCommand=speed)
+    history.hold(random.uniform(0.2, 3.0), bVelocity=1.0, fVelocityCommand=-speed)
+    stop = history.hold(20.0, bVelocity=0.0, bStop=1.0, bPrompt=1.0)
+    assert stop["fSwayLeft"][-1] > 0.2 and not stop["bPromise"][-1]
+    moves = history.hold(15.0, bStop=0.0, bPrompt=0.0, bVelocity=1.0, fVelocityCommand=speed)
+    assert abs(moves["fVelocity"][-1]) > 0.9 * abs(speed)
+    stop = history.hold(30.0, bVelocity=0.0, bStop=1.0)
+    assert stop["fVelocity"][-1] == 0.0
+    history.keeps()
+
+
 def test_no_speed_is_above_a_limit_however_little_that_falls(bay):
     """Neither the ramp to it, nor one that is kept, nor the stop behind it."""
     spec, compiled = bay

@@ -197,8 +197,8 @@ def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings)
         assert values[row] + 1j * values[row + 1] == pytest.approx(-known / 2.0, abs=1e-11)
     levels = bounds / gains
     *_, alone, quiet = account.call(2, trial, nBefore=5, nSlots=20, nMet=2, nGap=1, fPart=0.7, bQuiet=1.0)
-    assert np.array_equal(quiet, rows) and np.array_equal(alone[:4], values[:4])
-    for swing, row in zip(shown[2:], at[2:], strict=True):  # what the trial adds to what has swung
+    assert np.array_equal(quiet, rows)
+    for swing, row in zip(shown, at, strict=True):  # what the trial adds to what has swung
         own = ahead[swing, :5] @ trial[:5]
         assert alone[row] + 1j * alone[row + 1] == pytest.approx(-own / 2.0, abs=1e-11)
     assert np.allclose(radii[:4], 0.7 * np.cos(np.pi / 12) * levels[[2, 3, 8, 9]] / 2.0)
