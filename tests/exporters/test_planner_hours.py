@@ -13,6 +13,7 @@ pytestmark = pytest.mark.slow
 
 CYCLE, LIMIT, ERROR, VELOCITY, HIGH = 0.02, 0.05, 0.05, 1.1, 40.0
 M1, L2 = 350.0, 1.5
+UNKNOWN = 2.0  # nPromise: what no motion makes up for was forgotten
 ERRORS_OF_FREQUENCIES = 0.3  # rad, by which machines next to each other differ at the end
 DAMPED = ["plant.c1=1150.0", "plant.c2=10.0"]  # 0.5 % with 6 m of rope
 
@@ -102,6 +103,8 @@ def rests(out):
 
 def require_true(out, at, rope, load, decay=0.0):
     """Require that no more is left than is stated, and no more than allowed while the block promises."""
+    if out["nPromise"][at] == UNKNOWN:
+        return
     found = worst(out["fVelocity"][:at], rope, load, decay)
     counted = 0.97 * found if decay else found  # the decays are 8 % and 60 % greater
     assert counted <= out["fSwayLeft"][at]
@@ -161,7 +164,7 @@ def test_a_hand_in_time_with_the_swing_breaks_no_promise(text):
 
 
 def test_a_report_that_the_load_hangs_still_begins_anew(text):
-    crane = Crane(text, 3.0, 100.0).works(np.random.default_rng(1), 700.0, 3.0)
+    crane = Crane(text, 3.0, 100.0).works(np.random.default_rng(1), 500.0, 3.0)
     crane.hold(60.0, bVelocity=0.0)
     assert crane.outputs["fSwayLeft"][-1] > 0.5 * LIMIT
     crane.hold(1.0, bLoadAtRest=1.0)

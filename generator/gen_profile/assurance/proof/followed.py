@@ -172,6 +172,7 @@ class Followed:
         """Cycle from which on it is not known how the load of the machine as given swings."""
         lost = [order.begin for order in self.orders if order.kind in (QUICK_STOP, DISABLED)]
         lost += self.brakings
+        lost += np.flatnonzero(self.issued["nPromise"] == UNKNOWN)[:1].tolist()
         lost += [*self.rest_reports, *np.flatnonzero(self.retold)[:1].tolist()]
         return min(lost, default=self.cycles)
 

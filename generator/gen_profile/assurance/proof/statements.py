@@ -223,6 +223,10 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
     for begin in run.brakings:
         reports = (at for at in run.rest_reports if at >= begin and run.guided[at] and run.stands[at])
         may_be[begin : min(reports, default=run.cycles)] = True
+    added_up = np.flatnonzero(run.issued["nPromise"] == ADDED_UP)
+    for begin in added_up[:1]:  # what no motion makes up for may be forgotten
+        reports = (at for at in run.rest_reports if at >= begin and run.guided[at] and run.stands[at])
+        may_be[begin : min(reports, default=run.cycles)] = True
     return may_be | (np.cumsum(run.lost_sensors) > 0), must_be
 
 
