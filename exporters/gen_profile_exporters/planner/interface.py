@@ -24,10 +24,16 @@ def interface(constants: PlannerConstants) -> str:
         "events": constants.events,
         "varied": constants.stated_error > 0.0 and not constants.rates,
         "measured": constants.sensor is not None,
+        "prompt": may_stop_promptly(constants),
     }
     text = WHERE.sub(lambda some: some[2] if parts[some[1]] else "", TEXT.read_text("ascii"))
     values = _values(constants)
     return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
+
+
+def may_stop_promptly(constants: PlannerConstants) -> bool:
+    """Whether stops may be prompt: not where a machine is followed, whose promise would not hold."""
+    return not (constants.rates or constants.sensor)
 
 
 def reaction(constants: PlannerConstants) -> float:

@@ -30,8 +30,8 @@ SENSED = {  # what the block tells of such an axis, by the columns of a table
 }
 LOST = {  # promises, by nPromise
     1: "a live parameter changed on the way",
-    2: "there was a quick stop, or the axis was moved while the block was disabled",
-    5: "what the stated errors leave adds up, from motion to motion, to more than is allowed",
+    2: "there was a quick stop, the axis was moved while the block was disabled, or too much had added up",
+    5: "what the stated errors leave, or prompt stops, adds up to more than is allowed",
     6: "the sensor shows more sway than is allowed, or that is being damped",
 }
 UNITS = ("m", "rad")

@@ -16,7 +16,14 @@ from gen_profile_exporters.planner.blocks.texts import (
     planner,
 )
 from gen_profile_exporters.planner.constants import PlannerConstants
-from gen_profile_exporters.planner.interface import HOLD, WHERE, gives_up, interface, reaction
+from gen_profile_exporters.planner.interface import (
+    HOLD,
+    WHERE,
+    gives_up,
+    interface,
+    may_stop_promptly,
+    reaction,
+)
 from gen_profile_exporters.planner.layout import narrow, with_while_loops
 from gen_profile_exporters.playback.structured_text import block_name
 
@@ -61,6 +68,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
     stated |= {"exact": not varied, "measured": c.sensor is not None, "stays": not c.rates}
     stated["several"] = len(c.axes) > 1
+    stated["prompt"] = may_stop_promptly(c)
     body = (FOLDER / "shell.st").read_text("ascii")
     words = c.sensor.words if c.sensor else {}
 
@@ -73,6 +81,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         **values,
         # where a sensor is, it stands to damp
         "goes_on": "(nState = cMoving) OR (nState = cStanding)" if c.sensor else "nState = cMoving",
+        "prompt": "bPrompt := bPromptStop," if may_stop_promptly(c) else "",
         "together": "nTogether := nTogether, bHeld := bHeld, " if len(c.axes) > 1 else "",
         # a rope that changes is calmed on the way, and then while nothing forbids to move
         "left_for_good": "(nState = cStanding) AND" if c.rates else "",
