@@ -56,7 +56,7 @@ def test_a_motion_on_the_first_mesh_will_do_where_bisecting_costs_too_much():
     with budget(1e9):
         coarse = direct.solve(problem, coarse=True, options=options).raise_for_status()
         took = 1e9 - left()
-    with budget(4.0 * took):
+    with budget(2.7 * took):
         found = direct.solve(problem, options=options)
     assert len(found.raise_for_status().knots) == len(coarse.knots) < len(fine.knots)
     assert choice.keeps_limits(found)
