@@ -220,7 +220,7 @@ def test_no_machine_takes_more_operations(preset):
     ]
     spec = preset_spec(preset, changes)
     text = planner_block(spec).text
-    assert len(text) < 160_500
+    assert len(text) < 170_000
     library, *_ = compiled = compile_counting(text)
     assert library.size() < 72 * 1024
     block = CountedBlock(compiled, fActPosition=0.0)

@@ -36,8 +36,8 @@ COSINES = [
 STOP_SHARE = 0.8  # of the sway that is allowed, that a stop may leave
 BETWEEN = 1.15  # times that, on any machine that is watched
 LITTLE = 30  # slots in which little is left of what was measured, until it is no more damped
-APART = 2.0  # rad
-FADED = 1.6  # exponent by which a swing decays to a fifth
+APART = 1.5  # rad
+FADED = 1.386  # exponent by which a swing decays to a quarter
 FOREVER = 1e9  # s
 LEAST_SHARE = 0.02  # of the allowed sway, that rounding may leave where no errors are stated
 
