@@ -145,7 +145,7 @@ def test_a_bisected_mesh_holds_the_same_motion():
     (setup, _), cost = set_up.set_up(limited(acceleration=0.3)), SwayCost(beta=50.0, gamma=50.0)
     goal = direct.Goal(setup=setup, sway_cost=cost, sway_limit=None)
     found = direct.sequence(setup.transcription.rest(), goal)
-    where = switching(setup, found.iterate, None)
+    where = switching(setup, found.iterate, (None, None))
     finer, motion = bisected(setup, found.iterate, where)
     assert 0 < where.sum() < len(where)
     assert finer.effort(motion.local) == pytest.approx(setup.effort(found.iterate.local), rel=1e-12)
