@@ -142,7 +142,7 @@ def test_much_sway_is_calmed_before_the_axis_goes_elsewhere():
     with ClosedLoop(spec, planner_block(spec).text, Histories.of(spec)) as loop:
         run = loop.run(history)
     assert run.stands > 0
-    assert run.residual.max() < 0.012
+    assert run.residual.max() < 0.025
 
 
 @pytest.mark.slow

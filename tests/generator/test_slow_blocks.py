@@ -33,14 +33,15 @@ def delayed(on, wait):
 MOVES = "(ABS(fVelocity) > 0.02)"
 STOPS_DEAD = (
     "IF bExecute AND (fTarget <> fLast) THEN bHalts := {when}; fLast := fTarget; END_IF; "
-    "IF bHalts THEN IF ABS(fVelocity) > 0.0 THEN bExecute := FALSE; ELSE bHalts := FALSE; END_IF; END_IF;"
+    "IF bHalts THEN IF ABS(fVelocity) > 0.0 THEN bExecute := FALSE; nSince := 0; "
+    "ELSIF nSince < 150 THEN bExecute := FALSE; nSince := nSince + 1; ELSE bHalts := FALSE; END_IF; END_IF;"
 )
 SLOW = {  # and of which commands that makes some late
     "targets are looked at late": (delayed("bExecute", "bExecute := FALSE;"), {FIRST, POSITION}),
     "a stick is looked at late": (delayed("bVelocity", "fVelocityCommand := 0.0;"), {VELOCITY}),
     "a stop is looked at late": (delayed("bStop", "bStop := FALSE;"), {STOP}),
     "at two fifths of the speed": (("rOverride := 0.4 * rOverride;", ""), {FIRST, POSITION, WAY}),
-    "a far correction stops dead": ((STOPS_DEAD.format(when=MOVES), ""), {WAY}),
+    "a far correction stops dead for three seconds": ((STOPS_DEAD.format(when=MOVES), ""), {WAY}),
     "corrections wait for a standstill": (
         (
             "IF bExecute AND (fTarget <> fLast) THEN IF ABS(fVelocity) > 0.0 THEN fTarget := fLast; "
