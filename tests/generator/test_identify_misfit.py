@@ -10,7 +10,7 @@ from gen_profile.presentation.charts.identification import identification_figure
 from gen_profile.spec.reading import preset_spec
 from gen_profile.studies.identification import misfit
 from gen_profile.studies.identification.estimation import estimate
-from gen_profile.studies.identification.fit import fit_of
+from gen_profile.studies.identification.fit import Fit, fit_of
 from gen_profile.studies.identification.identify import identify
 from gen_profile.studies.identification.measurements import Period, SwingLog, cut_swing, parse_reading
 from gen_profile.studies.identification.misfit import Explanation, elsewhere, likeliest, spectrum
@@ -79,7 +79,7 @@ def test_a_swing_of_the_size_of_its_noise_tells_the_rope():
 
 
 @pytest.mark.parametrize(("per_rad", "refused"), [(1.0, False), (180.0 / np.pi, True)])
-def test_degrees_under_the_name_of_rad_are_named_before_anything_is_searched(per_rad, refused):
+def test_degrees_under_the_name_of_rad_are_named_before_anything_is_searched(monkeypatch, per_rad, refused):
     """The slow mode swings by 2 rad then; the fast one, for which it was taken, by less than 45°."""
     spec, times = preset_spec("bay-crane"), np.arange(0.0, 60.0, 0.1)
     exact = swing(spec.plant.parameters, times, [0.03, 0.03, 0.0, 0.0], (8.0,), "double-pendulum-crane")
@@ -88,6 +88,7 @@ def test_degrees_under_the_name_of_rad_are_named_before_anything_is_searched(per
     if not refused:
         require_likely(swing_model(machine, log))
         return
+    monkeypatch.setattr(Fit, "solve", lambda *_: pytest.fail("it was searched"))
     with pytest.raises(InfeasibleProblem, match=r"rad/s to either side, a swing of \d+°: look at its unit"):
         identify(spec, [log], ["L1"])
 

@@ -8,7 +8,7 @@ from gen_profile.studies.identification.estimation import require_swings
 from gen_profile.studies.identification.fit import fit_of
 from gen_profile.studies.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.studies.identification.misfit import misfits
-from gen_profile.studies.identification.swing_model import SwingingMachine, swing_model
+from gen_profile.studies.identification.swing_model import SwingingMachine, require_likely, swing_model
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem
 
 PARTS = 8  # of a log, at the beginnings of which it is tried
@@ -52,7 +52,9 @@ def _swings(
     machine: SwingingMachine, names: Sequence[str], readings: Sequence[DirectReading | Period], log: SwingLog
 ) -> bool:
     try:
-        fit = fit_of(machine, names, readings, [swing_model(machine, log)])
+        model = swing_model(machine, log)
+        require_likely(model)  # a search from far away takes minutes
+        fit = fit_of(machine, names, readings, [model])
         unknowns, noise = fit.solve()
         if any(misfits(fit, unknowns)):
             return False
