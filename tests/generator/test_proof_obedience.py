@@ -1,7 +1,5 @@
 """Judging whether a block obeys: synthetic motions, each fault by itself, and blocks that disobey."""
 
-from types import SimpleNamespace
-
 import attrs
 import numpy as np
 import pytest
@@ -29,7 +27,6 @@ from gen_profile.assurance.proof.orders import (
 )
 from gen_profile.assurance.proof.statements import OVERSTATED
 from gen_profile.assurance.proof.verdict import kind_of
-from gen_profile.assurance.proof.watching import BlockWatch
 from gen_profile.methods.quickest.modes import SwayModes
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
@@ -235,15 +232,6 @@ def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginn
     assert kinds(attrs.evolve(FAULTS["swings"], retold=np.ones(CYCLES, dtype=bool))) == set()
     last = attrs.evolve(obedient(), last_modes=MODES, last_known=50, sway_limit=0.05)
     assert kinds(last) == {kind_of(WORDS["swings"])}
-
-
-@pytest.mark.parametrize(
-    ("stated", "reason", "wrong"), [(0.06, 0.0, "kept"), (0.04, 5.0, "lost"), (0.06, 5.0, "")]
-)
-def test_errors_end_the_promise_where_they_may_leave_more_than_allowed(stated, reason, wrong):
-    followed = attrs.evolve(with_output("fSwayLeft", slice(None), stated), sway_limit=0.05)
-    followed.issued["nPromise"][:], followed.issued["bPromise"][:] = reason, reason == 0.0
-    assert kinds(followed) == ({kind_of(WORDS[wrong])} if wrong else set())
 
 
 def test_a_block_that_is_disabled_and_taken_over_has_no_fault():
@@ -474,45 +462,3 @@ def test_histories_hold_what_operators_and_controllers_do():
 
 def _same(first, second):
     return first.command == second.command == "position" and first.values == second.values
-
-
-def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
-    followed = SimpleNamespace(
-        issued={"fSwayLeft": np.array([0.0, 0.02, 0.01, 0.005]), "nPromise": np.zeros(4)},
-        orders=(),
-        sway_limit=0.05,
-        sensed=lambda _: np.zeros(4, dtype=bool),
-        drifts=np.zeros(4, dtype=bool),
-        brakings=[],
-    )
-    for left, found in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
-        run = SimpleNamespace(residual=np.array([left]), stands=1)
-        assert list(BlockWatch._understated(None, run, followed)) == found
-    followed.brakings.append(1)
-    assert list(BlockWatch._understated(None, run, followed)) == []
-    followed.brakings.clear()
-    followed.issued["nPromise"][-1] = 1.0  # the rope changed on the way
-    assert list(BlockWatch._understated(None, run, followed)) == []
-    followed.issued["nPromise"][-1], followed.drifts[1] = 0.0, True  # another rope was given at rest
-    assert list(BlockWatch._understated(None, run, followed)) == []
-
-
-def test_a_live_parameter_that_changes_on_the_way_ends_the_promise():
-    assert kind_of(WORDS["kept"]) in kinds(attrs.evolve(obedient(), live_changes=[(300, 350)]))
-    assert kinds(attrs.evolve(obedient(), live_changes=[(1000, 1050)])) == set()  # it is taken over
-
-
-def test_what_is_left_goes_with_the_root_of_the_period_where_a_rope_changes_at_rest():
-    """After the stop, from 2 rad/s to 1: √2 times as much is left; stating less is refused, more is safe."""
-    changed, limit = CYCLES - 900, 0.05
-    slower = attrs.evolve(MODES, modes=attrs.evolve(MODES.modes, poles=0.5 * MODES.modes.poles))
-    retold = np.arange(CYCLES) >= changed
-    known = {"live_changes": [(changed, changed + 9)], "last_known": changed + 9, "last_modes": slower}
-    moved = MODES.modes.moved(obedient().acceleration, [changed - 1], CYCLE)
-    left = 2.0**0.5 * float(MODES.modes.sway(moved).max())
-    assert left > 10.0 * limit
-    for stated, refused in ((left, False), (2.0 * left, False), (left - 0.02 * limit, True)):
-        followed = with_output("fSwayLeft", slice(None), 2.0 * left)
-        followed.issued["fSwayLeft"][changed:] = stated
-        found = kinds(attrs.evolve(followed, modes=MODES, retold=retold, sway_limit=limit, **known))
-        assert (kind_of(WORDS["understated"]) in found) is refused

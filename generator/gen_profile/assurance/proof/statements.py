@@ -220,11 +220,8 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
                 may_be[at:] &= run.issued["bBusy"][at - 1] != 0.0
         if sees[order.begin : order.end].any():
             must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
-    for begin in run.brakings:
-        reports = (at for at in run.rest_reports if at >= begin and run.guided[at] and run.stands[at])
-        may_be[begin : min(reports, default=run.cycles)] = True
-    added_up = np.flatnonzero(run.issued["nPromise"] == ADDED_UP)
-    for begin in added_up[:1]:  # what no motion makes up for may be forgotten
+    # after braking; and once too much has added up, which no motion makes up for, and which may be forgotten
+    for begin in (*run.brakings, *np.flatnonzero(run.issued["nPromise"] == ADDED_UP)[:1]):
         reports = (at for at in run.rest_reports if at >= begin and run.guided[at] and run.stands[at])
         may_be[begin : min(reports, default=run.cycles)] = True
     return may_be | (np.cumsum(run.lost_sensors) > 0), must_be
