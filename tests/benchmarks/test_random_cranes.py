@@ -14,7 +14,7 @@ from gen_profile.methods.solvers.motion import optimal_profile
 from gen_profile.motion.metrics import greatest
 from gen_profile.spec.reading import preset_spec
 
-SEEDS = 40
+SEEDS = [seed for seed in range(40) if seed != 13]  # without limits that one swings beyond a radian, unsolved
 INTERVALS = 40  # even, of five points: within 1e-4 of the bisected mesh where a limit binds
 FACTORS = {"velocity": 5, "acceleration": 6}  # of the oracle's states
 WORSE = 5e-3  # share by which a motion may cost more
@@ -51,12 +51,11 @@ def by_ipopt(spec, kind: str, limit: float) -> float | None:
     return float(found["f"]) if solver.stats()["success"] else None
 
 
-@pytest.mark.parametrize("seed", range(SEEDS))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_no_random_crane_is_refused_or_moved_worse_than_ipopt_does(seed):
     task, kind, share = drawn(seed)
     free = attempt(problem_of(preset_spec("bay-crane", task)))
-    if free.optimum is None:
-        pytest.skip(f"without limits: {free.status.name}")
+    assert free.optimum is not None, f"without limits: {free.status.name}"
     order = list(FACTORS).index(kind) + 1
     limit = float(f"{share * greatest(optimal_profile(free), order):.4g}")
     spec = preset_spec("bay-crane", [*task, f"limits.{kind}={limit}"])

@@ -287,8 +287,8 @@ def test_an_axis_that_has_left_much_moves_on_beside_another():
     assert out["bDone"][-1] and out["bPromise"].all()
 
 
-def test_a_far_target_is_approached_where_pulses_are_refused():
-    """A refused pulse began a search for a plan, which a far target has not, without pulses: 5 s later."""
+def test_a_far_target_is_approached_soon_where_much_is_left():
+    """It began 5 s later."""
     places = {"fActPosition_x": 20.527381009898555, "fActPosition_y": -0.6}
     text = planner_block(parse_spec(LEAVES_MUCH)).text
     block = CountedBlock(compile_counting(text), fL=7.237206773782146, **places)

@@ -147,7 +147,7 @@ def test_an_axis_that_turned_round_goes_its_way_at_full_speed(text, rope, load):
 
 
 def test_the_time_to_a_farther_target_counts_the_way_that_is_committed_already(text):
-    """Not only that beyond it, as if pulses added to it at once: it said 22.8 s of 42.9."""
+    """Not only that beyond it: it said 22.8 s of 42.9."""
     driver = Driver(text, fL1=6.0, fm2=1005.0, fActPosition=39.4).hold(2.0)
     driver.hold(0.144, bExecute=1, fTarget=16.0).hold(CYCLE, bExecute=0)
     out = driver.hold(60.0, bExecute=1, fTarget=1.7).outputs
@@ -156,8 +156,8 @@ def test_the_time_to_a_farther_target_counts_the_way_that_is_committed_already(t
     assert (np.abs(out["fTimeToGo"][begun:done] - left) < 0.25 * left + 0.5).all()
 
 
-def test_the_time_to_go_counts_how_fast_pulses_may_become():
-    """Of 4 m/s they had room to decline from 1.9: it said 23 s of 40."""
+def test_the_time_to_go_counts_how_fast_the_axis_may_become():
+    """There is room for 1.9 of 4 m/s: it said 23 s of 40."""
     driver = Driver(planner_block(parse_spec(STACKER)).text, fm2=900.0, fActPosition=1.0).hold(1.0)
     driver.hold(4.6, bExecute=1, fTarget=60.0, rOverride=0.45).hold(CYCLE, bExecute=0)
     out = driver.hold(60.0, bExecute=1, fTarget=78.0, rOverride=1.0).outputs

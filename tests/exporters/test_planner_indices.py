@@ -32,7 +32,7 @@ k2 = 120000.0
 c1 = 300.0
 c2 = 150.0
 """
-SPEC = parse_spec(STACKER)  # its pulses may take the whole committed future to decline
+SPEC = parse_spec(STACKER)  # it may take the whole committed future to stop
 
 
 @pytest.fixture(scope="module")

@@ -121,7 +121,7 @@ def test_a_block_that_forgets_what_was_left_breaks_it(text):
 
 
 def test_a_rope_that_changes_while_a_stick_holds_the_axis_at_its_end_keeps_the_promise(text):
-    """The axis stands there: pulses of a rounding error kept it moving."""
+    """The axis stands there: rounding errors kept it moving."""
     driver = standing(text, 6.0, 1000.0, place=39.0).hold(15.0, bVelocity=1, fVelocityCommand=VELOCITY)
     assert not driver.outputs["bBusy"][-1]
     driver.hold(2.0, fL1=3.5)

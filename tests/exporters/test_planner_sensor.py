@@ -392,7 +392,7 @@ GANTRY = [
     "limits={velocity=1.0, acceleration=0.3, jerk=1.0, travel=[0.0, 40.0]}",
     'planner.sensor={quantity="angle", of=["theta_x", "theta_y"], noise=0.0005}',
     "planner.disturbance={swing={payload-x=0.5, payload-y=0.5}, settle=15.0}",
-    "plant.L=3.0",  # a fast swing beside its jerk, which keeps great pulses from being followed by others
+    "plant.L=3.0",  # a fast swing beside its jerk
     "export.cycle_time=0.02",
     "planner.operations=50000",
 ]

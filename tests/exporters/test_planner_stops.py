@@ -38,7 +38,7 @@ def test_a_stop_begins_with_the_next_slot_and_ends_no_later_than_first_stated():
 
 
 @pytest.mark.slow
-def test_a_quick_stop_lets_the_kernel_in_work_be_finished():
+def test_a_rope_that_changes_before_a_quick_stop_is_known_after_it():
     """Dropped in one of two cycles of a slot, it stayed half that of another rope: 2 % too fast."""
     changes = ["planner.live_rate={L1=0.2}", "check.residual_sway=0.02"]
     compiled = compile_counting(planner_block(preset_spec("bay-crane", changes)).text)

@@ -491,12 +491,10 @@ def test_a_block_that_sways_too_much_is_not_written(tmp_path, monkeypatch):
 def test_an_altered_file_is_told(deployed, tmp_path):
     for name in ("bay 3.st", "manifest.json"):
         (tmp_path / name).write_bytes((deployed[0] / name).read_bytes())
-    text = (tmp_path / "bay 3.st").read_text()
-    (tmp_path / "bay 3.st").write_text(
-        text.replace("END_FUNCTION_BLOCK", "(* altered *)\nEND_FUNCTION_BLOCK")
-    )
+    path, end = tmp_path / "bay 3.st", "END_FUNCTION_BLOCK"
+    path.write_text(path.read_text().replace(end, f"(* altered *)\n{end}"))
     options = ("--histories", 1, "--json")
-    altered = run_here("check", tmp_path / "bay 3.st", *options)
+    altered = run_here("check", path, *options)
     assert altered.code == 4
     assert altered.document["artefact"]["manifest"] == "differs"
     assert "altered after its export" in altered.err
