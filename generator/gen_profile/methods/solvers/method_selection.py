@@ -60,7 +60,7 @@ BLEND = 4.0  # order of the norm by which these times and the period count toget
 RANGE = 2.0  # times the work for a whole range
 # rad and iterations, from which on a motion may be one of several optimal ones; rad within limits
 SWINGS_FAR, MANY_ITERATIONS, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
-REST = 1e-2  # of the greatest sway on the way, which is left where intervals are too long for a motion
+REST = 5e-2  # of the greatest sway on the way: more is left where intervals are too long for a motion
 BETTER = 1.0 - 1e-3  # times the cost of a motion, below which another one is given in its place
 
 
