@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
+from generator.planned_machines import GANTRY
 
 from gen_profile.planner.design import planner_block
-from gen_profile.spec.reading import preset_spec
+from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, SLOT = 0.004, 0.272  # s, that of a rope of 6 m
 MOMENTS = np.linspace(3.0, 10.0, 9)  # s, on the way
@@ -51,3 +52,42 @@ def test_a_rope_that_changes_before_a_quick_stop_is_known_after_it():
         block.hold(1200, bQuickStop=0.0, bVelocity=0.0, bReset=1.0)
         block.hold(3, bReset=0.0, bVelocity=1.0, fVelocityCommand=0.0)
         assert block.hold(3000, fVelocityCommand=0.6)["fVelocity"][-1] == pytest.approx(0.6)
+
+
+@pytest.fixture(scope="module")
+def slow_gantry():
+    """A bridge that takes 13 s to full speed, at 20 ms."""
+    x = "x={velocity=2.0, acceleration=0.15, jerk=0.2, travel=[0.0, 150.0]}"
+    y = "y={velocity=0.63, acceleration=0.12, jerk=0.2, travel=[0.0, 25.0]}"
+    changes = ["export.cycle_time=0.02", "robustness.uncertain={L=0.04}", "planner.live={L=[3.0, 12.0]}"]
+    return compile_counting(planner_block(parse_spec(GANTRY, [*changes, f"limits.axis={{{x}, {y}}}"])).text)
+
+
+@pytest.mark.slow
+def test_ends_of_a_stop_go_no_farther_beyond_the_committed_motion_than_a_load_sways(slow_gantry):
+    """A fifth of a ramp of 31 m was added on both sides: 6 m behind an axis that had begun to move."""
+    rope = 5.27
+    block = CountedBlock(slow_gantry, fActPosition_x=60.0, fActPosition_y=12.0, fL=rope)
+    block.hold(50)
+    block.hold(2, bVelocity=1.0)
+    out = block.hold(100, fVelocityCommand_x=-2.0, fVelocityCommand_y=-0.63)
+    for axis, acceleration in (("x", 0.15), ("y", 0.12)):
+        sways = 2.0 * acceleration * rope / 9.81
+        assert out[f"fVelocity_{axis}"][-1] < 0.0
+        assert 0.0 < out[f"fStopHigh_{axis}"][-1] - 60.0 * (axis == "x") - 12.0 * (axis == "y") < 1.05 * sways
+
+
+@pytest.mark.slow
+def test_a_stop_that_waits_for_another_axis_to_be_planned_does_not_count_as_failed(slow_gantry):
+    """The other one took all operations of a slot; the stop took 14 s, and went 2.2 m back."""
+    block = CountedBlock(slow_gantry, fActPosition_x=28.48848, fActPosition_y=11.007932, fL=8.97503)
+    block.hold(23)
+    block.hold(
+        16, bExecute=1.0, fTarget_x=78.0, fTarget_y=6.14, fVelocityLimit_x=0.957, fVelocityLimit_y=0.3014
+    )
+    block.hold(104, bStop=1.0, fVelocityLimit_x=0.0, fVelocityLimit_y=0.0)
+    for cycles, x, y in ((12, 10.976, 0.0), (11, 132.57, 8.526), (11, 68.056, 1.793)):
+        block.hold(cycles, bStop=0.0, bExecute=1.0, fTarget_x=x, fTarget_y=y)
+    out = block.hold(750, bStop=1.0)
+    assert np.flatnonzero(out["bBusy"])[-1] * 0.02 < 6.0
+    assert np.abs(out["fPosition_y"] - out["fPosition_y"][0]).max() < 0.2
