@@ -67,7 +67,7 @@ def obedient():
         "fPosition": position,
         "fVelocity": velocity,
         "fAcceleration": acceleration,
-        "bBusy": 1.0 * (~stands | (goes & ~there)),
+        "bBusy": 1.0 * (~stands | (goes & ~there) | sticks),
         "bDone": 1.0 * there,
         "bInVelocity": 1.0 * (sticks & (np.abs(velocity - 0.8) < 1e-9)),
         **{name: np.zeros(CYCLES) for name in ("bCommandAborted", "bError", "nErrorId", "nPromise")},
@@ -226,6 +226,20 @@ FAULTS = {
 @pytest.mark.parametrize("what", FAULTS)
 def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
+
+
+def test_busy_tells_of_a_stick_that_is_about_to_be_followed():
+    """A slow machine's axis, planned for longer than a fifth of a period, was told to have come to rest."""
+    slow = with_orders(REST, attrs.evolve(MOVE, end=2000), attrs.evolve(STICKS, begin=2000), STOPS)
+    slow.issued["bDone"][2000:] = slow.issued["fDistanceToGo"][2000:] = 0.0
+    slow.issued["bBusy"][2000:STICK] = 1.0
+    waits = {kind_of(WORDS[what]) for what in ("idle", "reaction", VELOCITY)}
+    assert kinds(slow) <= waits
+    slow.issued["bBusy"][2100] = 0.0
+    assert kind_of(WORDS["vanished"]) in kinds(slow)
+    at_the_end = attrs.evolve(slow, limits=[attrs.evolve(LIMITS, targets=(-100.0, TARGET))])
+    at_the_end.issued["bBusy"][2000:STICK] = 0.0
+    assert kind_of(WORDS["vanished"]) not in kinds(at_the_end)
 
 
 def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginning():

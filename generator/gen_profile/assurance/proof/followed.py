@@ -17,6 +17,7 @@ from gen_profile.assurance.proof.orders import (
     NO_MOTION,
     POSITION,
     QUICK_STOP,
+    VELOCITY,
     Ends,
     Flags,
     ReceivedOrders,
@@ -246,6 +247,15 @@ class Followed:
     def away(self) -> Array:
         """Greatest distance of an axis from its position where one is commanded, (cycles,)."""
         return np.asarray(np.abs(self.way).max(axis=0) * self.goes)
+
+    def led_by_stick(self, slots: float = 0.0) -> Flags:
+        """Tell when a stick leads an axis that has room for so many slots of its velocity, (cycles,)."""
+        sticks = self.by_order([order.kind == VELOCITY and min(order.tops) > 0.0 for order in self.orders])
+        led = np.zeros(self.cycles, dtype=bool)
+        for k, (position, way) in enumerate(zip(self.position, self.way, strict=True)):
+            room = self.room(k, position, way) - slots * SLOT * self.period * np.abs(way)
+            led |= (way != 0.0) & (room > EXACT)
+        return np.asarray(sticks & led & self.received.holds)
 
     def slow_parts(self, axis: int, begin: float, end: float, beyond: float) -> list[tuple[float, float]]:
         """Give lengths and velocity limits of slow intervals between two places, or a little beyond."""

@@ -37,6 +37,7 @@ from gen_profile.planner.events import KEPT_EVENTS
 
 BARELY = 9.99e-4  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
+LED_ON = 2.0  # slots, for which an axis surely has room where its stick leads it
 NOTICED = 0.2  # periods, in which the end of a motion is
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 ADDED_UP = 5.0  # nPromise: errors may leave more than is allowed
@@ -63,9 +64,10 @@ def truths(run: Followed) -> Iterator[Allowance]:
     yield from never("busy", run.guided & ~(run.stands | busy))
     yield from never("done", done & (busy | ~there))
     yield from never("vanished", received.holds & run.goes & ~busy & ~done)
+    yield from never("vanished", run.led_by_stick(slots=LED_ON) & ~busy)
     if not run.reserve:  # calming goes on as long as it must
         yield from _lasting(run, "not done", there & ~done)
-        asked = received.holds & run.goes | run.damped
+        asked = received.holds & run.goes | run.led_by_stick() | run.damped  # it is about to move
         yield from _lasting(run, "not busy", busy & run.stands & ~asked)
 
 
