@@ -454,12 +454,26 @@ def test_an_error_of_the_block_is_told(text):
         (["planner.quick_stop=0.1"], "planner.quick_stop: must be at least limits.acceleration, "),
         (["export.cycle_time=0.2"], "export.cycle_time: at most"),
         (
-            ["planner.live={L1=[3.0, 12.0]}", "plant.m1=450.0", "plant.m2=20000.0", "plant.L2=1.8"],
+            ["planner.live={L1=[3.0, 12.0]}", "plant.m1=200.0", "plant.m2=20000.0", "plant.L2=1.8"],
+            r"L1 = 12 m .* 29.8 times .* takes 25 at most; narrow .* such as to L1 = \[3, 7.1\], or",
+        ),
+        (  # where it is followed
+            [
+                *("planner.live={L1=[3.0, 12.0]}", "planner.live_rate={L1=0.1}", "check.uncertain={L1=0.01}"),
+                *("plant.m1=450.0", "plant.m2=20000.0", "plant.L2=1.8"),
+            ],
             "planner.live: at L1 = 12 m the fastest mode has 20 times the frequency .* takes 9 at most",
         ),
-        (  # told first that modes come near each other elsewhere, which did not help
-            ["planner.live={L1=[1.5, 7.0], m2=[0.0, 5000.0]}", "plant.m1=80.0", "plant.L2=1.2"],
-            "at L1 = 7 m and m2 = 5000 kg the fastest mode has 22.5 times the frequency .* narrow the ranges",
+        (
+            ["planner.live={m1=[0.0, 800.0], m2=[0.0, 5000.0]}", "plant.L2=2.0"],
+            r"narrow the ranges, such as to m1 = \[50, 800\], or state",
+        ),
+        (
+            [
+                *("planner.live={L1=[1.5, 7.0], m2=[0.0, 5000.0]}", "plant.m1=80.0", "plant.L2=1.2"),
+                "robustness.uncertain={L1=0.03}",
+            ],
+            "near L1 = 1.5 m and m2 = 0 kg two modes .* such as by a least load above 0",
         ),
     ],
 )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import product
+from math import ceil, floor, log10
 from types import SimpleNamespace
 
 import attrs
@@ -15,8 +16,11 @@ from gen_profile.spec.model import Spec
 from gen_profile.support.errors import SpecError
 
 MOST_MODES = 3
+NARROWED = 12  # halvings of a range, until no mode is too fast in what is left
 SYMMETRIC = 2  # modes whose frequencies come from sum and product of their squares
-MOST_RATIO = 9.0  # of the fastest mode to the slowest, whose period makes the slots
+MOST_RATIO = 25.0  # of the faster of two modes to the slower, whose period makes the slots
+# of three modes, or where the machine is followed: none turns by more than half a turn in a slot then
+MOST_FOLLOWED = 9.0
 MOST_LIVE = 2
 DEGREES = (3, 6, 9, 12)
 FREQUENCY_ACCURACY = 1e-5  # relative, of the frequencies over the live ranges
@@ -104,15 +108,42 @@ def live_modes(spec: Spec) -> LiveModes:
 
 def _refuse_fast_modes(spec: Spec, points: Sequence[Sequence[float]], ratios: Sequence[float]) -> None:
     """Refuse modes that are too fast for slots of the slowest one, before all that other cures would help."""
-    live = bool(spec.planner.live)
-    if max(ratios) > MOST_RATIO:
+    modes = len(linearized(spec, points[0]).distinct_frequencies)
+    follows = bool(spec.planner.live_rate or spec.planner.sensor)
+    most = MOST_FOLLOWED if follows or modes != SYMMETRIC else MOST_RATIO
+    if max(ratios) > most:
+        live = bool(spec.planner.live)
         at = f"planner.live: at {_place(spec, points[int(np.argmax(ratios))])}" if live else "plant:"
-        narrow = "narrow the ranges, or " if live and min(ratios) <= MOST_RATIO else ""
+        narrowed = list(_narrowed(spec, points, points[int(np.argmax(ratios))], most))
+        narrow = f"narrow the ranges, such as to {' or '.join(narrowed)}, or " if narrowed else ""
         raise SpecError(
             f"{at} the fastest mode has {max(ratios):.3g} times the frequency of the slowest, and the "
-            f"planner block takes {MOST_RATIO:g} at most; {narrow}state a machine without the fast mode, "
-            "such as a single pendulum."
+            f"planner block takes {most:g} at most; {narrow}state a machine without the fast mode, "
+            "such as a single pendulum as long as both ropes."
         )
+
+
+def _narrowed(
+    spec: Spec, points: Sequence[Sequence[float]], worst: Sequence[float], most: float
+) -> Iterator[str]:
+    """Give ranges of single live parameters in which no mode is too fast, in words."""
+
+    def fits(number: int, end: float) -> bool:
+        moved = {(*point[:number], end, *point[number + 1 :]) for point in points}
+        rates = [linearized(spec, point).distinct_frequencies for point in moved]
+        return max(float(one[-1] / one[0]) for one in rates) <= most
+
+    for number, (name, (low, high)) in enumerate(spec.planner.live.items()):
+        bad, good = worst[number], -worst[number]
+        if abs(bad) < 1.0 or not fits(number, good):
+            continue
+        for _ in range(NARROWED):
+            between = 0.5 * (bad + good)
+            bad, good = (bad, between) if fits(number, between) else (between, good)
+        digit, end = 10.0 ** floor(log10((high - low) / 20.0)), 0.5 * (low + high + good * (high - low))
+        kept = (digit * ceil(end / digit), high) if bad < good else (low, digit * floor(end / digit))
+        if kept[0] < kept[1]:
+            yield f"{name} = [{kept[0]:g}, {kept[1]:g}]"
 
 
 def decays(linear: Linearization) -> Array:
