@@ -26,6 +26,7 @@ from gen_profile.assurance.proof.orders import (
     read_orders,
 )
 from gen_profile.assurance.proof.statements import OVERSTATED
+from gen_profile.assurance.proof.stopping import far, stops
 from gen_profile.assurance.proof.verdict import kind_of
 from gen_profile.methods.quickest.modes import SwayModes
 from gen_profile.planner.interface import BlockAxis
@@ -226,6 +227,16 @@ FAULTS = {
 @pytest.mark.parametrize("what", FAULTS)
 def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
+
+
+def test_a_block_that_states_a_shorter_reaction_is_not_held_to_shorter_stops():
+    """Ways of stops, and how wide their stated ends may be, are measured by the machine's own time."""
+    limits = [
+        [(one.what, one.needed, one.allowed) for judge in (stops, far) for one in judge(run)]
+        for run in (obedient(), attrs.evolve(obedient(), reaction=0.1))
+    ]
+    assert limits[0] == limits[1]
+    assert {"far", "loose"} <= {what for what, *_ in limits[0]}
 
 
 def test_busy_tells_of_a_stick_that_is_about_to_be_followed():

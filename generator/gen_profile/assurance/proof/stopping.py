@@ -6,13 +6,14 @@ import numpy as np
 
 from gen_profile.assurance.proof.followed import (
     EXACT,
+    LATENESS,
     MISJUDGED,
     NOTHING,
     SLOT,
     Allowance,
     Followed,
+    bounded,
     greatest,
-    in_time,
     runs_of,
     to_speeds,
 )
@@ -20,6 +21,9 @@ from gen_profile.assurance.proof.orders import POSITION, QUICK_STOP, STOP, VELOC
 from gen_profile.motion.profile import Array
 
 ACTS = 2.0  # slots, in which what a stick asked for is led to
+# slowest periods: no motion is shorter that leaves nothing (ZV, Smith 1957; Singer and Seering 1990), so that
+# what an axis has begun is not replaced by such a one sooner, whatever a block states of itself
+TAKEN_UP = 0.5
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 
 
@@ -73,7 +77,7 @@ def _no_wider(run: Followed, order: TimedOrder, own: slice, known: Array, wide: 
     wide : (axes, cycles) array
         m, from the axes to the farther ends.
     """
-    takes = in_time(run, to_speeds(run, _while_it_reacts(run, own.start)))
+    takes = _stops_in_time(run, _until_taken_up(run, own.start))
     rests = run.stands[own] & (run.issued["bBusy"][own] == 0.0)
     for k, limits in enumerate(run.limits):
         leads = known[k] + limits.velocity * takes
@@ -81,10 +85,15 @@ def _no_wider(run: Followed, order: TimedOrder, own: slice, known: Array, wide: 
         yield from greatest("loose", wide[k, own] * rests, limits.margin + EXACT, own.start)
 
 
-def _while_it_reacts(run: Followed, cycle: int) -> Array:
-    """Tell how fast axes may become before a block has taken up a command, (axes,)."""
+def _stops_in_time(run: Followed, speeds: Array) -> float:
+    """Tell in s what a stop from speeds, (axes,), may take any block, until it is taken up included."""
+    return TAKEN_UP * run.period + LATENESS * bounded(run, to_speeds(run, speeds))
+
+
+def _until_taken_up(run: Followed, cycle: int) -> Array:
+    """Tell how fast axes may become before a stop is taken up, (axes,)."""
     fastest = np.array([own.velocity for own in run.limits])
-    gained = run.reaction * np.array([own.acceleration for own in run.limits])
+    gained = TAKEN_UP * run.period * np.array([own.acceleration for own in run.limits])
     return np.asarray(np.minimum(np.abs(run.velocity[:, cycle]) + gained, fastest))
 
 
@@ -167,9 +176,9 @@ def far(run: Followed) -> Iterator[Allowance]:
         speed, position = np.abs(run.velocity[k]), run.position[k]
         stops = [o.kind == STOP or (o.kind == VELOCITY and not o.values[k]) for o in run.orders]
         for begin, end in runs_of(run.by_order(stops) & ~run.damped):
-            reacted = min(begin + run.after(run.reaction), end)
-            fastest = max(float(speed[began[begin] : reacted].max()), MISJUDGED * own.velocity)
-            takes = 0.5 * (run.reaction + in_time(run, to_speeds(run, np.array([fastest] * len(run.limits)))))
+            taken_up = min(begin + run.after(TAKEN_UP * run.period), end)
+            fastest = max(float(speed[began[begin] : taken_up].max()), MISJUDGED * own.velocity)
+            takes = 0.5 * (TAKEN_UP * run.period + _stops_in_time(run, np.array([fastest] * len(run.limits))))
             way = np.abs(position[begin:end] - position[begin])
             yield from greatest("far", way, fastest * takes + run.wander, begin)
 
