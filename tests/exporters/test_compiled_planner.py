@@ -1,8 +1,10 @@
 """The planner block, compiled by matiec and run, against the block's own compiled form.
 
-Collected only where the environment variables IEC2C and MATIEC_LIB name matiec's compiler and library.
+Collected only where the environment variables IEC2C and MATIEC_LIB name matiec's compiler and library;
+WHOLE_BLOCK_CYCLES asks for another number of random cycles.
 """
 
+import os
 import re
 import subprocess
 import sys
@@ -11,13 +13,17 @@ import numpy as np
 from test_compiled_block import HARNESS, compile_text
 from test_planner_forms import SPEC, planner_commands
 from test_planner_parameters import CHANGES, Block, source_of
+from test_whole_block import random_rows
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files
+from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.parameters import buffered_planner
 from gen_profile_exporters.playback.buffers import buffer_texts
+
+CYCLES = int(os.environ.get("WHOLE_BLOCK_CYCLES", "30000"))
 
 
 def played(text, inputs, outputs, rows, folder):
@@ -41,10 +47,13 @@ def played(text, inputs, outputs, rows, folder):
 
 
 def test_matiec_s_planner_issues_the_same_bits(tmp_path):
-    text = planner_block(SPEC).text
+    text = planner_block(preset_spec("bay-crane", ["planner.zones=true", "planner.events=true"])).text
     oracle = BlockInstance(text)
-    rows = np.concatenate(list(planner_commands(oracle.inputs)))
-    assert played(text, oracle.inputs, oracle.outputs, rows, tmp_path) == oracle.call(rows).tolist()
+    rows = random_rows(oracle.inputs, CYCLES, seed=19)
+    due = oracle.call(rows)
+    assert np.array_equal(np.array(played(text, oracle.inputs, oracle.outputs, rows, tmp_path)), due)
+    assert len(np.unique(due[:, oracle.outputs.index("nErrorId")])) > 4
+    assert np.ptp(due[:, oracle.outputs.index("fPosition")]) > 5.0
 
 
 class Recorded(Block):

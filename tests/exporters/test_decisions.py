@@ -5,13 +5,11 @@ import re
 import numpy as np
 import pytest
 from generator.planned_machines import GANTRY
-from played_planner import played_text
 from scipy.interpolate import BSpline
 
-from gen_profile.planner.design import planner_constants
+from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import parse_spec, preset_spec
-from gen_profile_exporters.planner.blocks.whole import whole_block
 
 BEGIN, COMMAND, CHOOSE, FAILED, FOUND, SLOT, AGAIN = range(7)
 STOP, TARGET, SPEED, PROMPT = 1, 2, 3, 4
@@ -21,12 +19,12 @@ SLOTS = 64
 
 @pytest.fixture(scope="module")
 def blocks():
-    return blocks_of(played_text(preset_spec("bay-crane", [])))
+    return blocks_of(planner_block(preset_spec("bay-crane")).text)
 
 
 @pytest.fixture(scope="module")
 def two():
-    return blocks_of(whole_block(planner_constants(parse_spec(GANTRY))[1]))
+    return blocks_of(planner_block(parse_spec(GANTRY)).text)
 
 
 def blocks_of(text):
@@ -224,7 +222,7 @@ def test_setpoints_are_the_derivatives_and_the_integral_of_one_spline(blocks):
 FUNCTION_BLOCK Called
 VAR_INPUT nTick : DINT; fFrom : LREAL; nAhead : DINT; f0 : LREAL; f1 : LREAL; f2 : LREAL; f3 : LREAL; END_VAR
 VAR_OUTPUT fPosition : LREAL; fVelocity : LREAL; fAcceleration : LREAL; fTimeToGo : LREAL; END_VAR
-VAR given : bay_crane_setpoints; aFuture : ARRAY [0..{size - 1}] OF LREAL; END_VAR
+VAR given : FB_bay_crane_setpoints; aFuture : ARRAY [0..{size - 1}] OF LREAL; END_VAR
 aFuture[0] := f0; aFuture[1] := f1; aFuture[2] := f2; aFuture[3] := f3;
 given(bMoving := TRUE, nTick := nTick, nSlot := {cycles}, fSlot := {slot!r}, fFrom := fFrom, nAhead := nAhead,
     aFuture := aFuture);

@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from played_planner import played_text
 
+from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
 
@@ -22,8 +22,8 @@ STANDS = {
 @pytest.fixture(scope="module")
 def bounds():
     """Give bounds by name, of as many slots as are asked for."""
-    text = played_text(preset_spec("bay-crane", []))
-    block = re.search(r"(?s)FUNCTION_BLOCK bay_crane_motion_bounds\n.*?END_FUNCTION_BLOCK\n", text)[0]
+    text = planner_block(preset_spec("bay-crane")).text
+    block = re.search(r"(?s)FUNCTION_BLOCK FB_bay_crane_motion_bounds\n.*?END_FUNCTION_BLOCK\n", text)[0]
     inputs = "".join(f"{name} : LREAL; " for name in STANDS if name != "nSlots")
     outputs = "".join(f"{name} : ARRAY [0..{SLOTS - 1}] OF LREAL; " for name in ARRAYS)
     handed = ", ".join(f"{name} := {name}" for name in ("nKind", *STANDS, *ARRAYS))
@@ -31,7 +31,7 @@ def bounds():
 FUNCTION_BLOCK Called
 VAR_INPUT nKind : DINT; nSlots : DINT; {inputs} END_VAR
 VAR_OUTPUT {outputs} END_VAR
-VAR own : bay_crane_motion_bounds; END_VAR
+VAR own : FB_bay_crane_motion_bounds; END_VAR
 own({handed});
 END_FUNCTION_BLOCK
 """)

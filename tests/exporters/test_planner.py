@@ -42,36 +42,6 @@ def text():
     return planner_block(parse_spec(BAY)).text
 
 
-def random_history(text, seed):
-    random = np.random.default_rng(seed)
-    live = {"fL1": random.uniform(3.0, 9.0), "fm2": random.uniform(0.0, 2000.0)}
-    driver = Driver(text, **live, fActPosition=random.uniform(LOW, HIGH)).hold(0.5)
-    for _ in range(random.integers(2, 8)):
-        seconds = random.choice([random.uniform(0.05, 2.0), random.uniform(2.0, 12.0)])
-        match random.choice(["position", "velocity", "stop", "stick"]):
-            case "position":
-                target = random.choice([random.uniform(LOW, HIGH), LOW, HIGH])
-                driver.hold(seconds, bVelocity=0, bStop=0, bExecute=1, fTarget=target)
-            case "velocity":
-                value = random.choice([random.uniform(-VELOCITY, VELOCITY), VELOCITY, -VELOCITY])
-                driver.hold(seconds, bVelocity=1, bStop=0, fVelocityCommand=value)
-            case "stop":
-                driver.hold(seconds, bVelocity=0, bStop=1)
-            case "stick":
-                for value in random.normal(size=20):
-                    driver.hold(seconds / 20, bVelocity=1, bStop=0, fVelocityCommand=value)
-    return driver.hold(60.0, bVelocity=0, bStop=1).outputs, frequencies(live["fL1"], max(live["fm2"], 1e-3))
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_any_commands_keep_the_limits_and_leave_no_sway(text, seed):
-    out, rates = random_history(text, seed)
-    require_limits(out)
-    assert not out["bBusy"][-1]
-    assert out["bPromise"][-1]
-    assert residual(out, rates) < 1e-8
-
-
 ORDERS = [
     (80, {}),
     (160, {"bExecute": 1.0, "fTarget": 3.0}),

@@ -3,22 +3,21 @@
 import numpy as np
 import pytest
 from counted_block import CountedBlock, compile_counting
-from test_whole_block import whole_text
+from driven_block import most_operations
 
-from gen_profile.planner.design import planner_constants
+from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters.planner.blocks.sizes import operations
 
 pytestmark = pytest.mark.slow
 SPEC = preset_spec("bay-crane", ["planner.zones=true"])
 CYCLE, LIMITS = SPEC.export.cycle_time, SPEC.limits.of(0)
 STEP, UNSURE = 1e-4, 1e-4  # s, and m by which its steps may miss the way
-MOST = operations(planner_constants(SPEC)[1])
+MOST = most_operations(SPEC)
 
 
 @pytest.fixture(scope="module")
 def compiled():
-    return compile_counting(whole_text(SPEC))
+    return compile_counting(planner_block(SPEC).text)
 
 
 def braked(place, velocity, acceleration):

@@ -81,16 +81,6 @@ def test_every_container_reads_back_as_the_same_program(block, program, format_,
 
 
 @pytest.mark.parametrize("name", containers())
-def test_a_block_of_variables_reads_back_from_every_container(block, name, tmp_path):
-    spec = attrs.evolve(SPEC, export=attrs.evolve(SPEC.export, plc_tables="variables"))
-    files = block_files(block, spec, [name])
-    for file in files:
-        (tmp_path / file.filename).write_bytes(file.content)
-    back = parse_function_block(block_in(tmp_path / files[0].filename, files[0].content))
-    assert back.program() == parse_function_block(block.text).program()
-
-
-@pytest.mark.parametrize("name", containers())
 def test_a_block_reads_back_before_its_files_stand_in_a_folder(block, name):
     first, *_ = files = block_files(block, SPEC, [name])
     back = block_in(Path(first.filename), first.content, {file.filename: file.content for file in files})

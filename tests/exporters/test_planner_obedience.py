@@ -394,18 +394,6 @@ class TestZones:
             assert within.any()
             assert np.abs(part.velocity[within]).max() <= 0.3 + 1e-9
 
-    @pytest.mark.parametrize("seed", range(2))
-    def test_neither_does_any_hand(self, planner, seed):
-        random = np.random.default_rng(seed)
-        for _ in range(12):
-            command = random.choice(["target", "velocity"])
-            low, high = (0.0, 20.0) if command == "target" else (-1.1, 1.1)
-            part = planner.hold(random.uniform(0.05, 12.0), **{command: random.uniform(low, high)})
-            assert part.position.max() <= 20.0 + 1e-9
-            assert part.outputs["fStopHigh"].max() <= 20.0 + 1e-9
-            within = (part.position > 10.0) & (part.position < 14.0)
-            assert not within.any() or np.abs(part.velocity[within]).max() <= 0.3 + 1e-9
-
     def test_one_that_is_set_on_the_way_stops_before_it_or_slows_down(self, planner):
         planner.restrict()
         planner.hold(10.0, target=35.0)

@@ -56,31 +56,6 @@ def test_moves_to_and_fro_take_little_longer_than_the_first(text, rope, load, wa
     assert max(lasted) < 1.55 * lasted[0]
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_no_history_leaves_more_than_is_stated(text, seed):
-    random = np.random.default_rng(seed)
-    rope, load = random.uniform(3.0, 9.0), random.uniform(200.0, 2000.0)
-    driver = standing(text, rope, load)
-    for _ in range(12):
-        seconds = random.exponential(5.0)
-        match random.choice(["position", "stick", "stop"]):
-            case "position":
-                driver.hold(CYCLE, bVelocity=0, bStop=0, bExecute=0)
-                driver.hold(seconds, bExecute=1, fTarget=random.uniform(0.0, 40.0))
-            case "stick":
-                speed = random.choice([VELOCITY, -VELOCITY, random.uniform(-1.0, 1.0)])
-                driver.hold(CYCLE, bStop=0, bExecute=0, bVelocity=1, fVelocityCommand=0.0)
-                driver.hold(seconds, fVelocityCommand=speed)
-            case "stop":
-                driver.hold(seconds, bVelocity=0, bExecute=0, bStop=1)
-    out = driver.hold(40.0, bVelocity=0, bExecute=0, bStop=1).outputs
-    assert not out["bBusy"][-1]
-    assert left(out["fVelocity"], rope, load) < 1e-4
-    assert worst(out["fVelocity"], rope, load) <= 1.02 * out["fSwayLeft"][-1] + 1e-4
-    assert out["fSwayLeft"].max() <= LIMIT
-    assert out["bPromise"][-1]
-
-
 def test_what_may_be_left_makes_short_motions_quicker(text, quiet):
     """By a fifth, and leaves most of what plans may spend; a share of 0 leaves next to nothing."""
 

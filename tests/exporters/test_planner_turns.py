@@ -124,3 +124,26 @@ def test_an_axis_beyond_its_travel_comes_back_though_there_is_no_room_to_damp():
     block.hold(10, bEnable=1.0, fActVelocity=0.0)
     moved = block.hold(2500, bExecute=1.0, fTarget=20.0)["fPosition"]
     assert moved[-1] < places[-1] - 0.5
+
+
+def test_a_stick_that_trembles_is_followed(text):
+    driver = Driver(text, fActPosition=10.0).hold(2.0).hold(0.1, bVelocity=1)
+    for number in range(700):
+        speed = min(1.0, 0.01 * number) * (1.0 + 0.05 * (-1) ** number)
+        driver.hold(3 * CYCLE, fVelocityCommand=speed)
+    assert driver.parts[-1]["fVelocity"][-1] > 0.9
+
+
+def test_a_far_target_that_is_corrected_does_not_slow_the_axis(text):
+    """What swings behind the ramp turns against the decline, and the speed stays as it is."""
+    driver = Driver(text, fActPosition=3.0).hold(2.0).hold(9.0, bExecute=1, fTarget=38.0)
+    speed = driver.hold(CYCLE, bExecute=0).parts[-1]["fVelocity"][-1]
+    corrected = driver.hold(60.0, bExecute=1, fTarget=37.2).parts[-1]
+    assert corrected["fVelocity"][corrected["fPosition"] < 29.0].min() > 0.9 * speed > 0.5
+    assert corrected["bDone"][-1] and corrected["fPosition"][-1] == 37.2
+
+
+def test_the_slowest_speed_of_a_stick_moves_the_axis(text):
+    driver = Driver(text, fActPosition=10.0).hold(2.0).hold(0.1, bVelocity=1)
+    slowly = driver.hold(20.0, fVelocityCommand=1.1e-4).parts[-1]["fVelocity"]
+    assert slowly[-1] == pytest.approx(1.1e-4)

@@ -1,4 +1,4 @@
-"""The whole block of the folder of blocks, compiled by STruC++, against the block's own compiled form.
+"""The planner block, compiled by STruC++, against the block's own compiled form.
 
 Collected only where the environment variable STRUCPP names the folder of STruC++ (with ``dist`` and
 its runtime); WHOLE_BLOCK_CYCLES asks for another number of random cycles.
@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from system_parts import program
-from test_whole_block import random_rows, whole_text
+from test_whole_block import random_rows
 
+from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.st_to_c import translate
@@ -61,7 +62,7 @@ def played(text, rows, folder):
 
 
 def test_strucpp_s_whole_block_issues_the_same_bits(tmp_path):
-    text = whole_text(preset_spec("bay-crane", ["planner.zones=true", "planner.events=true"]))
+    text = planner_block(preset_spec("bay-crane", ["planner.zones=true", "planner.events=true"])).text
     oracle = BlockInstance(text)
     rows = random_rows(oracle.inputs, CYCLES, seed=23)
     assert np.array_equal(played(text, rows, tmp_path), oracle.call(rows))

@@ -1,10 +1,9 @@
-"""The whole block of the folder of blocks: its forms, and what it takes and gives."""
+"""Planner blocks of every kind: containers, C, random inputs, and the operations that they may state."""
 
 import ctypes
 import re
 import subprocess
 
-import attrs
 import numpy as np
 import pytest
 from counted_block import CountedBlock, compile_counting
@@ -22,7 +21,6 @@ from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile.support.errors import SpecError
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.planner.blocks.sizes import operations
-from gen_profile_exporters.planner.blocks.whole import whole_block
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
 
@@ -30,10 +28,6 @@ SWITCHED = {
     "bExecute": 0.5, "bVelocity": 0.1, "bStop": 0.08, "bPromptStop": 0.3, "bQuickStop": 0.04, "bReset": 0.4,
     "bLoadAtRest": 0.3,
 }  # fmt: skip
-
-
-def whole_text(spec):
-    return whole_block(planner_constants(spec)[1])
 
 
 def random_rows(inputs, cycles, seed):
@@ -97,7 +91,7 @@ def spec(request):
 
 @pytest.fixture(scope="module")
 def block(spec):
-    return attrs.evolve(planner_block(spec), text=whole_text(spec))
+    return planner_block(spec)
 
 
 @pytest.mark.parametrize("format_", containers())
@@ -135,25 +129,19 @@ def test_exported_c_issues_the_same_bits_without_a_warning(spec, block, tmp_path
 
 
 def test_its_inputs_for_live_parameters_are_found(block):
-    assert live_inputs(BlockInstance(block.text).inputs, block_axes(block.text)) == {"L1": "fL1", "m2": "fm2"}
-
-
-def test_it_is_short_enough_to_be_reviewed(block):
-    source = parse_function_block(block.text)
-    blocks = (*source.within, source)
-    own = [v for one in blocks for v in one.variables if v.section == "VAR"]
-    follows = any(one.name.endswith("_rope_model") for one in blocks)
-    assert len([v for v in own if v.scalar_type == "BOOL"]) <= (43 if follows else 40)
-    for one in blocks:
-        most = 505 if follows and one.name.endswith(("_motion", "_account")) else 450
-        assert one.body.count("\n") <= most, one.name
+    inputs = [
+        one.name
+        for one in parse_function_block(block.text).variables
+        if one.section == "VAR_INPUT" and "[" not in one.type
+    ]
+    assert live_inputs(inputs, block_axes(block.text)) == {"L1": "fL1", "m2": "fm2"}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rope", [{}, {"fL1": 5.5}], ids=["that stays", "that comes with it"])
 @pytest.mark.parametrize("changes", [[], ["robustness.uncertain={L1=0.05}"]], ids=["no errors", "errors"])
 def test_a_target_from_rest_is_reached_to_the_last_bit(changes, rope):
-    block = BlockInstance(whole_text(parse_spec(BAY, changes)))
+    block = BlockInstance(planner_block(parse_spec(BAY, changes)).text)
     given = block.inputs | {"fActPosition": 10.0}
     rows = [given] + 100 * [given | {"bEnable": 1.0}]
     rows += 3000 * [given | {"bEnable": 1.0, "bExecute": 1.0, "fTarget": 12.0} | rope]
@@ -174,7 +162,7 @@ def test_a_target_from_rest_is_reached_to_the_last_bit(changes, rope):
 def test_a_prompt_stop_that_leaves_more_than_is_allowed_withdraws_the_promise_without_stated_errors_too(
     moves, stops
 ):
-    block = BlockInstance(whole_text(parse_spec(BAY, ["planner.operations=12000"])))
+    block = BlockInstance(planner_block(parse_spec(BAY, ["planner.operations=12000"])).text)
     given = block.inputs | {"fActPosition": 10.0, "bEnable": 1.0, "bPromptStop": 1.0}
     rows = 400 * [given] + 350 * [given | moves] + 2500 * [given | stops]
     rows += 8000 * [given | {"bExecute": 1.0, "fTarget": 38.0}]
@@ -188,7 +176,7 @@ def test_a_prompt_stop_that_leaves_more_than_is_allowed_withdraws_the_promise_wi
 @pytest.mark.parametrize("changes", [[], ["planner.live_rate={L1=0.25}"]], ids=["stays", "changes"])
 def test_a_cycle_of_a_millisecond_has_operations_enough(changes):
     spec = preset_spec("bay-crane", ["export.cycle_time=0.001", *changes])
-    block = CountedBlock(compile_counting(whole_text(spec)), fActPosition=2.0)
+    block = CountedBlock(compile_counting(planner_block(spec).text), fActPosition=2.0)
     out = [block.hold(500), block.hold(40_000, bExecute=1.0, fTarget=4.0), block.hold(1)]
     out.append(block.hold(60_000, bExecute=1.0, fTarget=39.0))
     assert [part["fPosition"][-1] for part in (out[1], out[3])] == [4.0, 39.0]
@@ -211,12 +199,12 @@ QUICK = [
 )
 def test_fewer_operations_than_a_machine_needs_are_refused(preset, changes):
     with pytest.raises(SpecError, match="operations: at least") as refused:
-        whole_text(preset_spec(preset, [*changes, "planner.operations=3000"]))
+        planner_block(preset_spec(preset, [*changes, "planner.operations=3000"]))
     least = int(re.search(r"at least (\d+)", str(refused.value))[1])
     with pytest.raises(SpecError, match=f"operations: at least {least} for this machine, found {least - 1}"):
-        whole_text(preset_spec(preset, [*changes, f"planner.operations={least - 1}"]))
+        planner_block(preset_spec(preset, [*changes, f"planner.operations={least - 1}"]))
     stated = preset_spec(preset, [*changes, f"planner.operations={least}"])
-    assert f"cOperations : DINT := {least};" in whole_text(stated)
+    assert f"cOperations : DINT := {least};" in planner_block(stated).text
     more = preset_spec(preset, [*changes, f"planner.operations={least + 500}"])
     assert operations(planner_constants(more)[1]) == least + 500
 
@@ -251,7 +239,7 @@ def test_a_drive_that_is_very_slow_beside_the_swing_begins(mass):
 
 def require_moves(spec, **given):
     (low, high), top, cycle = spec.limits.travel, spec.limits.velocity, spec.export.cycle_time
-    block = CountedBlock(compile_counting(whole_text(spec)), fActPosition=0.5 * (low + high), **given)
+    block = CountedBlock(compile_counting(planner_block(spec).text), fActPosition=0.5 * (low + high), **given)
     block.hold(round(2.0 / cycle))
     block.hold(2, bVelocity=1.0)
     assert block.hold(round(12.0 / cycle), fVelocityCommand=0.9 * top)["fVelocity"].max() > 0.2 * top
@@ -260,8 +248,9 @@ def require_moves(spec, **given):
     assert out["operations"].max() <= operations(planner_constants(spec)[1])
 
 
+@pytest.mark.slow
 def test_an_axis_whose_stick_is_at_zero_rests_as_after_a_stop_while_the_other_one_is_led():
-    block = BlockInstance(whole_text(parse_spec(GANTRY, ["export.cycle_time=0.004"])))
+    block = BlockInstance(planner_block(parse_spec(GANTRY, ["export.cycle_time=0.004"])).text)
     given = block.inputs | {"bEnable": 1.0, "fActPosition_x": 30.0, "fActPosition_y": 10.0, "fL": 5.0}
     rows = [given] * 500 + [given | {"bExecute": 1.0}] * 75  # both to 0
     rows += [given | {"bVelocity": 1.0, "fVelocityCommand_x": -1.0}] * 3000

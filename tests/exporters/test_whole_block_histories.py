@@ -2,17 +2,21 @@
 
 import pytest
 from generator.planned_machines import GANTRY, HOIST
-from test_next_planner import PAPER as WIDE_ERRORS
 from test_planner_sensor import JOINT, TANK
-from test_whole_block import MEASURED, whole_text
+from test_whole_block import MEASURED
 
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
 from gen_profile.assurance.proof.histories import Histories
 from gen_profile.assurance.proof.numbering import Numbering
+from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 pytestmark = pytest.mark.slow
 ZONED = ["planner.zones=true", "planner.events=true"]
+WIDE_ERRORS = [
+    "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
+    *("planner.live={L1=[0.3, 0.6]}", "check.residual_sway=0.01"),
+]
 PAPER = [
     "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
     *("planner.live={L1=[0.3, 0.6]}", "planner.live_rate={L1=0.05}", "plant.c1=0.0", "plant.c2=0.0"),
@@ -38,7 +42,7 @@ MACHINES = {
     "hoisting": lambda: preset_spec("bay-crane", ["planner.live_rate={L1=0.3}", "check.uncertain={L1=0.01}"]),
     "hoisting gantry": lambda: parse_spec(GANTRY, ["planner.live_rate={L=0.1}", "export.cycle_time=0.004"]),
     "hoist of its own": lambda: parse_spec(HOIST, ["planner.live_rate={hoist=0.1}"]),
-    "wide errors": lambda: preset_spec("paper", list(WIDE_ERRORS)),
+    "wide errors": lambda: preset_spec("paper", WIDE_ERRORS),
     "quick hoisting": lambda: preset_spec("paper", PAPER),
     "a sensor": lambda: preset_spec("bay-crane", MEASURED),
     "a sensor, wide errors": lambda: preset_spec("paper", [*WIDE_ERRORS, *SWUNG]),
@@ -69,7 +73,7 @@ def test_all_verdicts_hold(machine):
     spec = MACHINES[machine]()
     histories = Histories.of(spec)
     drawn = Numbering.of(histories, 800, 11)
-    with ClosedLoop(spec, whole_text(spec), histories) as loop:
+    with ClosedLoop(spec, planner_block(spec).text, histories) as loop:
         judged = loop.judged(drawn, [*range(FIRST.get(machine, 30)), *FORMER.get(machine, ())])
     known = KNOWN.get(machine, ())
     faults = [(one.number, fault) for one in judged for fault in one.faults if one.number not in known]
