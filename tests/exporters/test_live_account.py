@@ -237,6 +237,7 @@ def test_rows_give_what_a_row_of_coefficients_leaves_on_each_machine(spec, accou
     assert np.allclose(radii[:4], inner * account.bound[2:])
 
 
+@pytest.mark.slow
 def test_a_machine_with_a_sensor_is_followed_on_the_rope_that_it_has():
     changes = ["planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}", SENSOR, DISTURBANCE]
     spec = preset_spec("bay-crane", changes)
@@ -256,6 +257,7 @@ def test_a_machine_with_a_sensor_is_followed_on_the_rope_that_it_has():
     assert left == pytest.approx(max(due), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_machine_between_both_ends_of_wide_errors_is_left_with_no_more_than_is_stated():
     """Of two pushes far apart, those halfway to an end are left with more than ends and that as given."""
     changes = ["planner.live={L1=[3.0, 9.0], m2=[500.0, 2000.0]}", SENSOR, DISTURBANCE]

@@ -453,6 +453,11 @@ class TestZones:
             planner.restrict(blocked=[(1.0, 2.0)] * 9)
         with pytest.raises(SpecError, match="slow: must be rows of 3 numbers"):
             planner.restrict(slow=[(1.0, 2.0)])
+        with pytest.raises(SpecError, match="blocked, a row: must be a list of numbers"):
+            planner.restrict(blocked=(1.0, 2.0))
+        for axis in ("cart", False):
+            with pytest.raises(SpecError, match=rf"axis: .* found '?{axis}"):
+                planner.restrict(axis=axis)
         with pytest.raises(SpecError, match=r"state planner\.zones = true"):
             gp.Planner(SPEC).restrict(slow=[(1.0, 2.0, 0.1)])
 

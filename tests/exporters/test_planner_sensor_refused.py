@@ -50,16 +50,13 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize(
+    "name", [pytest.param("live", marks=pytest.mark.slow), *(name for name in REFUSED if name != "live")]
+)
 def test_what_cannot_be_served_is_refused_in_a_sentence(name):
     changes, words = REFUSED[name]
     with pytest.raises(SpecError, match=words):
         planner_block(preset_spec("bay-crane", [*MEASURED, *changes]))
-
-
-def test_a_rope_that_changes_on_the_way_may_hold_a_load_that_is_measured():
-    text = planner_block(preset_spec("bay-crane", [*MEASURED, "planner.live_rate={L1=0.1}"])).text
-    assert "fSensor" in text and "cLiveStep" in text
 
 
 def test_a_sensor_needs_a_disturbance():

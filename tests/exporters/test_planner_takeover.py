@@ -15,6 +15,8 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import parse_spec
 from gen_profile_exporters.block_source import parse_function_block
 
+pytestmark = pytest.mark.slow
+
 SPEC = parse_spec(HOIST, ["planner.live_rate={hoist=0.1}"])
 CYCLE, VELOCITY, ACCELERATION, JERK = 0.004, 0.5, 0.3, 2.0
 TEXTS = {"followed": planner_block(SPEC).text, "not followed": planner_block(parse_spec(HOIST)).text}
@@ -44,7 +46,6 @@ def require_limits(setpoints):
     assert v[-1] == a[-1] == 0.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 @pytest.mark.parametrize("noise", [0.002, 0.005, 0.02, 0.1])
 def test_an_axis_that_stands_stays_where_it_is_however_noisy_its_velocity(text, noise):
@@ -86,7 +87,6 @@ def test_a_position_that_steps_is_taken_over_where_it_is_given(text):
     assert (setpoints[:, 0] == 4.0).all()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_converter_s_unfiltered_measurements_move_no_axis_that_stands(seed):
     random, axis = np.random.default_rng(seed), Converter(parse_function_block(TEXTS["followed"]))
@@ -99,7 +99,6 @@ def test_a_converter_s_unfiltered_measurements_move_no_axis_that_stands(seed):
     assert np.abs(np.array(axis.rows)[:, 1] - START).max() < 0.01
 
 
-@pytest.mark.slow
 def test_the_proof_takes_over_with_noise_and_refuses_a_block_that_runs_away_then():
     wrong, count = re.subn(
         r"(fVelocity := fSpeed;\s+fAcceleration := )0\.0;", r"\1 100.0 * fSpeed;", TEXTS["followed"]

@@ -84,7 +84,14 @@ KINDS = {
 }
 
 
-@pytest.fixture(scope="module", params=KINDS)
+# quick ones have every text but two of the motions within
+QUICKLY = [
+    pytest.param(kind, marks=() if kind in {"zones", "numbers as variables"} else pytest.mark.slow)
+    for kind in KINDS
+]
+
+
+@pytest.fixture(scope="module", params=QUICKLY)
 def spec(request):
     return preset_spec("bay-crane", KINDS[request.param])
 

@@ -17,6 +17,7 @@ def bounded(bounds, *overrides):
     return preset_spec("paper", [*BOUNDED, f"move.duration={bounds}", *overrides])
 
 
+@pytest.mark.slow
 def test_a_duration_between_bounds_is_the_shortest_one_or_the_least_allowed():
     found = [plan(bounded(bounds)) for bounds in ("minimum", "{most = 2.7}", "{least = 3.0005, most = 4}")]
     free, below, above = (one.motion.duration for one in found)
@@ -26,6 +27,7 @@ def test_a_duration_between_bounds_is_the_shortest_one_or_the_least_allowed():
     assert not found[2].spec.move.shortest
 
 
+@pytest.mark.slow
 def test_a_motion_that_takes_longer_than_allowed_is_refused_with_how_long_it_takes():
     with pytest.raises(InfeasibleProblem, match=r"takes 2\.6\d* s, and at most 2.5 s are allowed") as error:
         plan(bounded("{least = 1.0, most = 2.5}"))

@@ -154,6 +154,7 @@ def test_the_axes_are_as_near_to_the_smooth_motion_as_is_said(find, tau):
     assert gap.mean.max() < 1e-4 * moving.max()
 
 
+@pytest.mark.slow
 def test_rounding_to_coarse_counts_is_taken_as_it_is():
     """Setpoints leap by 33 µm: where only the greatest leap of a piece counted, there was no bound."""
     spec, setpoints = planned("paper", "check.uncertain={}")
@@ -339,6 +340,7 @@ PLANT = attrs.evolve(known, type="air-drag", equations=equations)
 """
 
 
+@pytest.mark.slow
 def test_equations_with_a_kink_are_not_proved_and_not_tried_for_ever(tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     spec = tmp_path / "own.toml"
@@ -363,6 +365,7 @@ def test_a_load_that_does_not_swing_has_no_tails():
         assert (_tails(np.zeros((2, 4, 5, 3)), (3,)) == 0.0).all()
 
 
+@pytest.mark.slow
 def test_a_motion_that_only_hoists_is_proved():
     spec, setpoints = planned("single-pendulum-crane", "move.target=[0.0, 1.0]", "export.cycle_time=0.01")
     found = attempt(spec, setpoints)

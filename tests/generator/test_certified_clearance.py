@@ -25,6 +25,7 @@ BOX = Area((-0.6, 0.9), (-0.4, 0.5))
 HERE = Area((0.1, 0.5), (-0.1, 0.3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "zone",
     [

@@ -246,6 +246,7 @@ def test_an_interrupt_that_python_drops_comes_again():
     assert (done.returncode, done.stderr) == (130, "Error: Interrupted.\n")
 
 
+@pytest.mark.slow
 def test_a_cure_is_named_once():
     refused = run_here("--set", "move.duration=1", "--set", "limits.acceleration=1")
     assert refused.err.count("It can be done with") == 1

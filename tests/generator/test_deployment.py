@@ -264,6 +264,7 @@ def test_a_library_is_deployed_and_any_motion_of_it_that_sways_too_much_stops_th
     assert used(block, libraries) == "old"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["old", "new"])
 def test_a_trial_is_refused_before_anything_is_asked_of_the_controller(planners, name):
     """Its manifest states 8 histories, as one may that was sealed again."""

@@ -249,12 +249,6 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             lambda spec: gp.run_sweep(spec, {"plant.L1": [1, 2]}, "plc", "unused", scheduler=3),
             "scheduler: an address is expected, found 3",
         ),
-        (lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(axis="cart"), "axis: .* found 'cart'"),
-        (lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(axis=False), "axis: .* found False"),
-        (
-            lambda _: gp.Planner(gp.preset_spec("bay-crane")).restrict(blocked=(1.0, 2.0)),
-            "blocked, a row: must be a list of numbers, found 1.0",
-        ),
         (lambda spec: gp.design(spec, [], "unused"), "name at least one format"),
         (lambda spec: gp.design(spec, "plcc", "unused"), "unknown format 'plcc'; did you mean 'plc'"),
     ],

@@ -54,11 +54,13 @@ def with_spec(plan, spec):
 
 
 class TestMotion:
+    @pytest.mark.slow
     def test_no_rope_lets_hook_or_load_nearer_than_the_clearance(self, plan):
         assert worst_of(plan, plan.motion) <= NEARER
         lower = gp.evolve_spec(plan.spec, path={"clearance": [0.3, 0.54]})
         assert worst_of(with_spec(plan, lower), plan.motion) > 0.01  # the equations see what is missing
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("rope", [0.9, 1.0, 1.1])
     def test_no_machine_sways_on(self, plan, rope):
         motion, values = plan.motion, {**MACHINE, "L0": rope * MACHINE["L0"]}
@@ -68,6 +70,7 @@ class TestMotion:
             apart = places[after, :2] - np.array(plan.spec.move.target[:2])
             assert np.abs(apart).max() <= (1e-4 if rope == 1.0 else 0.05)
 
+    @pytest.mark.slow
     def test_both_axes_are_in_step_and_keep_their_limits(self, plan):
         motion, times = plan.motion, np.linspace(0.0, plan.motion.duration, 20001)
         start, target = np.array(motion.start), np.array(motion.target)
@@ -105,6 +108,7 @@ class TestMotion:
         plan = gp.plan(hall(move=move))
         assert worst_of(plan, plan.motion, (0.9, 1.0, 1.1)) <= NEARER
 
+    @pytest.mark.slow
     def test_without_robustness(self):
         found = gp.plan(hall(robustness={"method": None, "uncertain": None}))
         assert worst_of(found, found.motion, (1.0,)) <= NEARER
@@ -251,6 +255,7 @@ class TestPlanView:
         assert line.span(Area((2.0, 4.0), (0.0, 3.0))) is None  # at its edge
         assert line.span(Area((2.0, 4.0), (0.0, 3.1))) == (2.0, 4.0)
 
+    @pytest.mark.slow
     def test_pictures_are_from_the_side_and_from_above(self, plan):
         side, above = path_figure(plan.spec, plan.evaluation).panels
         lines = {str(line.name): line for line in side.lines}
@@ -268,6 +273,7 @@ class TestPlanView:
         assert standing_on(spec.path, line)[0] == pytest.approx((6.0, 10.0, 4.0))
         assert set(standing_on(spec.path, line)) == {0}
 
+    @pytest.mark.slow
     def test_the_studio_knows_where_to_move_a_box(self, plan):
         (panel, _), way = path_figure(plan.spec, plan.evaluation).panels, np.array([24.0, 9.0])
         found = side_json(plan.spec, np.zeros((1, 2, 2, 2)))

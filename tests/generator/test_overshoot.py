@@ -57,6 +57,7 @@ def test_no_load_passes_its_target_by_more_than_the_limit(limit, way):
     assert kept.solution.optimum.cost > free.solution.optimum.cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [0.06, 0.03])
 def test_the_limit_holds_on_all_machines_and_no_more_is_held_back_than_needed(limit):
     kept = gp.plan(skewed(limit))
@@ -67,6 +68,7 @@ def test_the_limit_holds_on_all_machines_and_no_more_is_held_back_than_needed(li
     assert kept.figures["load_overshoot_worst_m"] == pytest.approx(worst, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_check_finds_how_far_loads_pass_and_refuses_a_motion_that_lets_them(tmp_path):
     free = gp.design(skewed(GREAT, "check.samples=20"), "csv", tmp_path)
     shown = {row["name"]: row for row in free.check.to_dict()["scenarios"]}
@@ -92,6 +94,7 @@ def test_a_load_may_pass_by_as_much_as_may_remain_of_its_sway(tmp_path):
     assert 0.0 < max(finding.overshoot for finding in check.findings) < 0.02
 
 
+@pytest.mark.slow
 def test_the_shortest_motion_keeps_it():
     task = ["move.duration=minimum", "limits.axis.cart={velocity = 1.0, acceleration = 0.5, jerk = 2.0}"]
     free, kept = (gp.plan(skewed(limit, NOMINAL, *task)) for limit in (GREAT, 0.0))
@@ -99,6 +102,7 @@ def test_the_shortest_motion_keeps_it():
     assert farthest(kept.motion) <= 2.0 * EXACT * WAY
 
 
+@pytest.mark.slow
 def test_every_direction_has_a_target_of_its_own():
     task = ["move.distance=[1, -1]", "move.duration=8", "move.initial={theta_x = 0.1, theta_y = -0.1}"]
     free, kept = (

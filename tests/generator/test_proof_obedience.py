@@ -240,7 +240,7 @@ def test_a_block_that_states_a_shorter_reaction_is_not_held_to_shorter_stops():
 
 
 def test_busy_tells_of_a_stick_that_is_about_to_be_followed():
-    """A slow machine's axis, planned for longer than a fifth of a period, was told to have come to rest."""
+    """A slow machine's axis, planned for longer than a fifth of a period, was said to have come to rest."""
     slow = with_orders(REST, attrs.evolve(MOVE, end=2000), attrs.evolve(STICKS, begin=2000), STOPS)
     slow.issued["bDone"][2000:] = slow.issued["fDistanceToGo"][2000:] = 0.0
     slow.issued["bBusy"][2000:STICK] = 1.0

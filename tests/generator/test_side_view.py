@@ -41,6 +41,7 @@ def test_the_skyline_is_the_highest_stack_with_its_clearance():
         assert between == pytest.approx(max(heights, default=0.0))
 
 
+@pytest.mark.slow
 def test_the_picture_has_the_load_of_every_machine():
     plan = gp.plan(quay())
     (panel,) = path_figure(plan.spec, plan.evaluation).panels
