@@ -323,10 +323,7 @@ class BlockFollower(AbstractContextManager["BlockFollower"]):
             byref(outcome),
         )
         if outcome.status:
-            reason = " ".join(self._messages)
-            far = " The loads swing farther than can be followed; lower the limits of the axes."
-            cure = far if "no longer finite" in reason else ""
-            raise CosimulationError(f"The FMU could not go on after cycle {outcome.cycles}: {reason}{cure}")
+            raise self._failure(outcome.cycles)
         return BlockRun(
             axes=tuple(
                 AxisExtremes(**dict(zip(_EXTREMES, row, strict=True))) for row in kept["axes"].tolist()
@@ -338,6 +335,12 @@ class BlockFollower(AbstractContextManager["BlockFollower"]):
             shown=shown[: outcome.cycles],
             **{name: getattr(outcome, name) for name in _SIMPLE},
         )
+
+    def _failure(self, cycles: int) -> CosimulationError:
+        reason = " ".join(self._messages)
+        far = " The loads swing farther than can be followed; lower the limits of the axes."
+        cure = far if "no longer finite" in reason else ""
+        return CosimulationError(f"The FMU could not go on after cycle {cycles}: {reason}{cure}")
 
     def _history(
         self,

@@ -33,10 +33,10 @@ BRAKE_WORK = 350  # operations of a cycle in which an axis has to brake in time
 EACH = re.compile(r"(?ms)^ *@each_axis\n(.*?)^ *@end_axis\n")
 
 
-def whole_block(constants: PlannerConstants, sizes: Sizes | None = None) -> str:
+def whole_block(constants: PlannerConstants) -> str:
     """Write the planner block with all blocks that it has within it; the last one is its own."""
     follows = constants.rates or constants.sensor
-    within = followed.motion(constants) if follows else planner(constants, sizes or Sizes())
+    within = followed.motion(constants) if follows else planner(constants, Sizes())
     if constants.sensor:
         within += "\n" + observer(constants, constants.sensor)
     motion = _renamed(within, constants.name, block_name(constants.name))

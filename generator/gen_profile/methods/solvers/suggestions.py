@@ -309,11 +309,10 @@ def _wider_limits(
     relaxation: Relaxation,
     options: SuggestionOptions,
     limits: Mapping[str, Any],
-    most: float = math.inf,
 ) -> Suggestion | None:
     """Widen some limits as little as works, the others as they are."""
     nearest = relaxation.least(tuple(limits))
-    if nearest is None or nearest.wider > most:
+    if nearest is None:
         return None
     needed = max(nearest.wider, 1.0)
 
