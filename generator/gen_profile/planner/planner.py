@@ -41,7 +41,7 @@ OF_AXES: dict[
 MOST_CYCLES = 2_000_000  # in one go: each takes some hundred bytes
 IDLE = dict.fromkeys(("bExecute", "bVelocity", "bStop", "bQuickStop"), 0.0)  # no command
 ZONES = ("aBlockedLow", "aBlockedHigh", "aSlowLow", "aSlowHigh", "aSlowLimit")
-KINDS = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
+OUTPUT_TYPES = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
 
 
 @attrs.frozen(kw_only=True)
@@ -339,7 +339,7 @@ class Planner(Summarised):
             for axis in self._axes:
                 self._inputs |= {axis.of(PLACE): last[axis.of("fPosition")], axis.of("fActVelocity"): 0.0}
         return {
-            name: column.astype(KINDS.get(name[0], np.float64))
+            name: column.astype(OUTPUT_TYPES.get(name[0], np.float64))
             for name, column in zip(self._block.outputs, issued, strict=True)
         }
 

@@ -47,7 +47,7 @@ MOST_UPLOAD = 16_777_216  # bytes of a file that is dropped on a page, its name 
 MOST_FILES = 4  # of a page, that can be downloaded
 MOST_NAME = 100  # characters of such a file's name
 MOST_OPENED = 32  # specs that were dropped
-KINDS = {
+CONTENT_TYPES = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -55,7 +55,7 @@ KINDS = {
 }
 OWN = resources.files("gen_profile.presentation.studio") / "assets"
 ASSETS = {
-    **{file.name: file for file in OWN.iterdir() if Path(file.name).suffix in KINDS},
+    **{file.name: file for file in OWN.iterdir() if Path(file.name).suffix in CONTENT_TYPES},
     "uPlot.js": OWN / "uPlot" / "uPlot.iife.min.js",
     "uPlot.css": OWN / "uPlot" / "uPlot.min.css",
     "animation.js": resources.files("gen_profile.presentation.report") / "assets" / "animation.js",
@@ -155,7 +155,7 @@ class Asset(Guarded):
         """Send it."""
         if name not in ASSETS:
             raise tornado.web.HTTPError(404)
-        self.set_header("Content-Type", KINDS[Path(name).suffix])
+        self.set_header("Content-Type", CONTENT_TYPES[Path(name).suffix])
         self.finish(ASSETS[name].read_bytes())
 
 
@@ -167,7 +167,7 @@ class ManualPage(Guarded):
         content = manual.picture(name) if picture else manual.page(name)
         if content is None:
             raise tornado.web.HTTPError(404)
-        self.set_header("Content-Type", "image/png" if picture else KINDS[".html"])
+        self.set_header("Content-Type", "image/png" if picture else CONTENT_TYPES[".html"])
         self.finish(content)
 
 

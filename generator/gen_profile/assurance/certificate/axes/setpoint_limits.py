@@ -16,7 +16,7 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.support.errors import CertificateError
 
-KINDS = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}
+PER_TIME = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}
 
 Asked = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
@@ -35,7 +35,7 @@ def asked_of_axes(spec: Spec, setpoints: SampledProfile) -> Asked:
         It is more than the check lets cams and rounding make of the limit. Of jerks that is not asked.
     """
     asked: dict[str, dict[str, Mapping[str, Any]]] = {}
-    for order, (kind, per) in enumerate(KINDS.items(), start=1):
+    for order, (kind, per) in enumerate(PER_TIME.items(), start=1):
         roundings = (2 ** (order - 1) * setpoints.resolution / setpoints.cycle_time**order).tolist()
         rows = zip(_quotients(spec, setpoints, order), roundings, spec.machine().actuated, strict=True)
         for column, (bound, rounding, axis) in enumerate(rows):
