@@ -1,14 +1,13 @@
-"""The shell of the planner of the folder of blocks, around a motion that plans nothing."""
+"""The shell of the planner block, around a motion that plans nothing."""
 
 import math
 import re
 
 import numpy as np
 import pytest
-from counted_block import CountedBlock, compile_counting, require_interpreted
+from counted_block import CountedBlock, compile_counting
 from driven_block import BAY
 from plain_motion import plain_motion
-from test_planner_signals import BECOMES, COMMANDS, DEVIATIONS, RULES, STATES, Signals, found
 from test_whole_block import random_rows
 
 from gen_profile.planner.design import planner_constants
@@ -44,22 +43,6 @@ class Led:
 
     def now(self, **inputs):
         return {name: float(values[-1]) for name, values in self.hold(0.0, **inputs).items()}
-
-
-@pytest.mark.parametrize("rule", [*RULES, *DEVIATIONS])
-def test_signals_are_those_of_today_s_block(text, rule):
-    signals = Signals(text)
-    for step in {**RULES, **DEVIATIONS}[rule]:
-        signals.step(*step)
-
-
-@pytest.mark.parametrize("state", STATES)
-def test_commands_lead_from_state_to_state_as_in_the_diagram(text, state):
-    for (command, steps), becomes in zip(COMMANDS.items(), BECOMES[state].split(), strict=True):
-        signals = Signals(text)
-        for inputs, cycles in [*STATES[state], *steps]:
-            signals.play(inputs, cycles)
-        assert found(signals.play({}, 6000)) == becomes.removeprefix("*"), command
 
 
 @pytest.mark.parametrize("speed", [0.2, -0.9, 3.0])
@@ -271,13 +254,3 @@ def test_random_inputs_keep_the_rules_of_the_signals(text):
     assert not np.any(issued["bBusy"][issued["bEnabled"] == 0.0])
     assert not np.any(issued["bPromise"] * issued["nPromise"])
     assert set(issued["nErrorId"]) >= {0.0, 3.0, 5.0, 6.0, 7.0, 8.0}
-
-
-def test_the_interpreter_issues_the_same_bits():
-    constants = planner_constants(parse_spec(BAY))[1]
-    text = around(plain_motion(constants), constants)
-    block = CountedBlock(compile_counting(text), bEnable=0.0)
-    rows = random_rows(block.inputs, 100_000, seed=3)
-    chosen = rows[np.sort(np.random.default_rng(1).choice(len(rows), 300, replace=False))]
-    orders = [(3, dict(zip(list(block.inputs), row, strict=True))) for row in chosen.tolist()]
-    require_interpreted(text, block, orders)

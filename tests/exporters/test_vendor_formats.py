@@ -64,8 +64,9 @@ def goal_of(profile, layout="segments", **options):
 
 class TestBlocks:
     @pytest.mark.slow
-    @pytest.mark.parametrize("layout", LAYOUTS)
-    @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES, bang_bang()], ids=["one", "two", "rough"])
+    @pytest.mark.parametrize(
+        ("layout", "profile"), [*zip(LAYOUTS, (MOVE, TWO_MOVES, bang_bang()), strict=True)], ids=LAYOUTS
+    )
     @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
     def test_replay_is_that_of_structured_text(self, format_, profile, layout):
         goal = goal_of(profile, layout, unit="mm")
@@ -84,8 +85,11 @@ class TestBlocks:
             format_.replay(content.replace(literal, b"0.25"), goal)
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("layout", LAYOUTS)
-    @pytest.mark.parametrize("format_", [*BLOCKS.values(), structured_text], ids=[*BLOCKS, "plc"])
+    @pytest.mark.parametrize(
+        ("format_", "layout"),
+        [(structured_text, layout) for layout in LAYOUTS] + [(one, "samples") for one in BLOCKS.values()],
+        ids=[*LAYOUTS, *BLOCKS],
+    )
     @pytest.mark.parametrize("mutation", MUTATIONS.values(), ids=MUTATIONS.keys())
     def test_mutants_are_refused(self, mutation, format_, layout):
         goal = goal_of(TWO_MOVES, layout)
