@@ -42,16 +42,16 @@ def test_every_machine_has_its_mechanics_here():
     assert set(FAMILIES) <= families
 
 
-@pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("type_", MACHINES)
-def test_machines_obey_lagrange(type_, seed):
+def test_machines_obey_lagrange(type_):
     lagrange = Lagrange(type_)
-    parameters, q, dq, ddq_a = some_machine(lagrange.plant, seed)
-    if type_ == "slosh-tank":  # its damping ratios are measured below
-        parameters = undamped(type_, parameters)
-    expected = lagrange.accelerations(q, dq, ddq_a, parameters)
-    found = own_accelerations(lagrange.plant, q, dq, ddq_a, parameters)
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * (1.0 + np.abs(expected).max()))
+    for seed in range(20):
+        parameters, q, dq, ddq_a = some_machine(lagrange.plant, seed)
+        if type_ == "slosh-tank":  # its damping ratios are measured below
+            parameters = undamped(type_, parameters)
+        expected = lagrange.accelerations(q, dq, ddq_a, parameters)
+        found = own_accelerations(lagrange.plant, q, dq, ddq_a, parameters)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * (1.0 + np.abs(expected).max()))
 
 
 @pytest.mark.slow
