@@ -63,6 +63,8 @@ class PlannerConstants:
         Whether the spec states them: they are not to be more.
     periods : sequence of float
         s, of the slowest mode at the corners of the live ranges.
+    prompt : bool
+        Whether stops are prompt where the controller does not say.
     sway_share : float
         m, of the sway that errors may leave: what plans may spend; 0 for motions that leave none to first
         order.
@@ -103,6 +105,7 @@ class PlannerConstants:
     operations: int
     states_operations: bool
     periods: Sequence[float]
+    prompt: bool
     sway_share: float
     stated_error: float
     degrees: int

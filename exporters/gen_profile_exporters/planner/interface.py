@@ -65,6 +65,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "cycle": f"{c.cycle:g}",
         "live_rates": " faster than stated" if c.rates else "",
         "hold": f"{HOLD:g}",
+        "prompt_default": " := TRUE" if c.prompt else "",
         "reaction": f"{reaction(c):.3g}",
         "gives_up": f"{gives_up(c):.3g}",
         "live_lines": "\n    ".join(ranges) or "No live parameters.",

@@ -125,6 +125,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         ),
         sway_limit=min(spec.check.residual_sway.values()),
         stated_error=float(frequency_errors(spec).max(initial=0.0)),
+        prompt=spec.planner.stop == "prompt",
         sway_share=_sway_share(spec),
         degrees=int(exponents.max(initial=0)) + 1,
         curvatures=[*modes_of_live.interpolant.curvatures, *modes_of_live.others.curvatures],

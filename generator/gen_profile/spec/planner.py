@@ -106,6 +106,8 @@ class PlannerSpec(Checked, table="planner"):
         quick; 0 plans motions that leave none to first order.
     lateness : float or None
         Times what is possible that a command may take, and a second beside; None demands nothing.
+    stop : str
+        How axes stop where `bPromptStop` does not say: "quiet", without sway, or "prompt", never faster than now.
     quick_stop : float or None
         Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
     quick_stop_jerk : float or None
@@ -124,6 +126,7 @@ class PlannerSpec(Checked, table="planner"):
     operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
     sway_share: Annotated[float, Bounds(least=0.0, most=0.8)] = 0.5
     lateness: Annotated[float, Bounds(least=1.0, most=100.0)] | None = None
+    stop: Literal["quiet", "prompt"] = "quiet"
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
     sensor: SensorSpec | None = None

@@ -341,7 +341,15 @@ def _sensor(spec: Spec, plant: Plant) -> Iterator[Fault]:
         yield "planner.sensor", problem
 
 
-OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
+def _stop(spec: Spec) -> Iterator[Fault]:
+    """Refuse prompt stops of machines whose loads are followed: a promise would not hold."""
+    for name in ("live_rate", "sensor"):
+        if spec.planner.stop == "prompt" and getattr(spec.planner, name):
+            problem = Phrase('"prompt" is not together with planner.{name}; leave one out', name=name)
+            yield "planner.stop", problem, f"planner.{name}"
+
+
+OF_SPEC = (_stop, _drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
 OF_MACHINE = (
     _forgotten, _free, _at_start, _at_end, _shares, _wind, _checked_machines, _axis_limits, _overshoot,
     _units, _all_axes, _live, _sensor, stack_faults,

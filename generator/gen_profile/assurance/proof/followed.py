@@ -17,6 +17,7 @@ from gen_profile.assurance.proof.orders import (
     NO_MOTION,
     POSITION,
     QUICK_STOP,
+    STOP,
     VELOCITY,
     Ends,
     Flags,
@@ -84,6 +85,8 @@ class Followed:
     received : ReceivedOrders
     issued : mapping of str to (cycles,) array
         By names of the block's outputs.
+    prompt : (cycles,) array of bool
+        Whether stops are to be prompt.
     reserve : float
         Share of the limits for calming while live parameters change, else 0.
     wander : float
@@ -115,6 +118,7 @@ class Followed:
     limits: Sequence[Ends]
     received: ReceivedOrders
     issued: Mapping[str, Array]
+    prompt: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
     reserve: float = 0.0
     wander: float = 0.0
     settle: float = 0.0
@@ -176,6 +180,22 @@ class Followed:
         lost += np.flatnonzero(self.issued["nPromise"] == UNKNOWN)[:1].tolist()
         lost += [*self.rest_reports, *np.flatnonzero(self.retold)[:1].tolist()]
         return min(lost, default=self.cycles)
+
+    @cached_property
+    def prompt_stops(self) -> Flags:
+        """Whether each axis is to stop promptly, (axes, cycles)."""
+        axes = range(len(self.axes))
+        stops = [
+            [one.kind == STOP or not max(one.tops) > 0.0 or (one.kind == VELOCITY and not one.values[k]) for k in axes]
+            for one in self.orders
+        ]
+        guided = self.by_order([one.kind not in (QUICK_STOP, DISABLED) for one in self.orders])
+        return np.asarray(self.by_order(stops).T & guided & self.prompt & ~self.stands)
+
+    @cached_property
+    def stopped_from(self) -> int:
+        """Cycle from which on a prompt stop may have left the machine as given swinging."""
+        return int(np.argmax([*self.prompt_stops.any(axis=0), True]))
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""

@@ -79,6 +79,8 @@ class Surroundings:
         Whether they change on the way.
     zones, sensors : bool
         Whether the block knows of any.
+    other_stops : float or None
+        `bPromptStop` for stops of the kind that is not usual; None where there is no such input.
     rough : int
         How many of the habits may be taken that leave the load swinging.
     """
@@ -92,6 +94,7 @@ class Surroundings:
     hoists: bool
     zones: bool
     sensors: bool
+    other_stops: float | None
     rough: int
 
     def zone(self, axis: int, place: float, width: float, number: int, *, slow: bool) -> dict[str, float]:
@@ -141,7 +144,8 @@ def habit(command: Command, which: float, how: float, around: Surroundings) -> M
     """
     if which < 0.5:
         return (command,)
-    habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *ROUGH[: around.rough] * OFTEN]
+    rough = [*ROUGH[: around.rough], *[_otherwise_stopped] * (around.other_stops is not None and around.rough > 0)]
+    habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *rough * OFTEN]
     return habits[min(int(2.0 * len(habits) * (which - 0.5)), len(habits) - 1)](command, how, around)
 
 
@@ -361,6 +365,19 @@ def _braked(command: Command, how: float, around: Surroundings) -> Manner:
     stop = [_stopped(first, wait - before)] * (how < 0.5)
     commands = first, *stop, _stopped(first, wait, "quick-stop"), _stopped(first, 3.0 * wait)
     return commands if around.hoists else (*commands, rest_report)  # one that calms by a model believes that
+
+
+def _otherwise_stopped(command: Command, how: float, around: Surroundings) -> Manner:
+    """Stop by a button or a stick at 0, promptly or not, which is chosen before, as it stops, or for a moment."""
+    first, wait = _towards(command, how, around), around.part(how, 3) + 0.5 * around.period * (how > 0.3)
+    first = _stick(command, how, around) if _fraction(how, 6) < 0.4 else first
+    kind, values = ("velocity", around.neutral) if first.command == "velocity" else ("stop", ())
+    stop = _followed(first, wait, command=kind, values=values)
+    lasts = around.brief(_fraction(how, 4), 4.0)
+    chosen = max(-first.time, wait - lasts * _fraction(how, 5))
+    inputs = {"bPromptStop": around.other_stops or 0.0}
+    again = _followed(first, wait + around.period * (0.3 + 2.0 * _fraction(how, 7)))
+    return first, stop, again, _change(first, chosen, 2.0 * lasts, inputs)
 
 
 def _released(command: Command, how: float, around: Surroundings) -> Manner:

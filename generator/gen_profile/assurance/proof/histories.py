@@ -75,6 +75,8 @@ class History:
         Of inputs, beside the commands.
     sensed : SensedHistory or None
         What the block's sensor meets; without it there is no news of any.
+    stops : str
+        How axes stop where that is not given: "quiet" or "prompt".
     """
 
     live: Mapping[str, float]
@@ -85,6 +87,7 @@ class History:
     hoisting: Mapping[str, tuple[tuple[float, float], ...]] = attrs.field(factory=dict)
     changes: tuple[Change, ...] = ()
     sensed: SensedHistory | None = None
+    stops: str = "quiet"
 
     @property
     def starts(self) -> dict[str, float]:
@@ -146,6 +149,11 @@ class History:
         """Whether what becomes of the load cannot be known for another reason."""
         lost = self.sensed is not None and bool(self.sensed.fault)
         return lost or any(map(self._has, ("bEnable", *(f"f{name}" for name in self.live))))
+
+    @property
+    def prompt(self) -> bool:
+        """Whether stops may leave more sway than other motions."""
+        return self.stops == "prompt" or self._has("bPromptStop")
 
     @property
     def moved(self) -> bool:
@@ -349,6 +357,7 @@ class Histories:
             ),
             changes=(*self._zones(starts, first, amount), *habits.changes_in(given)),
             sensed=found,
+            stops=self.spec.planner.stop,
         )
 
     def _hoisted_at_rest(self, choice: float, last: float) -> Manner:
@@ -416,6 +425,7 @@ class Histories:
             hoists=bool(self.spec.planner.live_rate),
             zones=self.spec.planner.zones,
             sensors=self.spec.planner.sensor is not None,
+            other_stops=other_stops(self.spec),
             rough=rough,
         )
 
@@ -453,6 +463,12 @@ class Histories:
         """Choose a share from end to end; of several axes, each is left alone now and then."""
         alone = len(self.axes) > 1 and abs(choice - 0.5) < ALONE
         return 0.5 if alone else widened(choice, 0.25)
+
+
+def other_stops(spec: Spec) -> float | None:
+    """Give `bPromptStop` for stops of the kind that is not usual; None where a block has no such input."""
+    planner = spec.planner
+    return None if planner.live_rate or planner.sensor else float(planner.stop == "quiet")
 
 
 def written(value: float) -> float | str:

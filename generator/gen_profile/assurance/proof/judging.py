@@ -129,7 +129,7 @@ def _faults(
         yield from _axis_faults(history, named, axis, limits, ROUNDING + braked)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    unknown = history.brakes or history.disturbed or watched.unproven or watched.braked
+    unknown = history.brakes or history.disturbed or history.prompt or watched.unproven or watched.braked
     if not run.promise and not (unknown or lasts):
         yield TAKEN_BACK
 

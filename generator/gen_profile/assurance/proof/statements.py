@@ -142,7 +142,8 @@ def promises(run: Followed) -> Iterator[Allowance]:
         ready[begin : begin + after] = False
     yield from never("lost", (why == 3.0) & ready)
     stated = run.issued.get("fSwayLeft", np.zeros(run.cycles))
-    yield from never("lost", (why == ADDED_UP) & (stated <= run.sway_limit))
+    left = stated <= run.sway_limit if "fSwayLeft" in run.issued else np.arange(run.cycles) < run.stopped_from
+    yield from never("lost", (why == ADDED_UP) & left)
     yield from never("kept", promise & ((stated > run.sway_limit) | run.damped))
     may_be, must_be = _unknown(run)
     yield from never("lost", (why == UNKNOWN) & ~may_be)
@@ -339,6 +340,7 @@ def remains(run: Followed) -> Iterator[Allowance]:
     as_given, at_most, apart = run.modes.left(run.acceleration, ends, run.cycle)
     limit, stated = run.sway_limit, run.issued.get("fSwayLeft")
     if not run.modes.modes.damped:
+        as_given = as_given * (np.array(ends) < run.stopped_from)
         worst = int(np.argmax(as_given))
         yield Allowance("swings", ends[worst], float(as_given[worst]), UNDISTURBED * limit)
     if stated is not None and not run.modes.modes.damped:
@@ -356,6 +358,8 @@ def remains(run: Followed) -> Iterator[Allowance]:
 def _remains_at_last(run: Followed) -> Iterator[Allowance]:
     """Judge what motions leave that begin and end at rest after the last live parameters were given."""
     if run.last_modes is None or run.last_modes.modes.damped:
+        return
+    if run.stopped_from < run.cycles:
         return
     lost = [*run.brakings, *(order.end for order in run.orders if order.kind in (QUICK_STOP, DISABLED))]
     known = max(run.last_known, *lost, 0)

@@ -216,6 +216,7 @@ class BlockWatch:
             limits=self.known.limits,
             received=read_orders(start_cycles, rows, self.known, run.cycles, self._facts(issued)),
             issued=issued,
+            prompt=inputs.get("bPromptStop", np.zeros(len(script.start_cycles)))[now] != 0.0,
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
             settle=self.spec.planner.disturbance.settle if self.spec.planner.disturbance else 0.0,
