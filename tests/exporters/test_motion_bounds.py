@@ -26,29 +26,29 @@ def bounds():
     block = re.search(r"(?s)FUNCTION_BLOCK FB_bay_crane_motion_bounds\n.*?END_FUNCTION_BLOCK\n", text)[0]
     inputs = "".join(f"{name} : LREAL; " for name in STANDS if name != "nSlots")
     outputs = "".join(f"{name} : ARRAY [0..{SLOTS - 1}] OF LREAL; " for name in ARRAYS)
-    handed = ", ".join(f"{name} := {name}" for name in ("nKind", *STANDS, *ARRAYS))
+    handed = ", ".join(f"{name} := {name}" for name in ("nKind", "bStops", *STANDS, *ARRAYS))
     called = BlockInstance(f"""{block}
 FUNCTION_BLOCK Called
-VAR_INPUT nKind : DINT; nSlots : DINT; {inputs} END_VAR
+VAR_INPUT nKind : DINT; bStops : BOOL; nSlots : DINT; {inputs} END_VAR
 VAR_OUTPUT {outputs} END_VAR
 VAR own : FB_bay_crane_motion_bounds; END_VAR
 own({handed});
 END_FUNCTION_BLOCK
 """)
 
-    def found(kind, **changes):
+    def found(kind, stops=False, **changes):
         given = STANDS | changes
-        issued = called.call(np.array([[kind, *given.values()]], dtype=float))[0].reshape(5, SLOTS)
+        issued = called.call(np.array([[kind, stops, *given.values()]], dtype=float))[0].reshape(5, SLOTS)
         return {name: row[: given["nSlots"]] for name, row in zip(ARRAYS, issued, strict=True)}
 
     return found
 
 
 def test_places_are_those_of_now_and_of_a_stop_what_it_stated(bounds):
-    for kind, low, high in ((THERE, 0.0, 40.0), (REST, 8.0, 16.0), (PROMPTLY, 8.0, 16.0), (RAMP, 0.0, 40.0)):
-        found = bounds(kind)
+    for stops, low, high in ((False, 0.0, 40.0), (True, 8.0, 16.0)):
+        found = bounds(THERE, stops)
         assert np.all(found["aLow"] == (low - 10.0) / 0.5) and np.all(found["aHigh"] == (high - 10.0) / 0.5)
-    assert bounds(REST, fLowest=9.0)["aLow"][0] == -2.0
+    assert bounds(REST, stops=True, fLowest=9.0)["aLow"][0] == -2.0
 
 
 def test_speeds_are_those_of_the_kind(bounds):

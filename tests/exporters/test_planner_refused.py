@@ -22,6 +22,11 @@ from gen_profile.support.errors import SpecError
             ['plant={type="mass-spring-chain-4"}'],
             "has 4 modes",
         ),
+        (
+            "bay-crane",
+            ['planner.stop="prompt"', "planner.live_rate={L1=0.1}"],
+            'planner.stop: "prompt" is not together with planner.live_rate; leave one out',
+        ),
         ("gantry-crane", ["planner.live={y=[0.0, 1.0]}"], "planner.live.y: this axis makes the load sway"),
         (
             "tower-crane",

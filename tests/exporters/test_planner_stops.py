@@ -6,6 +6,7 @@ from exporters.counted_block import CountedBlock, compile_counting
 from generator.planned_machines import GANTRY
 
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, SLOT = 0.004, 0.272  # s, that of a rope of 6 m
@@ -52,6 +53,12 @@ def test_a_rope_that_changes_before_a_quick_stop_is_known_after_it():
         block.hold(1200, bQuickStop=0.0, bVelocity=0.0, bReset=1.0)
         block.hold(3, bReset=0.0, bVelocity=1.0, fVelocityCommand=0.0)
         assert block.hold(3000, fVelocityCommand=0.6)["fVelocity"][-1] == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(("stop", "set_first"), [("quiet", 0.0), ("prompt", 1.0)])
+def test_a_spec_says_how_axes_stop_where_the_controller_does_not(stop, set_first):
+    spec = preset_spec("bay-crane", [f'planner.stop="{stop}"'])
+    assert BlockInstance(planner_block(spec).text).inputs["bPromptStop"] == set_first
 
 
 @pytest.fixture(scope="module")

@@ -82,3 +82,13 @@ def test_all_verdicts_hold(machine):
         assert one.rests_after is not None
         limits = spec.check.residual_sway
         assert not one.promise or all(sway <= limits[load] for load, sway in one.residual.items())
+
+
+def test_taps_keep_their_stated_ends_and_nothing_brakes_beyond_the_travel():
+    """A tap at rest was planned anew beyond its ends; a target given as an axis came back made it brake."""
+    spec = MACHINES["bay"]()
+    histories = Histories.of(spec)
+    drawn = Numbering.of(histories, 200, 2526710094)
+    with ClosedLoop(spec, whole_text(spec), histories) as loop:
+        judged = loop.judged(drawn, [118, 131])
+    assert not [fault for one in judged for fault in one.faults]

@@ -183,6 +183,13 @@ FAULTS = {
     "far": with_orders(
         REST, attrs.evolve(MOVE, end=350), order(350, CYCLES, STOP), periods=(0.1,), reaction=0.1
     ),
+    "hurries": with_orders(
+        REST,
+        attrs.evolve(MOVE, end=150),
+        order(150, CYCLES, STOP),
+        reaction=0.1,
+        prompt=np.ones(CYCLES, dtype=bool),
+    ),
     "outside": attrs.evolve(obedient(), limits=[attrs.evolve(LIMITS, targets=(-100.0, 4.9))]),
     "fast": with_orders(
         REST,
@@ -474,7 +481,7 @@ def test_histories_hold_what_operators_and_controllers_do():
     assert inputs == {
         *("rOverride", "fVelocityLimit", "fL1", "fm2", "bReset", "bExecute", "bLoadAtRest", "bEnable"),
         *("fCycleTime", "fFollowingLimit", "fActPosition", "fActVelocity", "fVelocityCommand", "fTarget"),
-        *("bVelocity", "bStop", "bQuickStop"),
+        *("bVelocity", "bStop", "bQuickStop", "bPromptStop"),
     }
     again = [sum(map(_same, history.commands, history.commands[1:])) for history in drawn]
     assert max(again) > 10

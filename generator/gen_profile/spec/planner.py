@@ -107,7 +107,7 @@ class PlannerSpec(Checked, table="planner"):
     lateness : float or None
         Times what is possible that a command may take, and a second beside; None demands nothing.
     stop : str
-        How axes stop where `bPromptStop` does not say: "quiet", without sway, or "prompt", never faster than now.
+        How axes stop where `bPromptStop` is not given: "quiet", without sway, or "prompt", never faster.
     quick_stop : float or None
         Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
     quick_stop_jerk : float or None

@@ -106,7 +106,7 @@ def _came(run: Followed) -> Iterator[tuple[str, Flags]]:
 
 
 def required(
-    live: Iterable[str], sensors: Sequence[str] = (), *, hoists: bool = False
+    live: Iterable[str], sensors: Sequence[str] = (), *, hoists: bool = False, prompts: bool = False
 ) -> list[tuple[str, str]]:
     """List the pairs of inputs, or outputs, and states that every proof must have tried.
 
@@ -119,6 +119,8 @@ def required(
         and no axis that goes as it is taken over.
     hoists : bool
         Whether ropes change on the way: a block that calms by its model believes that the load hangs still.
+    prompts : bool
+        Whether stops may be prompt.
     """
     given, seldom = [f"f{name}" for name in live], SELDOM[bool(sensors) : len(SELDOM) - hoists]
     rare = (*EVENTS, *(name + how for name in given for how in (NO_NUMBER, SPIKE)))
@@ -127,6 +129,7 @@ def required(
         *((name, state) for name in LOST for state in (() if sensors else GUIDED)),
         *((name, POWERED_UP) for name in ("bExecute", "bVelocity", "bStop", "bQuickStop", "bReset")),
         *LATER,
+        *(("bPromptStop", state) for state in (POSITION, VELOCITY, STOP) if prompts),
         *((name, ANYWHERE) for name in (*seldom, *LOST, *given, *RISES, *sensors)),
     ]
 

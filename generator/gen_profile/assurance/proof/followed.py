@@ -186,7 +186,10 @@ class Followed:
         """Whether each axis is to stop promptly, (axes, cycles)."""
         axes = range(len(self.axes))
         stops = [
-            [one.kind == STOP or not max(one.tops) > 0.0 or (one.kind == VELOCITY and not one.values[k]) for k in axes]
+            [
+                one.kind == STOP or not max(one.tops) > 0.0 or (one.kind == VELOCITY and not one.values[k])
+                for k in axes
+            ]
             for one in self.orders
         ]
         guided = self.by_order([one.kind not in (QUICK_STOP, DISABLED) for one in self.orders])

@@ -144,7 +144,10 @@ def habit(command: Command, which: float, how: float, around: Surroundings) -> M
     """
     if which < 0.5:
         return (command,)
-    rough = [*ROUGH[: around.rough], *[_otherwise_stopped] * (around.other_stops is not None and around.rough > 0)]
+    rough = [
+        *ROUGH[: around.rough],
+        *[_otherwise_stopped] * (around.other_stops is not None and around.rough > 0),
+    ]
     habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *rough * OFTEN]
     return habits[min(int(2.0 * len(habits) * (which - 0.5)), len(habits) - 1)](command, how, around)
 
@@ -368,7 +371,7 @@ def _braked(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _otherwise_stopped(command: Command, how: float, around: Surroundings) -> Manner:
-    """Stop by a button or a stick at 0, promptly or not, which is chosen before, as it stops, or for a moment."""
+    """Stop by button or stick, promptly or not, which is chosen before, as it stops, or for a moment."""
     first, wait = _towards(command, how, around), around.part(how, 3) + 0.5 * around.period * (how > 0.3)
     first = _stick(command, how, around) if _fraction(how, 6) < 0.4 else first
     kind, values = ("velocity", around.neutral) if first.command == "velocity" else ("stop", ())

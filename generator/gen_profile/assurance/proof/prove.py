@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.assurance.proof.closed_loop import ClosedLoop
 from gen_profile.assurance.proof.exercised import required, sensor_met
 from gen_profile.assurance.proof.followed import LATENESS
-from gen_profile.assurance.proof.histories import Histories
+from gen_profile.assurance.proof.histories import Histories, other_stops
 from gen_profile.assurance.proof.judging import Judge
 from gen_profile.assurance.proof.lateness import chosen
 from gen_profile.assurance.proof.numbering import KEPT, LONG, RHYTHMS, Numbering
@@ -165,7 +165,8 @@ def _required(spec: Spec) -> list[tuple[str, str]]:
     live = () if changing else tuple(spec.planner.live)
     kinds = faults_of(len(spec.planner.sensor.names)) if spec.planner.sensor else ()
     met = [sensor_met(kind) for kind in (("", *kinds) if kinds else ())]
-    return required(live, met, hoists=bool(spec.planner.live_rate))
+    prompts = other_stops(spec) is not None
+    return required(live, met, hoists=bool(spec.planner.live_rate), prompts=prompts)
 
 
 def _verdict(

@@ -184,7 +184,7 @@ def far(run: Followed) -> Iterator[Allowance]:
 
 
 def hurries(run: Followed) -> Iterator[Allowance]:
-    """Judge that an axis which stops promptly becomes no faster, once what is committed may have been replaced."""
+    """Judge that an axis which stops promptly becomes no faster once what was committed may be replaced."""
     for k, own in enumerate(run.limits):
         speed = np.abs(run.velocity[k])
         for begin, end in runs_of(run.prompt_stops[k]):

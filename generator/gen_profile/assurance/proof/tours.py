@@ -114,6 +114,11 @@ def _disabled(how: float, around: Surroundings) -> Iterator[Change]:
     yield attrs.evolve(_given(bEnable=0.0), lasts=how * PART * around.period)
 
 
+def _other_stops(how: float, around: Surroundings) -> Iterator[Change]:
+    inputs = {"bPromptStop": around.other_stops or 0.0}
+    yield Change(time=0.0, lasts=2.0 * how * PART * around.period, inputs=inputs)
+
+
 def _load_at_rest(how: float, around: Surroundings) -> Iterator[Change]:
     yield _given(bLoadAtRest=1.0)
 
@@ -142,7 +147,8 @@ def events(around: Surroundings) -> tuple[Event, ...]:
     others = () if around.rough == len(BRAKING) else ROUGH[: 1 if around.hoists else 3 if around.live else 2]
     if others and around.sensors:  # the rest comes in histories with a sensor
         return (*others, *ALSO)
-    return (*BRAKING, *others, *ALSO, *live[:1])
+    stops = (_other_stops,) * (around.other_stops is not None)
+    return (*BRAKING, *others, *ALSO, *live[:1], *stops)
 
 
 def tour(choice: float, time: float, around: Surroundings) -> Manner:
