@@ -89,6 +89,6 @@ def test_taps_keep_their_stated_ends_and_nothing_brakes_beyond_the_travel():
     spec = MACHINES["bay"]()
     histories = Histories.of(spec)
     drawn = Numbering.of(histories, 200, 2526710094)
-    with ClosedLoop(spec, whole_text(spec), histories) as loop:
+    with ClosedLoop(spec, planner_block(spec).text, histories) as loop:
         judged = loop.judged(drawn, [118, 131])
     assert not [fault for one in judged for fault in one.faults]

@@ -112,13 +112,13 @@ def _work(c: PlannerConstants, watched: int, slots: int) -> int:
     programme = 100 + 8 * slots + max(432, 20 + rows * (rows + 14)) - 15 * swings
     if _follows(c):
         account = account_work(c, 1 + len(ENDS) + watched)
-        rests = 90 + account["cFollowWork"] + account["cNowWork"]
+        rests = 95 + account["cFollowWork"] + account["cNowWork"]
         found = 13 * plan + 4 * c.modes * (1 + len(ENDS) + watched)
         searches = account["cModelWork"] + max(
             30 * rowed + account["cSweepWork"], found + account["cRunWork"]
         )
     else:
-        rests = 90 + 12 * swings
+        rests = 95 + 12 * swings
         searches = max(11 * plan + 80 * (swings + rowed) + 10, model_work(c) + 90 * swings, 120 * swings)
     sensors = len(c.sensor.words) * cycle_work(c.sensor, c.modes) if c.sensor else 0
     return shell_work(c) + sensors + len(c.axes) * rests + 150 + 30 * swings + max(searches, programme)

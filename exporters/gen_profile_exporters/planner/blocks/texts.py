@@ -233,7 +233,7 @@ def _of_motion(c: PlannerConstants, swings: int, shown: int, slots: int, plan: i
         "cShown": shown,
         "cPlan": plan,
         "cFuture": plan + 4,
-        "cOwnWork": 90,  # operations of every cycle
+        "cOwnWork": 95,  # operations of every cycle
         # operations that an axis has for programmes in a cycle in the mean, where all of them plan
         "cCycleWork": max(500, operations(c) // len(c.axes) - 340 - 5 * slots),
         # operations where a programme is found, and the next begins

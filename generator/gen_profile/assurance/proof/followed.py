@@ -198,7 +198,7 @@ class Followed:
     @cached_property
     def stopped_from(self) -> int:
         """Cycle from which on a prompt stop may have left the machine as given swinging."""
-        return int(np.argmax([*self.prompt_stops.any(axis=0), True]))
+        return int(np.argmax(np.append(self.prompt_stops.any(axis=0), True)))
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""
