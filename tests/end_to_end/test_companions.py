@@ -189,6 +189,7 @@ def test_no_file_of_a_planner_block_may_be_altered(planned):
     assert verified_block(folder / main)[0] == PLANNED
 
 
+@pytest.mark.slow
 def test_a_planner_blocks_wrapper_or_program_that_is_named_is_compared(planned):
     folder, names = planned
     path = folder / next(name for name in names if name.endswith("_Axis.TcPOU"))
@@ -203,6 +204,7 @@ def test_a_planner_blocks_wrapper_or_program_that_is_named_is_compared(planned):
         one.write_bytes(content)
 
 
+@pytest.mark.slow
 def test_an_altered_wrapper_fails_the_proof_of_its_block(planned):
     folder, (main, *others) = planned
     content = (folder / others[0]).read_bytes()

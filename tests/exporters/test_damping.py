@@ -1,4 +1,4 @@
-"""When the planner of the folder of blocks damps what a sensor shows: the block alone."""
+"""When the planner damps what a sensor shows: the block that decides it, alone."""
 
 import numpy as np
 import pytest

@@ -9,7 +9,6 @@ import flint
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev as series
-from scipy import signal
 
 import gen_profile as gp
 from gen_profile.assurance.certificate import certify, theorem
@@ -133,7 +132,9 @@ def test_the_axes_are_as_near_to_the_smooth_motion_as_is_said(find, tau):
     times = np.linspace(0.0, last, (len(setpoints.times) - 1) * 200 + 1)
     axis = np.interp(times, setpoints.times, setpoints.position[:, 0])
     if tau:  # which takes straight lines as they are
-        axis = start + signal.lsim(([1.0], [tau, 1.0]), axis - start, times)[1]
+        from scipy.signal import lsim  # noqa: PLC0415  (half a second in each process that collects)
+
+        axis = start + lsim(([1.0], [tau, 1.0]), axis - start, times)[1]
     for piece in np.flatnonzero(knots[1:] <= last)[::5]:
         first, end = (round(200 * knot / setpoints.cycle_time) for knot in knots[piece : piece + 2])
         t = times[first : end + 1]

@@ -110,6 +110,7 @@ def test_a_free_axis_keeps_a_narrow_travel(travel):
     assert excursion(motion, 1) <= travel[1] - travel[0] + 1e-9  # m: no drive resolves a nanometre
 
 
+@pytest.mark.slow
 def test_a_refused_move_with_an_axis_that_has_no_room_is_answered():
     limits = {"acceleration": 0.01, "axis": {"hoist": {"travel": [0.0, 0.0]}}}
     with pytest.raises(GenProfileError, match=r"It can be done with move\.duration = "):
@@ -175,6 +176,7 @@ def test_what_every_axis_takes_is_told(tmp_path):
     assert "on the way 6000 to 6000 mm;" in header
 
 
+@pytest.mark.slow
 def test_a_free_axis_s_way_stands_in_the_header(tmp_path):
     spec = preset_spec(
         "tower-crane", ["move.start=[0, 25]", "move.target=[1.2, 25]", 'move.free=["trolley"]']

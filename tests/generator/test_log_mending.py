@@ -314,6 +314,7 @@ def rotated(signal, *angles):
     return (signal[:, None] * axis + noise + [0.01, -0.02, 0.005]).T
 
 
+@pytest.mark.slow
 def test_a_gyroscope_that_lies_askew_shows_the_rope_by_all_its_axes(tmp_path):
     """From one axis alone a wide swing looks small, and its longer period was taken for a longer rope."""
     times, _, rates = swing(angle=0.6)

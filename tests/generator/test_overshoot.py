@@ -48,6 +48,7 @@ def farthest(motion, rope=ROPE, way=WAY, until=30.0):
     return most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("limit", "way"), [(0.05, WAY), (0.0, WAY), (0.0, -WAY)])
 def test_no_load_passes_its_target_by_more_than_the_limit(limit, way):
     free, kept = (gp.plan(skewed(one, NOMINAL, way=way)) for one in (GREAT, limit))

@@ -303,6 +303,7 @@ def test_whatever_is_turned_is_answered_without_a_traceback():
 
 
 class TestOverStacks:
+    @pytest.mark.slow
     def test_the_way_is_sketched_before_it_is_found_for_all_machines(self):
         document = quay().to_dict()
         start = WrittenSpec(words=("quay.toml",), text=tomlkit.dumps(document), folder=Path())

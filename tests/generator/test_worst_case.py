@@ -87,6 +87,7 @@ def test_without_limits_little_more_acceleration_is_taken_than_by_the_exact_moti
     assert over_range <= 1.501 * exact
 
 
+@pytest.mark.slow
 def test_options_decide_how_much_effort_less_sway_may_take():
     problem = ranged(limits=LimitsSpec())
     usual, little, wide = (
