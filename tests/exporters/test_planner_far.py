@@ -208,3 +208,17 @@ def test_a_slow_drive_that_goes_to_a_target_is_stopped_by_a_stick_the_other_way(
     out = driver.hold(0.1, bExecute=0, bVelocity=1).hold(25.0, fVelocityCommand=2.0).outputs
     assert out["fPosition"].min() > place - 5.0
     assert out["fVelocity"][-1] == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("rope", "load", "override"), [(6.0, 1500.0, 1.0), (3.0, 300.0, 0.6), (9.0, 2000.0, 1.0)]
+)
+def test_the_time_to_a_far_target_is_known_at_speed(rope, load, override):
+    """It was 1.1 to 1.8 s too long, as the way of the decline was counted twice; with sensors up to 6 s."""
+    driver = Driver(
+        planner_block(parse_spec(BAY)).text, fActPosition=1.0, fL1=rope, fm2=load, rOverride=override
+    )
+    out = driver.hold(3.0).hold(100.0, bExecute=1.0, fTarget=38.0).parts[-1]
+    arrives = int(np.argmax(out["bDone"]))
+    error = out["fTimeToGo"][:arrives] - CYCLE * (arrives - np.arange(arrives))
+    assert np.abs(error[round(6.0 / CYCLE) : round(20.0 / CYCLE)]).max() < 0.5

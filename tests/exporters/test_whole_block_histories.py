@@ -57,8 +57,7 @@ FIRST = {
     "a sensor, wide errors": 10,
     "two sensors at 1 ms": 8,
 }  # histories of each, 30 else, and those that were refused
-# bBusy falls late; fTimeToGo is wrong, and a promise is taken back; bBusy falls late; 2 ms late
-KNOWN = {"a sensor": (0,), "two sensors": (0, 2), "wide errors": (90, 217), "a level probe": (2,)}
+KNOWN = {"a level probe": (2,)}  # an axis stands 2 ms too long
 FORMER = {
     "bay": (157, 181, 222),  # an axis that comes back from beyond its travel: ends of a stop, braking
     "zones": (6, 56),  # a slot of rounding behind the end of a motion, where its target came again
