@@ -9,6 +9,8 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
+import pytest
+
 from gen_profile.methods.solvers.solution import LATER, LONGER, WIDER, Status
 from gen_profile.methods.solvers.suggestions import IN_VAIN
 from gen_profile.presentation.studio.knobs import knobs
@@ -64,6 +66,7 @@ def fields(template):
     return sorted(part[1] for part in PART.finditer(template) if part[1])
 
 
+@pytest.mark.slow
 def test_translations_have_the_fields_of_their_templates():
     found = {template for template, _ in templates()}
     assert len(found) > 100 and found & set(WORDS["messages"])
