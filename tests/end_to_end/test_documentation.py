@@ -66,7 +66,6 @@ if STANDALONE:
         assert size < 1e6 * stated < 350e6
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_no_command_hides(page):
+def test_no_command_hides():
     """One in an indented block would not be run."""
-    assert "\n    gen-profile " not in page.read_text("utf-8")
+    assert [page.name for page in PAGES if "\n    gen-profile " in page.read_text("utf-8")] == []

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
 from command_line import COMMANDS, cli
 
 from gen_profile.plants.registry import find_plant, plant_types
@@ -16,21 +15,18 @@ BRIEF = {"glossary"}  # a table that needs no introduction
 OF_THE_GROUP = {"--help", "--version"}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page):
-    text = page.read_text("utf-8")
-    targets = re.findall(r"\]\((?!https?:)([^)#]+)", text)
-    assert [target for target in targets if not (page.parent / target).exists()] == []
+def test_links_lead_somewhere():
+    links = {page: re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text("utf-8")) for page in PAGES}
+    assert sum(map(len, links.values())) > 200
+    assert [(p.name, to) for p, all_ in links.items() for to in all_ if not (p.parent / to).exists()] == []
 
 
-@pytest.mark.parametrize(
-    "page", [page for page in DOCS if page.stem not in BRIEF], ids=lambda page: page.stem
-)
-def test_a_page_begins_with_what_it_is_for(page):
-    box = page.read_text("utf-8").split("\n\n")[1].replace("\n> ", " ")
-    assert re.fullmatch(
-        r"> \*\*What it is for:\*\* .+\. \*\*When to read it:\*\* .+\. \*\*Example:\*\* .+\.", box
-    )
+def test_a_page_begins_with_what_it_is_for():
+    for page in DOCS:
+        box = page.read_text("utf-8").split("\n\n")[1].replace("\n> ", " ")
+        assert page.stem in BRIEF or re.fullmatch(
+            r"> \*\*What it is for:\*\* .+\. \*\*When to read it:\*\* .+\. \*\*Example:\*\* .+\.", box
+        ), page.name
 
 
 def test_every_format_is_on_its_page():
@@ -47,10 +43,9 @@ def commands_on(page):
     return [line.split() for line in re.findall(r"(?<![\w-])gen-profile ((?:[\w-]|\S*/)[^\n`#|&;]*)", text)]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_options_are_those_of_the_command(page):
+def test_options_are_those_of_the_command():
     wrong = []
-    for words in commands_on(page):
+    for words in (words for page in PAGES for words in commands_on(page)):
         own = getattr(cli.commands.get(words[0]), "default", "")
         names = (words[0], " ".join(words[:2]), f"{words[0]} {own}", cli.default)
         command = next(COMMANDS[name] for name in names if name in COMMANDS)
