@@ -3,6 +3,7 @@
 from gen_profile.methods.solvers import method_selection as choice
 from gen_profile.methods.solvers.draft import Plan, solved
 from gen_profile.methods.solvers.over_stacks.plan import over_stacks
+from gen_profile.methods.solvers.over_stacks.searches import OPTIONS
 from gen_profile.methods.solvers.shortest import short_enough, shortest
 from gen_profile.methods.solvers.solution import SIMPLER, Status, no_motion
 from gen_profile.methods.solvers.suggestions import Remedy, explained, remedy
@@ -22,10 +23,15 @@ def plan(spec: Spec, progress: Progress = no_progress) -> Plan:
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
     try:
-        with budget(*choice.ANSWER):
+        with budget(*answer_of(spec)):
             return judged(draft(spec, progress), progress)
     except OutOfWork as error:
         raise no_motion(Status.GIVEN_UP, SIMPLER) from error
+
+
+def answer_of(spec: Spec) -> tuple[float, float]:
+    """Tell how much work in s, and of the processor, all takes at most that a spec asks for."""
+    return choice.ANSWER if spec.path is None else OPTIONS.answer
 
 
 def draft(spec: Spec, progress: Progress = no_progress) -> Plan:

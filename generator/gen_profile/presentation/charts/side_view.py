@@ -25,6 +25,10 @@ SIDE = (
 )
 ABOVE = "From above, likewise."
 Box = tuple[float, float, float]  # from, to, and top or underside, in m
+PARTS = 40  # of a way around something, of which each is nearly straight
+ASIDE = 0.05  # m off the straight way, from which on it is none
+CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+AROUND = Style(colour=FRAME, dash="dot", width=1.2)
 KEPT_OUT = Style(colour=LIMIT, dash="dash", width=1.2)
 
 
@@ -32,7 +36,7 @@ def path_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
     """Draw the way of the loads of all machines of a motion over what stands there."""
     times = np.linspace(0.0, evaluation.motion.duration, SAMPLES)
     places = np.asarray(evaluation.swing.bodies(times))
-    panels, caption = [side_view(spec, on_line(spec, places))], SIDE
+    panels, caption = [side_view(spec, places)], SIDE
     if spec.path is not None and len(evaluation.motion.target) == 3:
         panels.append(plan_view(spec, places))
         caption = f"{SIDE} {ABOVE}"
@@ -51,24 +55,30 @@ def side_view(spec: Spec, places: Array) -> Panel:
     ----------
     spec : Spec
         With a path over stacks.
-    places : (machines, samples, bodies, 2) array
-        m, along the way in plan view and above the suspension; of the nominal machine first.
+    places : (machines, samples, bodies, 3) array
+        m; of the nominal machine first.
     """
     path, bodies, line = spec.path, spec.machine().bodies, line_of(spec)
     assert path is not None
-    ways = places + np.array([0.0, path.rail])
-    standing, overhead = _split(path, standing_on(path, line))
+    ways, beside = on_line(spec, places) + np.array([0.0, path.rail]), gone_around(spec, places)
+    on_way = standing_on(path, line)
+    standing, overhead = _split(path, {k: box for k, box in on_way.items() if k not in beside})
     heights = [top for *_, top in (*standing, *overhead)]
     floor = min([0.0, float(ways[..., 1].min()), *heights])
     ceiling = ROOM + max([float(ways[..., 1].max()) + path.load[-1], *heights])
+    bottoms = {k: ceiling if k >= len(path.stacks) else floor for k in beside}
     lines = [Line("stacks", *_box(low, high, floor, top), STANDING) for low, high, top in standing]
     lines += [Line("overhead", *_box(a, b, height, ceiling), STANDING) for a, b, height in overhead]
+    for k, bottom in bottoms.items():
+        left, right, height = on_way[k]
+        lines.append(Line("gone around", *_box(left, right, bottom, min(height, ceiling)), AROUND))
     looks = _looks(path, bodies)
     for number, (body, (size, colour)) in enumerate(zip(bodies, looks, strict=True)):
         seen = (line.extent(*size[:2]), size[2])
         name = Phrase("swept by the {body}", body=body)
         lines.append(Line(name, *swept(ways[:, :, number], seen), Style(colour=colour, fill=0.2)))
-    kept_out, hanging = _split(path, standing_on(path, line, path.clearances))
+    wider = standing_on(path, line, path.clearances)
+    kept_out, hanging = _split(path, {k: box for k, box in wider.items() if k not in beside})
     if kept_out:
         lines.append(Line("clearance", *skyline(kept_out, floor), KEPT_OUT))
     lines += [Line("clearance", *_box(low, high, ceiling, under), KEPT_OUT) for low, high, under in hanging]
@@ -104,7 +114,7 @@ def plan_view(spec: Spec, places: Array) -> Panel:
     y = [*edges, float(places[..., 1].min()), float(places[..., 1].max())]
     hall = (min(y) - ROOM, max(y) + ROOM)  # as far as bands are drawn
     names, sideways = ["stacks"] * len(path.stacks) + ["overhead"] * len(path.overhead), path.clearances[0]
-    lines = []
+    lines, straight = [], is_straight(spec, places)
     for around, style in ((0.0, STANDING), (sideways, KEPT_OUT)):
         for number, name in enumerate(names):
             area = path.area(number).widened(around, around)
@@ -113,16 +123,11 @@ def plan_view(spec: Spec, places: Array) -> Panel:
     for number, (body, (size, colour)) in enumerate(zip(bodies, _looks(path, bodies), strict=True)):
         ends = Style(colour=colour, dash="dot", width=1.2)
         way, half = places[:, :, number, :2], np.array(size[:2]) / 2.0
-        corners = (way[..., None, :] + half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])).reshape(-1, 2)
-        outline = corners[ConvexHull(corners).vertices] if half.all() else way[0]
-        lines.append(
-            Line(
-                Phrase("swept by the {body}", body=body),
-                outline[:, 0],
-                outline[:, 1],
-                Style(colour=colour, fill=0.2),
-            )
-        )
+        name = Phrase("swept by the {body}", body=body)
+        for part in [way] if straight else np.array_split(way, PARTS, axis=1):
+            corners = (part[..., None, :] + half * CORNERS).reshape(-1, 2)
+            outline = corners[ConvexHull(corners).vertices] if half.all() else part[0]
+            lines.append(Line(name, outline[:, 0], outline[:, 1], Style(colour=colour, fill=0.2)))
         name = Phrase("middle of the {body}, nominal", body=body)
         lines.append(Line(name, way[0, :, 0], way[0, :, 1], Style(colour=colour, width=1.8)))
         name = Phrase("{body} at start and target", body=body)
@@ -132,6 +137,35 @@ def plan_view(spec: Spec, places: Array) -> Panel:
     assert axes is not None
     x_label, y_label = (f"{names[axis]} (m)" for axis in axes.along)
     return Panel("From above", y_label, lines, x_label=x_label, even=True)
+
+
+def is_straight(spec: Spec, places: Array) -> bool:
+    """Whether nominal bodies (machines, samples, bodies, 3) stay on the straight way in plan view."""
+    (x, y), line = line_of(spec).way, places[0, ..., :2]
+    aside = (line - line[0]) @ np.array([-y, x])
+    return bool(np.abs(aside).max() <= ASIDE)
+
+
+def gone_around(spec: Spec, places: Array) -> frozenset[int]:
+    """Tell what on the straight way no nominal body is over or below, as the way leads around it.
+
+    Parameters
+    ----------
+    spec : Spec
+    places : (machines, samples, bodies, 3) array
+        m.
+    """
+    path, count = spec.path, places.shape[2]
+    assert path is not None
+    if is_straight(spec, places):
+        return frozenset()
+    met: set[int] = set()
+    for body in range(count):
+        x, y, _ = places[0, :, body].T
+        wide, deep, _ = path.size(body, count)
+        areas = (path.area(k).widened(wide / 2.0, deep / 2.0) for k in range(len(path.obstacles)))
+        met |= {k for k, area in enumerate(areas) if (area.outside(x, y) < 0.0).any()}
+    return frozenset(standing_on(path, line_of(spec))) - met
 
 
 def _looks(path: StacksSpec, bodies: Sequence[str]) -> list[tuple[tuple[float, float, float], str]]:

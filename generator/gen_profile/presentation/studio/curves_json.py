@@ -55,7 +55,7 @@ def side_json(spec: Spec, places: Array) -> dict[str, Any]:
     ----------
     spec : Spec
         With a path over stacks.
-    places : (machines, samples, bodies, 2) array
+    places : (machines, samples, bodies, 3) array
         As `side_view` takes them.
     """
     panel, path, line = side_view(spec, places), spec.path, line_of(spec)

@@ -15,13 +15,11 @@ from gen_profile.dynamics.evaluation.motion_evaluation import MotionEvaluation, 
 from gen_profile.dynamics.evaluation.phrases import machine, move, place_unit
 from gen_profile.dynamics.problem.limits import LIMIT_TOLERANCE
 from gen_profile.methods.solvers.draft import Plan
-from gen_profile.methods.solvers.method_selection import ANSWER
 from gen_profile.methods.solvers.over_stacks.plan import sketched
-from gen_profile.methods.solvers.plan import draft, judged
+from gen_profile.methods.solvers.plan import answer_of, draft, judged
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.motion.metrics import extremes, peak
 from gen_profile.presentation.charts.curves import motion_figure, select_machines, sway_figure
-from gen_profile.presentation.charts.side_view import on_line
 from gen_profile.presentation.report.animation import animation
 from gen_profile.presentation.studio.curves_json import curves_json, side_json
 from gen_profile.presentation.studio.knobs import knobs
@@ -52,7 +50,7 @@ def picture(question: Question) -> Iterator[Part]:
     """Solve a spec and show it: curves and the machine first, then knobs and the verdict."""
     try:
         spec = question.spec()
-        with budget(*ANSWER):
+        with budget(*answer_of(spec)):
             yield from _sketched(spec)
             drafted = draft(spec)
             if drafted.found is None:
@@ -90,7 +88,7 @@ def _sketched(spec: Spec) -> Iterator[Part]:
 def _side(spec: Spec, evaluation: MotionEvaluation) -> Part:
     times = np.linspace(0.0, evaluation.motion.duration, SAMPLES)
     places = np.asarray(evaluation.swing.bodies(times))
-    return {"part": "side", **side_json(spec, on_line(spec, places))}
+    return {"part": "side", **side_json(spec, places)}
 
 
 def _setting(question: Question, spec: Spec) -> Part:

@@ -1,7 +1,7 @@
 """A path over stacks as the programs take it: machines, their ends, and when each load is high enough."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
 import numpy as np
@@ -10,18 +10,20 @@ from gen_profile.dynamics.evaluation.scenarios import scenarios
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.dynamics.problem.initial_state import initial_state
 from gen_profile.dynamics.problem.linearization import linearize
+from gen_profile.methods.solvers.over_stacks.guide import Guide, Numbers
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces, Rates, highest, least_time
-from gen_profile.methods.solvers.over_stacks.swing import Swing, swing_of, swings_along
+from gen_profile.methods.solvers.over_stacks.swing import CARRIED, Swing, swing_of, swings_along
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant, decides
 from gen_profile.spec.model import AxisLimitsSpec, Spec
 from gen_profile.spec.plan_view import Area, StraightWay
-from gen_profile.spec.stacks import PathAxes, StackZone, hanging, path_axes, zones
+from gen_profile.spec.stacks import PathAxes, Place, StackZone, hanging, path_axes, zones
 from gen_profile.support.units import RATES
 
 FINE = 4001  # times at which levels are compared; between them they are straight lines
 UNLIMITED = 1e4  # in place of a limit of the trolley that is not stated
 EDGE = 1e-9  # s, to either side of a crossing
+PLAN = (StraightWay(), StraightWay(way=(0.0, 1.0)))  # both axes by themselves
 LEVEL = 1e-5  # m, by which a level may be too low: between the times at which it is known it is higher
 
 
@@ -34,8 +36,9 @@ class Bay:
     spec : Spec
     plant : Plant
     axes : PathAxes
-    line : StraightWay
-        In plan view, along which the load goes: the trolley's places are along it.
+    lines : tuple of StraightWay
+        In plan view: the one along which the load goes, or both axes where it goes around something. The
+        trolley's places are along them.
     moving : tuple of int
         Coordinates of the machine that move as the load goes along the line.
     nominal, others : Swing
@@ -45,19 +48,22 @@ class Bay:
     hang : (machines, bodies) array
         Heights of the bodies at the start, m above the suspension.
     zones : tuple of StackZone
-        Along the line.
+        Along the line, or in plan view.
+    guide : Guide or None
+        Of a way around something.
     """
 
     spec: Spec
     plant: Plant
     axes: PathAxes
-    line: StraightWay
+    lines: tuple[StraightWay, ...]
     moving: tuple[int, ...]
     nominal: Swing
     others: Swing
     machines: Array
     hang: Array
     zones: tuple[StackZone, ...]
+    guide: Guide | None = None
 
     @property
     def hoist(self) -> int:
@@ -65,24 +71,21 @@ class Bay:
         return self.axes.hoist
 
     @property
-    def limits(self) -> AxisLimitsSpec:
-        """Of the trolley, along the line: what the axes that carry it along allow."""
-        stated = [
-            (self.spec.limits.of(axis), k) for k, axis in enumerate(self.axes.along) if self.line.way[k]
-        ]
+    def limits(self) -> tuple[AxisLimitsSpec, ...]:
+        """Of the trolley, along every line: what the axes that carry it along allow."""
+        return tuple(self._limits(line) for line in self.lines)
+
+    def _limits(self, line: StraightWay) -> AxisLimitsSpec:
+        stated = [(self.spec.limits.of(axis), k) for k, axis in enumerate(self.axes.along) if line.way[k]]
         rates = {
             rate: min(
-                (
-                    each / abs(self.line.way[k])
-                    for one, k in stated
-                    if (each := getattr(one, rate)) is not None
-                ),
+                (each / abs(line.way[k]) for one, k in stated if (each := getattr(one, rate)) is not None),
                 default=None,
             )
             for rate in RATES
         }
         travels = [
-            sorted((edge - self.line.origin[k]) / self.line.way[k] for edge in one.travel)
+            sorted((edge - line.origin[k]) / line.way[k] for edge in one.travel)
             for one, k in stated
             if one.travel is not None
         ]
@@ -98,19 +101,25 @@ class Bay:
     def begin(self) -> Array:
         """State of the nominal machine at the start, sensitivities included."""
         state = np.zeros(self.nominal.states)
-        state[0] = self._along(self.spec.move.start)
+        carried = self.nominal.carried
+        state[:carried:CARRIED] = self.start
         swing = initial_state(self.plant, self.spec.move.initial).reshape(2, -1)[:, list(self.moving)].ravel()
-        state[3 : 3 + len(swing)] = swing
+        state[carried : carried + len(swing)] = swing
         return state
 
     @property
-    def target(self) -> float:
-        """Of the trolley in m, along the line."""
+    def start(self) -> Array:
+        """Of the trolley in m, along every line."""
+        return self._along(self.spec.move.start)
+
+    @property
+    def target(self) -> Array:
+        """Likewise."""
         return self._along(self.spec.move.target)
 
-    def _along(self, end: Sequence[float]) -> float:
-        places = [*(end[axis] for axis in self.axes.along), 0.0][:2]
-        return float(self.line.along(np.array(places)))
+    def _along(self, end: Sequence[float]) -> Array:
+        places = np.array([*(end[axis] for axis in self.axes.along), 0.0][:2])
+        return np.array([line.along(places) for line in self.lines])
 
     @property
     def rise(self) -> float:
@@ -118,13 +127,17 @@ class Bay:
         return -self.spec.move.distance[self.hoist]
 
     @property
-    def top(self) -> float:
-        """How far the hoist can lift from the start in m."""
+    def highest(self) -> float:
+        """How far the hoist itself can lift from the start in m."""
         travel, start = self.spec.limits.of(self.hoist).travel, self.spec.move.start[self.hoist]
         least = self.plant.actuated[self.hoist].lower
-        highest = start - max(least, travel[0] if travel else least)
+        return start - max(least, travel[0] if travel else least)
+
+    @property
+    def top(self) -> float:
+        """How far the hoist can lift from the start in m."""
         below = min((self.headroom(zone) for zone in self.zones if self.passes(zone)), default=math.inf)
-        return min(highest, max(below, self.rise, 0.0))
+        return min(self.highest, max(below, self.rise, 0.0))
 
     def headroom(self, zone: StackZone) -> float:
         """How far the hoist can lift from the start in m below what is overhead."""
@@ -142,12 +155,25 @@ class Bay:
     @property
     def way(self) -> float:
         """Of the trolley in m."""
-        return abs(self.target - float(self.begin[0]))
+        return float(np.linalg.norm(self.target - self.start))
 
     def passes(self, zone: StackZone) -> bool:
         """Whether a body has to go over a stack, or below what is overhead."""
+        if self.guide is not None:
+            return self.guide.crosses(zone.area)
         sides = self._sides(zone)
         return len(set(sides)) > 1 or (zone.overhead and sides[0] == (-math.inf, math.inf))
+
+    def is_wall(self, zone: StackZone) -> bool:
+        """Whether a body goes around it: something overhead, or too high to be lifted over."""
+        assert self.guide is not None
+        lift = zone.top - float(self.hang[:, zone.body].min())
+        return zone.overhead or lift > self.highest
+
+    def guided_by(self, places: Array, window: float) -> "Bay":
+        """Let lines turn as bodies go at even times, (times, bodies, 2)."""
+        assert self.guide is not None
+        return attrs.evolve(self, guide=self.guide.going(places, window))
 
     def alone(self) -> "Bay":
         """Leave the nominal machine only."""
@@ -155,7 +181,21 @@ class Bay:
 
     def quickest_travel(self) -> float:
         """Least time in s that the trolley takes by itself."""
-        return least_time(self.way, _rates(self.limits)) if self.way else 0.0
+        if self.guide is not None:
+            return sum(self.legs(self.guide.route))
+        return self.directly()
+
+    def directly(self) -> float:
+        """Least time in s straight to the target, whatever is in the way."""
+        return self._travel(self.target - self.start)
+
+    def legs(self, route: Sequence[tuple[float, float]]) -> list[float]:
+        """Least times in s from corner to corner of a route, resting at each."""
+        return [self._travel(way) for way in np.diff(np.array(route), axis=0)]
+
+    def _travel(self, ways: Array) -> float:
+        pairs = zip(ways.tolist(), self.limits, strict=True)
+        return max(least_time(way, _rates(limits)) if way else 0.0 for way, limits in pairs)
 
     def quickest_lift(self, lift: float) -> float:
         """Least time in s that the hoist takes to rest at a height and go on from there to the target."""
@@ -168,9 +208,69 @@ class Bay:
 
     def _sides(self, zone: StackZone) -> tuple[tuple[float, float], tuple[float, float]]:
         """Between which places a body may be while it is low, before a stack and after it."""
-        return _side(zone, float(self.begin[0])), _side(zone, self.target)
+        return _side(zone, float(self.start[0])), _side(zone, float(self.target[0]))
 
-    def bounds(self, machine: int, body: int, up: Pieces, times: Array) -> tuple[Array, Array]:
+    def sides(self, machine: int, body: int, up: Pieces, times: Array) -> tuple[Numbers, Array, Array]:
+        """Tell on which sides of lines a body of a machine has to be, as a hoist lifts it.
+
+        Returns
+        -------
+        rows, normals, most : (rows,), (rows, lines) and (rows,) arrays
+            Numbers of times, and ``normal · place ≤ most`` at them.
+        """
+        if self.guide is not None:
+            return self._around(machine, body, up, times)
+        low, high = self._bounds(machine, body, up, times)
+        held = [np.flatnonzero(np.isfinite(bound)) for bound in (high, low)]
+        signs = np.repeat([[1.0], [-1.0]], [len(rows) for rows in held], axis=0)
+        return np.concatenate(held), signs, np.concatenate([high[held[0]], -low[held[1]]])
+
+    def _around(self, machine: int, body: int, up: Pieces, times: Array) -> tuple[Numbers, Array, Array]:
+        """Tell the sides in plan view: of lines past areas while a body is low, of its own place else.
+
+        Between two times a body may not cut a corner, so the lines of both hold at each.
+        """
+        assert self.guide is not None
+        fine = np.linspace(0.0, up.duration, FINE)
+        level = self.hang[machine, body] + up.at(fine)[:, 0]
+        found = [(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))]
+        between = np.concatenate([times[:1], (times[:-1] + times[1:]) / 2.0, times[-1:]])
+        for zone in self.zones:
+            if zone.body != body or (zone.overhead and (self.passes(zone) or level.max() <= zone.top)):
+                continue
+            rises, falls = (up.duration, 0.0) if zone.overhead else _crossings(fine, level, zone.top)
+            normals, most = self.guide.lines(zone.area, body, rises / up.duration, falls / up.duration)
+            last = len(most) - 1
+            early, late = (
+                np.clip(np.round(one / up.duration * last), 0, last).astype(np.intp)
+                for one in (between[:-1], between[1:])
+            )
+            low = (times <= rises + EDGE, times >= falls - EDGE)
+            for own, counts in zip((self._own(zone, 0), self._own(zone, -1)), low, strict=True):
+                rows = np.flatnonzero(counts)
+                if own is not None:
+                    lines, limits = own
+                    found.append(
+                        (np.repeat(rows, 4), np.tile(lines, (len(rows), 1)), np.tile(limits, len(rows)))
+                    )
+                    continue
+                found.append((rows, normals[early[rows]], most[early[rows]]))
+                other = rows[(normals[early[rows]] != normals[late[rows]]).any(axis=1)]
+                found.append((other, normals[late[other]], most[late[other]]))
+        rows, normals, most = (np.concatenate(one) for one in zip(*found, strict=True))
+        return rows, normals, most
+
+    def _own(self, zone: StackZone, end: int) -> tuple[Array, Array] | None:
+        """Lines around a body's own place where it starts or ends within a zone; none elsewhere."""
+        assert self.guide is not None
+        x, y = self.guide.places[end, zone.body]
+        if not zone.area.holds((x, y)):
+            return None
+        own = next(one for one in zone.own if float(one.outside(x, y)) <= 0.0)
+        normals = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        return normals, np.array([own.x[1], -own.x[0], own.y[1], -own.y[0]])
+
+    def _bounds(self, machine: int, body: int, up: Pieces, times: Array) -> tuple[Array, Array]:
         """Tell between which places a body of a machine may be at some times, as a hoist lifts it."""
         low, high = np.full(len(times), -np.inf), np.full(len(times), np.inf)
         fine = np.linspace(0.0, up.duration, FINE)
@@ -195,17 +295,23 @@ class Bay:
     @property
     def tightest(self) -> tuple[StackZone | None, float]:
         """The stack that a body of the nominal machine is nearest beside at the target, and its room in m."""
-        still = self.still(0)[:, 0]
+        still = self.still(0)[:, :, 0]
         low = [zone for zone in self.zones if self.hang[0, zone.body] + self.rise < zone.top]
-        rooms = [(zone, float(zone.beside(still[zone.body]))) for zone in low]
+        rooms = [(zone, float(zone.beside(*still[zone.body]))) for zone in low]
         return min(rooms, key=lambda pair: pair[1], default=(None, math.inf))
 
     def still(self, machine: int) -> Array:
-        """Where the bodies of a machine hang at the target in m, and their derivatives by its state."""
-        state = np.zeros(self.others.states)
-        state[0] = self.target
+        """Where the bodies of a machine hang at the target in m, and their derivatives by its state.
+
+        Returns
+        -------
+        (bodies, lines, 1 + states) array
+        """
+        state, lines = np.zeros(self.others.states), len(self.lines)
+        state[: self.others.carried : CARRIED] = self.target
         hoist = np.array([self.spec.move.target[self.hoist], 0.0, 0.0])
-        return self.others.seen(state, hoist, self.machines[machine])[:-1]
+        seen = self.others.seen(state, hoist, self.machines[machine])[:-lines]
+        return seen.reshape(-1, lines, seen.shape[-1])
 
     def events(self, machine: int, up: Pieces) -> Array:
         """List the times at which bodies of a machine cross the heights of stacks."""
@@ -215,44 +321,65 @@ class Bay:
         return np.unique([time for pair in crossed for time in pair if 0.0 < time < up.duration])
 
 
-def bay_of(spec: Spec, reserve: float = 0.0) -> Bay:
-    """State the path of a spec over its stacks, with so much more clearance in m."""
+def bay_of(spec: Spec, reserve: float = 0.0, guide: Guide | None = None) -> Bay:
+    """State the path of a spec over its stacks, with so much more clearance in m, straight or guided."""
     plant, path, move = spec.machine(), spec.path, spec.move
     axes = path_axes(plant, spec.plant.parameters)
     assert path is not None and axes is not None  # as the spec's rules hold
-    line = axes.line(move.start, move.target)
-    swings = swings_along(plant, axes, line, linearize(plant, spec.plant.parameters, move.target))
+    lines = PLAN if guide is not None else (axes.line(move.start, move.target),)
+    swings = swings_along(plant, axes, lines, linearize(plant, spec.plant.parameters, move.target))
     sideways, above = path.clearances
     wider = attrs.evolve(path, clearance=(sideways + reserve, above + reserve))
     named = _machines(spec, plant)
     ends = [hanging(plant, spec.plant.parameters, q_a) for q_a in (move.start, move.target)]
     hang = np.array([[z for *_, z in hanging(plant, values, move.start)] for values in named])
     desensitized = tuple(spec.robustness.uncertain) if spec.robustness.method == "sensitivity" else ()
-    found = []
-    for wide, zone in zip(zones(wider, ends), zones(path, ends), strict=True):
-        met, met_wide = zone.on(line), wide.on(line)
-        if met is not None and met_wide is not None:  # loads do not sway away from the line
-            places = [float(line.along(np.array(end[zone.body][:2]))) for end in ends]
-            found.append(_up_to_ends(met_wide, met, places))
+    pairs = zip(zones(wider, ends), zones(path, ends), strict=True)
     return Bay(
         spec=spec,
         plant=plant,
         axes=axes,
-        line=line,
+        lines=lines,
         moving=swings[1],
         nominal=swing_of(plant, axes, *swings, desensitized),
         others=swing_of(plant, axes, *swings, ()),
         machines=parameter_rows(plant, named),
         hang=hang,
-        zones=tuple(found),
+        zones=tuple(_met(pairs, lines, ends)),
+        guide=guide,
     )
 
 
-def _up_to_ends(wide: StackZone, zone: StackZone, places: Sequence[float]) -> StackZone:
-    """Widen a zone up to where its body starts or ends at most, which else would be within it."""
-    low = max([wide.low, *(x for x in places if x <= zone.low)])
-    high = min([wide.high, *(x for x in places if x >= zone.high)])
-    return attrs.evolve(wide, area=Area((low, high)))
+def _met(
+    pairs: Iterable[tuple[StackZone, StackZone]],
+    lines: tuple[StraightWay, ...],
+    ends: Sequence[Sequence[Place]],
+) -> Iterator[StackZone]:
+    """Take what is on the way, a little wider: of one line, from which loads do not sway away, or all."""
+    for wide, zone in pairs:
+        places = np.array([end[zone.body][:2] for end in ends])
+        if len(lines) == 2:
+            x, y = (
+                _up_to_ends(
+                    (wide.area.x, wide.area.y)[k], (zone.area.x, zone.area.y)[k], places[:, k].tolist()
+                )
+                for k in range(2)
+            )
+            yield attrs.evolve(wide, area=Area(x, y))
+            continue
+        met, met_wide = zone.on(lines[0]), wide.on(lines[0])
+        if met is not None and met_wide is not None:
+            along = lines[0].along(places).tolist()
+            yield attrs.evolve(met_wide, area=Area(_up_to_ends(met_wide.area.x, met.area.x, along)))
+
+
+def _up_to_ends(
+    wide: tuple[float, float], span: tuple[float, float], places: Sequence[float]
+) -> tuple[float, float]:
+    """Widen a span up to where a body starts or ends at most, which else would be within it."""
+    low = max([wide[0], *(x for x in places if x <= span[0])])
+    high = min([wide[1], *(x for x in places if x >= span[1])])
+    return low, high
 
 
 def _machines(spec: Spec, plant: Plant) -> list[dict[str, float]]:

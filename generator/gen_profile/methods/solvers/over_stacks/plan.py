@@ -2,8 +2,9 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial, reduce
+from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -14,21 +15,33 @@ from gen_profile.dynamics.evaluation.residual_sway import observation_time
 from gen_profile.dynamics.evaluation.simulation import PlantSimulation
 from gen_profile.dynamics.problem.parameter_box import machines_of
 from gen_profile.dynamics.problem.problem import problem_of
-from gen_profile.methods.solvers.draft import Passage, Plan, in_cycles, lasting, suggested
+from gen_profile.methods.solvers.draft import Passage, Plan, lasting, suggested
+from gen_profile.methods.solvers.over_stacks.around import way_of
 from gen_profile.methods.solvers.over_stacks.bay import Bay, bay_of
+from gen_profile.methods.solvers.over_stacks.guide import Place
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
-from gen_profile.methods.solvers.over_stacks.program import INTERVAL, Course, Program, resting
-from gen_profile.methods.solvers.search import Search, least
+from gen_profile.methods.solvers.over_stacks.program import (
+    INTERVAL,
+    Course,
+    Program,
+    resting,
+)
+from gen_profile.methods.solvers.over_stacks.searches import (
+    ENOUGH,
+    FIRST,
+    OPTIONS,
+    ROUGH,
+    StackSearch,
+    none_found,
+)
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.stacks import StackZone
-from gen_profile.spec.values import LONGEST_MOVE
 from gen_profile.support.errors import (
     Code,
     InfeasibleProblem,
     NoMotion,
     Reason,
-    SolverDiverged,
     Suggestion,
     rounded_down,
     rounded_up,
@@ -39,188 +52,10 @@ from gen_profile.support.work import OutOfWork
 
 METHOD = "over stacks"
 RESERVE = 2e-3  # m of clearance, for what lies between the steps of programs
-ENOUGH = 4e-4  # m that may be missing to it, less than the check allows
-# how much room is missing falls with the duration by about the trolley's speed
-ROUGH = Search(precision=4e-3, close=8e-3, slope=2.0, believed=(0.2, 20.0), longest=0.4, downward=True)
-EXACT = attrs.evolve(ROUGH, precision=8e-4, close=1e-3)
-DECIDED_BY_HOIST = 0.3  # s, beyond the hoist's own least time, up to which no other height is quicker
-SPARE = 0.02  # m above the height that is needed, for clearance that is asked for later
-LOWER = (0.0, 0.25, 0.5, 0.75)  # of the way from the height that is needed to the top, as other heights
-WAITS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (3.0, 0.0))  # s before the hoist starts, and after it ends
-WORTH = 2e-3  # of the duration, that another height must save; then twice as much, and so on
-ROUNDS = 8  # of linearising anew
-SETTLED = 1e-7  # m, rad and their rates, by which a machine may be elsewhere after an interval
-LONGER = 2e-3  # of the duration that is added where the machines themselves have too little room
-TRIES = 12
 WATCHED = 4001  # times at which machines are looked at
-NEARLY = (
-    0.3  # m that may be missing where machines are linear about rest: as they swing, they have more or less
-)
 ACCURACY = 1e-7  # of machines that are looked at, relative
 CLOSE = 1e-9  # s, between knots that are one
 OVERALL = 1e-3  # m of clearance that is asked for beyond what another machine of the ranges lacked
-
-Lifted = Callable[[float], Pieces | None]  # from a duration in s to the hoist's motion
-
-
-@attrs.define(kw_only=True)
-class _Planner:
-    """Searches over programs, and counts them."""
-
-    bay: Bay
-    programs: int = 0
-    chosen: tuple[Course, Lifted] | None = None  # of the least duration, with a little less clearance
-
-    def solved(self, about: Course, *, smooth: bool = False) -> Course | None:
-        """Solve a program about a course."""
-        self.programs += 1
-        return Program(bay=self.bay, about=about).solve(smooth=smooth)
-
-    def quickest(
-        self, lifted: Lifted, start: float, search: Search, near: Course | None = None
-    ) -> Course | None:
-        """Find the course of least duration that has room, machines being linear about rest or another."""
-        found: dict[float, Course] = {}
-
-        def excess(duration: float) -> float:
-            up = lifted(duration)
-            about = None if up is None else stretched(near, up) if near else resting(self.bay, up)
-            course = None if about is None else self.solved(about)
-            if course is None:
-                return math.inf
-            found[duration] = course
-            lacking = max(-course.room, course.miss) if course.miss > ENOUGH else -course.room
-            return (lacking - ENOUGH) / max(self.bay.way, 1.0)
-
-        duration = least(excess, start, search, LONGEST_MOVE)
-        return None if duration is None else found[duration]
-
-    def course(self) -> Course:
-        """Find what the spec asks for.
-
-        Raises
-        ------
-        InfeasibleProblem, SolverDiverged
-        """
-        _require_height(self.bay)
-        move = self.bay.spec.move
-        found = self.shortest() if move.shortest else self.in_time(move.duration)
-        least = move.bounds.least or 0.0
-        if found is not None and found.up.duration < least:
-            found = self.in_time(in_cycles(self.bay.spec, least))
-        if found is None:
-            raise _refusal(self)
-        return found
-
-    def shortest(self) -> Course:
-        """Find the quickest course that machines themselves follow with room; it ends on a cycle."""
-        bay = self.bay
-        course, lifted = self.chosen = self.chosen or self.linear()
-        duration = course.up.duration
-        for _ in range(TRIES):
-            up = lifted(in_cycles(bay.spec, duration))
-            assert up is not None  # in more time than before
-            if (settled := self.settled(stretched(course, up))) is not None:
-                return settled
-            duration *= 1.0 + LONGER
-        raise _none_found(bay)
-
-    def linear(self) -> tuple[Course, Lifted]:
-        """Find how the hoist lifts, and the quickest course of machines that are linear about another."""
-        bay, alone = self.bay, _Planner(bay=self.bay.alone())
-        start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
-        lifted: Lifted = partial(bay.lifted, top=bay.top)
-        rough = _there(bay, alone.quickest(lifted, start, ROUGH))
-        if rough.up.duration > bay.quickest_lift(bay.needed) + DECIDED_BY_HOIST:
-            rough, lifted = alone.otherwise_lifted(rough, lifted)
-        self.programs += alone.programs
-        if len(bay.machines) > 1:
-            rough = _there(bay, self.quickest(lifted, rough.up.duration, ROUGH))
-        near = self.solved(rough) or rough
-        return self.quickest(lifted, near.up.duration, EXACT, near) or near, lifted
-
-    def otherwise_lifted(self, best: Course, lifted: Lifted) -> tuple[Course, Lifted]:
-        """Look for a lower top, then for waits of the hoist, that are quicker: where the trolley decides."""
-        bay, top = self.bay, self.bay.top
-        least = min(bay.needed + SPARE, bay.top)
-        tops = [least + share * (bay.top - least) for share in LOWER]
-        for lower, waits in [*((lower, WAITS[0]) for lower in tops), *((None, waits) for waits in WAITS[1:])]:
-            way: Lifted = partial(bay.lifted, top=top if lower is None else lower, waits=waits)
-            saved = WORTH
-            while (up := way(best.up.duration * (1.0 - saved))) is not None:
-                course = self.solved(resting(bay, up))
-                if course is None or not has_room(course):
-                    break
-                best, lifted, top = course, way, top if lower is None else lower
-                saved *= 2.0
-        return best, lifted
-
-    def in_time(self, duration: float) -> Course | None:
-        """Find the smoothest course of a duration that lifts little; none where it is too short."""
-        bay = self.bay
-        for top in (*(bay.needed + share * (bay.top - bay.needed) for share in LOWER), bay.top):
-            up = bay.lifted(duration, top)
-            course = None if up is None else self.solved(resting(bay, up))
-            if course is not None and -course.room < NEARLY and course.miss < NEARLY:
-                settled = self.settled(self.solved(course) or course)
-                if settled is not None:
-                    return settled
-        return None
-
-    def settled(self, course: Course) -> Course | None:
-        """Linearise anew until machines do what the program says; the smoothest such course, with room."""
-        for _ in range(ROUNDS):
-            program = Program(bay=self.bay, about=course)
-            if course.smooth and program.defect < SETTLED:
-                break
-            self.programs += 1
-            smoother = program.solve(smooth=True)
-            if smoother is None:
-                return None
-            course = smoother
-        return course if has_room(course) else None
-
-
-def has_room(course: Course) -> bool:
-    """Whether a course reaches its target with nearly as much room as it shall have."""
-    return course.room >= -ENOUGH and course.miss <= ENOUGH
-
-
-def stretched(course: Course, up: Pieces) -> Course:
-    """Let a course last as long as another motion of the hoist."""
-    ratio = course.up.duration / up.duration
-    slower = np.ones(course.nodes[0].shape[-1])
-    slower[:3] = ratio ** np.arange(3.0)
-    nominal, others = course.nodes
-    nodes = (nominal * slower, others * slower[: others.shape[-1]])
-    return attrs.evolve(course, up=up, jerks=course.jerks * ratio**3, nodes=nodes)
-
-
-def _there(bay: Bay, course: Course | None) -> Course:
-    if course is None:
-        raise _none_found(bay)
-    return course
-
-
-def _none_found(bay: Bay) -> SolverDiverged:
-    """Say that no motion was found: the likeliest cause is an end beside which loads swing on too far."""
-    sentence = Phrase(
-        "move.duration: no duration was found in which the load passes the stacks; widen the limits."
-    )
-    zone, room = bay.tightest
-    path, allowed = bay.spec.path, max(bay.spec.check.residual_sway.values())
-    if len(bay.machines) > 1 and zone is not None and room < allowed:
-        assert path is not None
-        sentence = Phrase(
-            "move.target: no motion was found after which the {body} keeps its clearance to {obstacle}, to "
-            "which it has {room:.3g} m more at the target; move the target away from it, narrow the ranges, "
-            "or allow a smaller path.clearance.",
-            body=bay.plant.bodies[zone.body],
-            obstacle=path.named(zone.obstacle),
-            room=room,
-        )
-    place = sentence.split(":")[0]
-    return SolverDiverged(sentence, reasons=[Reason(code=Code.DIVERGED, place=place)])
 
 
 def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
@@ -233,20 +68,23 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
     """
     began, reserve = time.perf_counter(), RESERVE
     progress("solving")
-    planner = _Planner(bay=bay_of(spec, reserve))
-    for _ in range(ROUNDS):
+    planner = StackSearch(bay=way_of(spec, reserve))
+    _require_height(planner.bay)
+    for _ in range(OPTIONS.rounds):
         try:
             course = planner.course()
         except OutOfWork as error:
-            raise _none_found(planner.bay) from error
+            raise none_found(planner.bay) from error
+        if course is None:
+            raise _refusal(planner)
         motion = _profile(planner.bay, course)
         near = _nearest(spec, motion)
         if near.room >= -ENOUGH:
             break
         reserve += OVERALL - near.room
-        planner.bay = bay_of(spec, reserve)
+        planner.bay = bay_of(spec, reserve, planner.bay.guide)
     else:
-        raise _none_found(planner.bay)
+        raise none_found(planner.bay)
     passage = Passage(
         lift=course.up.peak(),
         one_by_one=_one_by_one(planner.bay),
@@ -267,25 +105,25 @@ def sketched(spec: Spec) -> Array | None:
 
     Returns
     -------
-    (samples, bodies, 2) array
-        m, along the line and above the suspension.
+    (samples, bodies, 3) array
+        m.
     """
-    bay = bay_of(spec, RESERVE).alone()
+    bay = way_of(spec, RESERVE).alone()
     bay = attrs.evolve(bay, nominal=bay.others)  # without sensitivities
-    planner, lifted = _Planner(bay=bay), partial(bay.lifted, top=bay.top)
+    planner, lifted = StackSearch(bay=bay), partial(bay.lifted, top=bay.top)
     course: Course | None = None
     if spec.move.shortest:
         start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
-        course = planner.quickest(lifted, start, ROUGH)
+        course = planner.quickest(lifted, start, ROUGH if bay.guide is None else FIRST)
     elif (up := lifted(spec.move.duration)) is not None:
         course = planner.solved(resting(bay, up))
     if course is None:
         return None
-    seen = Program(bay=bay, about=course).followed[0].seen[0, :, :-1, :-1]
-    x = seen.reshape(-1, seen.shape[-1])
-    times = np.linspace(0.0, course.up.duration, len(x), endpoint=False)
+    along = Program(bay=bay, about=course).places
+    places = sum(np.array(line.origin) + along[:, :, k, None] * line.way for k, line in enumerate(bay.lines))
+    times = np.linspace(0.0, course.up.duration, len(along))
     z = bay.hang[0] + course.up.at(times)[:, :1]
-    return np.stack([x, z], axis=2)
+    return np.concatenate([places, z[:, :, None]], axis=2)
 
 
 def _nearest(spec: Spec, motion: Profile) -> Nearest:
@@ -299,10 +137,25 @@ def _nearest(spec: Spec, motion: Profile) -> Nearest:
 
 def _one_by_one(bay: Bay) -> float | None:
     """Tell how long lifting, travelling without sway and lowering take one after the other, in s."""
-    lift = bay.needed
-    alone = attrs.evolve(bay.alone(), zones=())
-    held = _Planner(bay=alone).quickest(partial(_held, lift), bay.quickest_travel() + INTERVAL, ROUGH)
-    return None if held is None else bay.quickest_lift(lift) + held.up.duration
+    total, legs = bay.quickest_lift(bay.needed), [bay] if bay.guide is None else _legs(bay, bay.guide.route)
+    for one in legs:
+        alone = attrs.evolve(one.alone(), zones=())
+        held = StackSearch(bay=alone).quickest(partial(_held, bay.needed), one.directly() + INTERVAL, ROUGH)
+        if held is None:
+            return None
+        total += held.up.duration
+    return total
+
+
+def _legs(bay: Bay, route: Sequence[Place]) -> Iterator[Bay]:
+    """Take every straight part of a way around something by itself."""
+    axes, move = bay.axes.along, bay.spec.move
+    for leg in pairwise(route):
+        start, target = ([*move.start], [*move.start])
+        for end, place in zip((start, target), leg, strict=True):
+            for axis, at in zip(axes, place, strict=True):
+                end[axis] = at
+        yield bay_of(bay.spec.changed({"move.start": start, "move.target": target}))
 
 
 def _held(lift: float, duration: float) -> Pieces:
@@ -312,9 +165,10 @@ def _held(lift: float, duration: float) -> Pieces:
 def _profile(bay: Bay, course: Course) -> Profile:
     """Write the course as polynomials of all axes, with ends that are exact."""
     lengths, move = np.full(len(course.jerks), course.up.duration / len(course.jerks)), bay.spec.move
+    ways = np.array([line.way for line in bay.lines])
     axes = {
-        axis: _to_rest(lengths, way * course.jerks, move.start[axis], move.target[axis])
-        for axis, way in zip(bay.axes.along, bay.line.way, strict=False)
+        axis: _to_rest(lengths, course.jerks @ ways[:, k], move.start[axis], move.target[axis])
+        for k, axis in enumerate(bay.axes.along)
     }
     axes[bay.hoist] = _to_rest(
         course.up.lengths, -course.up.jerks, move.start[bay.hoist], move.target[bay.hoist]
@@ -370,8 +224,7 @@ def _require_height(bay: Bay) -> None:
         if len(bay.axes.along) == 2:
             template = (
                 "path.stacks: {stack} is in the way: at the hoist's top the {body} is {lacking:.3g} m too "
-                "low to pass it with path.clearance; the way is straight in plan view, and one around it "
-                "takes two moves."
+                "low to pass it with path.clearance, and the travel leaves no way around."
             )
     else:
         place, less = "path.overhead", above - lacking / 2.0 - RESERVE
@@ -388,7 +241,7 @@ def _require_height(bay: Bay) -> None:
     )
 
 
-def _refusal(planner: _Planner) -> InfeasibleProblem:
+def _refusal(planner: StackSearch) -> InfeasibleProblem:
     """Say what is in the way in the time that is asked for, by how much, and which time was found to do."""
     bay, asked = planner.bay, planner.bay.spec.move.duration
     up = bay.lifted(asked, bay.top)
@@ -423,13 +276,12 @@ def _tried(spec: Spec, values: Mapping[str, Any]) -> tuple[Suggestion, ...]:
 
 def _in_the_way(bay: Bay, course: Course) -> tuple[StackZone, float]:
     """Find the stack that a course comes too near to, and by how much in m."""
-    one = Program(bay=bay, about=course).followed[0]
-    places = one.seen[0, :, 1:].reshape(-1, one.seen.shape[-1])
-    times = np.linspace(0.0, course.up.duration, len(places) + 1)[1:]
+    places = Program(bay=bay, about=course).places
+    times = np.linspace(0.0, course.up.duration, len(places))[1:]
 
     def missing(zone: StackZone) -> float:
-        low, high = attrs.evolve(bay, zones=(zone,)).bounds(0, zone.body, course.up, times)
-        x = places[:, zone.body]
-        return float(np.maximum(low - x, x - high).max())
+        rows, normals, most = attrs.evolve(bay, zones=(zone,)).sides(0, zone.body, course.up, times)
+        at = places[1:][rows, zone.body]
+        return float(((normals * at).sum(axis=1) - most).max(initial=-math.inf))
 
     return max(((zone, missing(zone)) for zone in bay.zones), key=lambda pair: pair[1])

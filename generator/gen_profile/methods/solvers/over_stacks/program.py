@@ -1,6 +1,6 @@
 """The trolley's convex program for a duration and a hoist's motion: all machines linear about what they did.
 
-Variables are changes of the trolley's jerk in every interval and of all states at its begin; what a load may
+Variables are changes of the trolley's jerks in every interval and of all states at its begin; what a load may
 do while it is low are linear bounds of its place, at steps and at the instants at which it crosses a height.
 """
 
@@ -16,11 +16,11 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.methods.solvers.direct.conic import ConicProgram, ConicStatus, Entries, place, squares
 from gen_profile.methods.solvers.over_stacks.bay import Bay
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
-from gen_profile.methods.solvers.over_stacks.swing import TROLLEY, FollowedMachines, followed
+from gen_profile.methods.solvers.over_stacks.swing import CARRIED, FollowedMachines, followed
 from gen_profile.motion.profile import Array
 
 INTERVAL = 0.4  # s, about, of constant jerk
-STEPS = 8  # in each interval, at which bounds hold
+STEPS, FEW_STEPS = 8, 4  # in each interval; few suffice as long as durations are searched roughly
 MARGIN = 0.3  # m, of spare room that is worth knowing
 MISSING = 30.0  # times a metre too near to a stack, a metre beside the target counts
 SMOOTH = 1e-4  # of the squared jerk's mean, beside a metre of room
@@ -40,7 +40,7 @@ class Course:
     ----------
     up : Pieces
         The hoist's motion, upwards.
-    jerks : (intervals,) array
+    jerks : (intervals, lines) array
     nodes : tuple of arrays
         States of the nominal machine at the begin and end of every interval, (intervals + 1, n), and of the
         others, (machines, intervals + 1, n).
@@ -65,30 +65,31 @@ def resting(bay: Bay, up: Pieces) -> Course:
     intervals = max(math.ceil(up.duration / INTERVAL), 4)
     begin = np.tile(bay.begin, (intervals + 1, 1))
     other = np.tile(bay.begin[: bay.others.states], (len(bay.machines) - 1, intervals + 1, 1))
-    return Course(up=up, jerks=np.zeros(intervals), nodes=(begin, other))
+    return Course(up=up, jerks=np.zeros((intervals, len(bay.lines))), nodes=(begin, other))
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Program:
-    """All machines linear about a course."""
+    """All machines linear about a course, in so many steps of every interval."""
 
     bay: Bay
     about: Course
+    steps: int = STEPS
 
     @property
     def step(self) -> float:
         """Of integration in s."""
-        return self.about.up.duration / len(self.about.jerks) / STEPS
+        return self.about.up.duration / len(self.about.jerks) / self.steps
 
     @cached_property
     def followed(self) -> list[FollowedMachines]:
         """What the machines do, the nominal one first; each is alone along the first axis."""
         bay, about = self.bay, self.about
         intervals = len(about.jerks)
-        half = np.arange(2 * STEPS * intervals + 1) * self.step / 2.0
+        half = np.arange(2 * self.steps * intervals + 1) * self.step / 2.0
         lifted = -about.up.at(half.astype(np.float64))[:, :3]
         lifted[:, 0] += bay.spec.move.start[bay.hoist]
-        rows = np.arange(intervals)[:, None] * 2 * STEPS + np.arange(2 * STEPS + 1)
+        rows = np.arange(intervals)[:, None] * 2 * self.steps + np.arange(2 * self.steps + 1)
         nominal, others = about.nodes
         follow = partial(followed, jerks=about.jerks, hoist=lifted[rows], step=self.step)
         first = follow(bay.nominal, nominal[None, :-1], bay.machines[:1])
@@ -109,31 +110,47 @@ class Program:
         return max(float(np.abs(one.states[0, :, -1] - begin[1:]).max()) for one, begin in pairs)
 
     @property
+    def places(self) -> Array:
+        """Where the nominal machine's bodies are along the lines at steps, (samples, bodies, lines)."""
+        seen, lines = self.followed[0].seen[0], len(self.bay.lines)
+        steps = np.concatenate([seen[:, :-1].reshape(-1, seen.shape[-1]), seen[-1, -1:]])
+        return np.asarray(steps[:, :-lines].reshape(len(steps), -1, lines))
+
+    @property
     def width(self) -> int:
         """Number of states of all machines, the trolley's once."""
-        others = (len(self.bay.machines) - 1) * (self.bay.others.states - TROLLEY)
+        others = (len(self.bay.machines) - 1) * (self.bay.others.states - self.bay.others.carried)
         return self.bay.nominal.states + others
 
+    @property
+    def stride(self) -> int:
+        """Number of variables of an interval: states and jerks."""
+        return self.width + len(self.bay.lines)
+
     def _columns(self, machine: int) -> Numbers:
-        """Where the states of a machine are among all, and the jerk behind them."""
-        first = self.bay.nominal.states
+        """Where the states of a machine are among all, and the jerks behind them."""
+        first, jerks = self.bay.nominal.states, np.arange(self.width, self.stride)
         if machine == 0:
-            return np.append(np.arange(first), self.width)
-        own = self.bay.others.states - TROLLEY
+            return np.concatenate([np.arange(first), jerks])
+        carried = self.bay.others.carried
+        own = self.bay.others.states - carried
         swing = first + (machine - 1) * own + np.arange(own)
-        return np.concatenate([np.arange(TROLLEY), swing, [self.width]])
+        return np.concatenate([np.arange(carried), swing, jerks])
+
+    def _states(self, machine: int) -> Numbers:
+        return self._columns(machine)[: -len(self.bay.lines)]
 
     def _rows(self, intervals: Numbers, blocks: Array, machine: int = 0) -> Entries:
-        """Place rows on a machine's state at the begin of intervals, and on the jerk there.
+        """Place rows on a machine's state at the begin of intervals, and on the jerks there.
 
         Parameters
         ----------
         intervals : (count,) array of int
-        blocks : (count, rows, n + 1) array
+        blocks : (count, rows, n + lines) array
         """
-        wide = np.zeros((*blocks.shape[:2], self.width + 1))
-        wide[:, :, self._columns(machine)[: blocks.shape[2]]] = blocks
-        return place(wide, intervals * (self.width + 1))
+        wide = np.zeros((*blocks.shape[:2], self.stride))
+        wide[:, :, self._columns(machine)] = blocks
+        return place(wide, intervals * self.stride)
 
     @staticmethod
     def _alone(column: int) -> Entries:
@@ -143,7 +160,7 @@ class Program:
     @property
     def variables(self) -> int:
         """Number of them: states and jerks, how far from the target it ends, and how much room is missing."""
-        return (len(self.about.jerks) + 1) * (self.width + 1) - 1 + 2
+        return len(self.about.jerks) * self.stride + self.width + 2
 
     def solve(self, *, smooth: bool) -> Course | None:
         """Find the motion with the most room; or the smoothest one, where room suffices.
@@ -164,10 +181,11 @@ class Program:
                 self._left(program, machine)
         least = -self._alone(self.variables - 1)
         program.at_most(least, np.array([-1.0 if smooth else MARGIN - 1.0]))
-        intervals = len(self.about.jerks)
-        jerks = np.arange(intervals) * (self.width + 1) + self.width
+        intervals, lines = self.about.jerks.shape
+        jerks = np.arange(intervals)[:, None] * self.stride + self.width + np.arange(lines)
         weight, linear = np.zeros(self.variables), np.zeros(self.variables)
-        scale = (self.bay.limits.jerk or 1.0) ** 2 * intervals / (1.0 if smooth else SMOOTH)
+        limits = np.array([one.jerk or 1.0 for one in self.bay.limits])
+        scale = limits**2 * intervals / (1.0 if smooth else SMOOTH)
         weight[jerks], linear[jerks] = 1.0 / scale, self.about.jerks / scale
         linear[-1], linear[-2] = (DEAR, 0.0) if smooth else (1.0, MISSING)
         costs = squares(weight[:, None, None], np.arange(self.variables)[:, None])
@@ -178,9 +196,9 @@ class Program:
 
     def _course(self, x: Array, jerks: Numbers) -> Course:
         """Take the states and jerks that a program found."""
-        changes = np.append(x[:-2], 0.0).reshape(-1, self.width + 1)
+        changes = np.append(x[:-2], np.zeros(len(self.bay.lines))).reshape(-1, self.stride)
         nominal, others = self.about.nodes
-        moved = [changes[:, self._columns(m + 1)[:-1]] for m in range(len(others))]
+        moved = [changes[:, self._states(m + 1)] for m in range(len(others))]
         return attrs.evolve(
             self.about,
             jerks=self.about.jerks + x[jerks],
@@ -196,109 +214,120 @@ class Program:
         intervals = np.arange(len(self.about.jerks))
         starts = [self.about.nodes[0], *self.about.nodes[1]]
         for machine, (one, nodes) in enumerate(zip(self.followed, starts, strict=True)):
-            skipped = TROLLEY if machine else 0
+            skipped = self.bay.others.carried if machine else 0
             ends, along = one.states[0, :, -1, skipped:], one.along[0, :, -1, skipped:]
-            columns = self._columns(machine)
-            blocks = np.zeros((len(intervals), along.shape[1], 2 * self.width + 1))
-            blocks[:, :, columns] = along
-            own = self.width + 1 + columns[skipped:-1]
+            blocks = np.zeros((len(intervals), along.shape[1], self.stride + self.width))
+            blocks[:, :, self._columns(machine)] = along
+            own = self.stride + self._states(machine)[skipped:]
             blocks[:, np.arange(along.shape[1]), own] = -1.0
-            matrix = place(blocks, intervals * (self.width + 1))
+            matrix = place(blocks, intervals * self.stride)
             program.equal(matrix, (nodes[1:, skipped:] - ends).ravel())
 
     def _trolley(self, program: ConicProgram) -> None:
         """Hold travel, velocity, acceleration and jerk to limits, by control points of half intervals."""
-        limits, jerks = self.bay.limits, self.about.jerks
-        span = self.step * STEPS
-        nodes = self.about.nodes[0][:-1, :TROLLEY]
+        jerks, span = self.about.jerks, self.step * self.steps
         intervals = np.arange(len(jerks))
-        ranges = [(limits.travel, 0), (limits.velocity, 1), (limits.acceleration, 2), (limits.jerk, 3)]
-        for stated, order in ranges:
-            if stated is None:
-                continue
-            low, high = stated if isinstance(stated, tuple) else (-stated, stated)
-            points = _control_points(span, order)
-            now = np.concatenate([nodes, jerks[:, None]], axis=1) @ points.T
-            blocks = np.zeros((len(jerks), len(points), self.bay.nominal.states + 1))
-            blocks[:, :, [0, 1, 2, -1]] = points
-            matrix = self._rows(intervals, blocks)
-            program.at_most(matrix, (high - now).ravel())
-            program.at_most(-matrix, (now - low).ravel())
+        for line, limits in enumerate(self.bay.limits):
+            carried = CARRIED * line + np.arange(CARRIED)
+            state = np.concatenate([self.about.nodes[0][:-1, carried], jerks[:, line, None]], axis=1)
+            ranges = [(limits.travel, 0), (limits.velocity, 1), (limits.acceleration, 2), (limits.jerk, 3)]
+            for stated, order in ranges:
+                if stated is None:
+                    continue
+                low, high = stated if isinstance(stated, tuple) else (-stated, stated)
+                points = _control_points(span, order)
+                now = state @ points.T
+                blocks = np.zeros((len(jerks), len(points), len(self._columns(0))))
+                blocks[:, :, [*carried, self.bay.nominal.states + line]] = points
+                matrix = self._rows(intervals, blocks)
+                program.at_most(matrix, (high - now).ravel())
+                program.at_most(-matrix, (now - low).ravel())
 
     def _ends(self, program: ConicProgram, *, free: bool) -> None:
         """End at rest, without sway or sensitivity, at the target, or as near to it as can be."""
         states = self.bay.nominal.states
+        places = CARRIED * np.arange(len(self.bay.lines))
         asked = np.zeros(states)
-        asked[0] = self.bay.target
+        asked[places] = self.bay.target
         left = asked - self.about.nodes[0][-1]
-        at = len(self.about.jerks) * (self.width + 1)
-        program.equal(place(np.eye(states)[None, 1:], np.array([at])), left[1:])
-        reached, off = self._alone(at), self._alone(self.variables - 2)
+        at = len(self.about.jerks) * self.stride
+        rest = np.delete(np.arange(states), places)
+        program.equal(place(np.eye(states)[None, rest], np.array([at])), left[rest])
+        off = self._alone(self.variables - 2)
         if not free:
             program.equal(off, np.zeros(1))
-        program.at_most(reached + (-off), left[:1])
-        program.at_most(-(reached + off), -left[:1])
+        for one in places:
+            reached = self._alone(at + int(one))
+            program.at_most(reached + (-off), left[[one]])
+            program.at_most(-(reached + off), -left[[one]])
 
     def _beside(self, program: ConicProgram, machine: int) -> None:
         """Keep the bodies of a machine beside stacks while they are low."""
         bay, up = self.bay, self.about.up
-        grid = np.arange(1, len(self.about.jerks) * STEPS + 1) * self.step
+        every = self.steps // FEW_STEPS
+        grid = np.arange(every, len(self.about.jerks) * self.steps + 1, every) * self.step
         events = bay.events(machine, up)
-        times = np.unique(np.concatenate([grid[1::2], events - 1e-7, events, events + 1e-7]))
+        times = np.unique(np.concatenate([grid, events - 1e-7, events, events + 1e-7]))
         times = times[(times > 0.0) & (times <= up.duration)]
         for body in range(len(bay.plant.bodies)):
-            low, high = bay.bounds(machine, body, up, times)
-            for sign, bound in ((1.0, high), (-1.0, low)):
-                held = np.isfinite(bound)
-                if not held.any():
-                    continue
-                intervals, now, along = self._at(machine, body, times[held])
-                matrix = self._rows(intervals, sign * along[:, None], machine)
-                program.at_most(matrix, sign * (bound[held] - now), give=1.0)
+            rows, normals, most = bay.sides(machine, body, up, times)
+            if not len(rows):
+                continue
+            intervals, now, along = self._at(machine, body, times[rows])
+            matrix = self._rows(intervals, np.einsum("ki,kij->kj", normals, along)[:, None], machine)
+            program.at_most(matrix, most - (normals * now).sum(axis=1), give=1.0)
 
-    def _at(self, machine: int, row: int, times: Array) -> tuple[Numbers, Array, Array]:
-        """Tell what is seen of a machine at some times, straight between steps, and its derivatives."""
-        one, intervals = self.followed[machine], len(self.about.jerks)
-        number = np.minimum((times / self.step).astype(np.intp), intervals * STEPS - 1)
-        k, j = np.divmod(number, STEPS)
-        share = times / self.step - number
-        now = (1.0 - share) * one.seen[0, k, j, row] + share * one.seen[0, k, j + 1, row]
+    def _at(self, machine: int, body: int, times: Array) -> tuple[Numbers, Array, Array]:
+        """Tell where a body of a machine is at some times, straight between steps, and its derivatives."""
+        one, (intervals, lines) = self.followed[machine], self.about.jerks.shape
+        number = np.minimum((times / self.step).astype(np.intp), intervals * self.steps - 1)
+        k, j = np.divmod(number, self.steps)
+        share, own = (times / self.step - number)[:, None], slice(lines * body, lines * (body + 1))
+        now = (1.0 - share) * one.seen[0, k, j, own] + share * one.seen[0, k, j + 1, own]
         weights = share[:, None]
-        along = (1.0 - weights) * one.seen_along[0, k, j, row] + weights * one.seen_along[0, k, j + 1, row]
+        along = (1.0 - weights) * one.seen_along[0, k, j, own] + weights * one.seen_along[0, k, j + 1, own]
         return k, now, along
 
     def _sway(self, program: ConicProgram, machine: int) -> None:
-        """Hold the end load's sway on the way to its limit."""
-        limit = self.bay.spec.limits.sway
+        """Hold the end load's sway on the way to its limit, or its length along two lines."""
+        limit, lines = self.bay.spec.limits.sway, len(self.bay.lines)
         if limit is None:
             return
         one, intervals = self.followed[machine], np.arange(len(self.about.jerks))
-        now, along = one.seen[0, :, 1:, -1], one.seen_along[0, :, 1:, -1]
-        matrix = self._rows(intervals, along, machine)
-        program.at_most(matrix, (KEPT_SWAY * limit - now).ravel())
-        program.at_most(-matrix, (KEPT_SWAY * limit + now).ravel())
+        every = 1 if lines == 1 else self.steps // FEW_STEPS
+        now, along = one.seen[0, :, every::every, -lines:], one.seen_along[0, :, every::every, -lines:]
+        if lines == 1:
+            matrix = self._rows(intervals, along[:, :, 0], machine)
+            program.at_most(matrix, (KEPT_SWAY * limit - now).ravel())
+            program.at_most(-matrix, (KEPT_SWAY * limit + now).ravel())
+            return
+        count = now.shape[0] * now.shape[1]
+        blocks = np.concatenate([np.zeros_like(along[:, :, :1]), along], axis=2)
+        matrix = self._rows(intervals, blocks.reshape(len(intervals), -1, along.shape[-1]), machine)
+        sides = np.concatenate([np.full((count, 1), KEPT_SWAY * limit), -now.reshape(count, lines)], axis=1)
+        program.within_cones(matrix, sides)
 
     def _left(self, program: ConicProgram, machine: int) -> None:
         """Hold what a machine swings by at the target to the limits of residual sway, and off stacks."""
-        bay, up, at = self.bay, self.about.up, len(self.about.jerks) * (self.width + 1)
+        bay, up, at = self.bay, self.about.up, len(self.about.jerks) * self.stride
+        carried = bay.others.carried
         gain, turns = _swinging_on(bay, machine)
         sways = np.concatenate([gain, np.zeros_like(gain)], axis=1)
         stated, ways = np.array(list(bay.spec.check.residual_sway.values())), bay.plant.directions
         groups = stated.reshape(-1, ways if len(stated) % ways == 0 else len(stated))
-        limits = KEPT_RESIDUAL * groups.min(axis=1).repeat(
-            groups.shape[1]
-        )  # along the line, of both directions
+        alike = groups.min(axis=1).repeat(groups.shape[1])  # along one line, of both directions
+        limits = KEPT_RESIDUAL * (alike if len(bay.lines) == 1 else stated)
         held = [] if bay.spec.robustness.method == "none" else [(sways, limits, 0.0)]
         for body, still in enumerate(bay.still(machine)):
-            low, high = bay.bounds(machine, body, up, np.array([up.duration]))
-            held.append((still[None, 1 + TROLLEY :], np.minimum(still[0] - low, high - still[0]), 1.0))
-        last = self.about.nodes[1][machine - 1][-1, TROLLEY:]
+            _, normals, most = bay.sides(machine, body, up, np.array([up.duration]))
+            held.append((normals @ still[:, 1 + carried :], most - normals @ still[:, 0], 1.0))
+        last = self.about.nodes[1][machine - 1][-1, carried:]
         for outputs, limit, give in held:
-            if np.isinf(limit).all():
+            if not len(limit):
                 continue
             shown = np.concatenate([outputs @ turn for turn in turns])
             wide = np.zeros((1, len(shown), self.width))
-            wide[0, :, self._columns(machine)[TROLLEY:-1]] = shown.T
+            wide[0, :, self._states(machine)[carried:]] = shown.T
             for sign in (1.0, -1.0):
                 side = np.tile(limit, len(turns)) - sign * shown @ last
                 program.at_most(place(sign * wide, np.array([at])), side, give=give)

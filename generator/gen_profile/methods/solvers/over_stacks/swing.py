@@ -14,9 +14,11 @@ from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.plan_view import StraightWay
 from gen_profile.spec.stacks import PathAxes
+from gen_profile.support.work import spend
 
 EQUAL = 1e-9  # relative difference of what is the same
-TROLLEY = 3  # states of the trolley, which come first: place, velocity and acceleration
+EVALUATION = 1e-7  # s of work for each derivative of a rate
+CARRIED = 3  # states of the trolley along every line, which come first: place, velocity and acceleration
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -25,28 +27,36 @@ class Swing:
 
     Attributes
     ----------
-    states : int
+    states, lines : int
+        The trolley has three states along every line.
     rate : Function
-        Of (state, hoist's place, velocity and acceleration, parameters): [ż, ∂ż/∂z] without the jerk's part.
+        Of (state, hoist's place, velocity and acceleration, parameters): [ż, ∂ż/∂z] without the jerks' part.
     seen : Function
-        Of the same: [y, ∂y/∂z], y being the bodies' places along the line and the end load's sway along it.
+        Of the same: [y, ∂y/∂z], y being every body's places along the lines and the end load's sways.
     """
 
     states: int
+    lines: int
     rate: Function
     seen: Function
 
+    @property
+    def carried(self) -> int:
+        """Number of the trolley's states."""
+        return CARRIED * self.lines
+
 
 def swings_along(
-    plant: Plant, axes: PathAxes, line: StraightWay, linear: Linearization
-) -> tuple[StraightWay, tuple[int, ...]]:
-    """Choose a line on which the load swings as on this one, and tell which coordinates move on it.
+    plant: Plant, axes: PathAxes, lines: tuple[StraightWay, ...], linear: Linearization
+) -> tuple[tuple[StraightWay, ...], tuple[int, ...]]:
+    """Choose lines on which the load swings as on these, and tell which coordinates move on them.
 
     A machine that swings alike along both axes does on any line what it does along the first; what is
     crosswise stays at rest.
     """
-    if len(axes.along) == 1:
-        return line, tuple(range(len(plant.unactuated)))
+    if len(axes.along) == len(lines):
+        return lines, tuple(range(len(plant.unactuated)))
+    (line,) = lines
     first, second = axes.along
     pushes, shown = linear.input, linear.sway_gain[plant.end_load]
     powers = [np.linalg.matrix_power(linear.stiffness, k) for k in range(len(pushes))]
@@ -58,20 +68,25 @@ def swings_along(
         line = StraightWay()
     pushed = pushes[:, [first, second]] @ np.array(line.way)
     reached = np.max([np.abs(one @ pushed) / np.abs(one).max() for one in powers], axis=0)
-    return line, tuple(np.flatnonzero(reached > EQUAL * reached.max()).tolist())
+    return (line,), tuple(np.flatnonzero(reached > EQUAL * reached.max()).tolist())
 
 
 @cache
 def swing_of(
-    plant: Plant, axes: PathAxes, line: StraightWay, moving: tuple[int, ...], names: tuple[str, ...]
+    plant: Plant,
+    axes: PathAxes,
+    lines: tuple[StraightWay, ...],
+    moving: tuple[int, ...],
+    names: tuple[str, ...],
 ) -> Swing:
-    """Compile a machine that goes along a line, with sensitivities to some parameters.
+    """Compile a machine that goes along lines, with sensitivities to some parameters.
 
     Parameters
     ----------
     plant : Plant
     axes : PathAxes
-    line : StraightWay
+    lines : tuple of StraightWay
+        One, or two that are crosswise and cross where places along both are 0.
     moving : tuple of int
         Numbers of the coordinates that are states; others stay at 0.
     names : tuple of str
@@ -83,34 +98,45 @@ def swing_of(
     still = sym.column([one[k] for one in (q, dq) for k in range(len(q)) if k not in moving])
     by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
     sensitive = sensitivities(rate, swing, by_name, names, 1)
-    carried, hoist = sym.symbols("trolley", TROLLEY), sym.symbols("hoist", 3)
+    carried, hoist = sym.symbols("trolley", CARRIED * len(lines)), sym.symbols("hoist", 3)
     state = sym.column([carried, swing, *(one.states for one in sensitive)])
-    onwards = sym.column([sym.split(carried)[1], sym.split(carried)[2], sym.zeros(1, 1)])
+    places = [sym.split(carried)[CARRIED * k : CARRIED * (k + 1)] for k in range(len(lines))]
+    onwards = sym.column([one for _, v, a in places for one in (v, a, sym.zeros(1, 1))])
 
     def driven(expression: Symbol) -> Symbol:
         expression = sym.at_zero(expression, still)
         for order, symbol in enumerate((d.q_a, d.dq_a, d.ddq_a)):
-            along = sym.split(carried)[order]
             moved: dict[int, Symbol] = {axes.hoist: sym.split(hoist)[order]}
-            for axis, origin, way in zip(axes.along, line.origin, line.way, strict=False):
-                moved[axis] = way * along if order else origin + way * along
+            for k, axis in enumerate(axes.along):
+                pairs = zip(places, lines, strict=True)
+                parts = [line.way[k] * one[order] + (0.0 if order else line.origin[k]) for one, line in pairs]
+                moved[axis] = sum(parts[1:], parts[0])
             expression = sym.substitute(
                 expression, symbol, sym.column([moved[axis] for axis in sorted(moved)])
             )
         return expression
 
     rates = sym.column([onwards, driven(rate), *(driven(one.rates) for one in sensitive)])
-    places, sways = sym.split(d.place), sym.split(d.sway)[plant.end_load]
-    (x, y), origin = line.way, line.way[0] * line.origin[0] + line.way[1] * line.origin[1]
-    alongs = [x * places[k] + y * places[k + 1] - origin for k in range(0, len(places), 3)]
-    sway = sum((way * one for way, one in zip(line.way[1:], sways[1:], strict=False)), line.way[0] * sways[0])
-    seen = driven(sym.column([*alongs, sway]))
+    seen = driven(sym.column(_seen(sym.split(d.place), sym.split(d.sway)[plant.end_load], lines)))
     inputs = {"state": state, "hoist": hoist, "p": d.p}
     return Swing(
         states=state.shape[0],
+        lines=len(lines),
         rate=Function("rate", inputs, sym.beside(rates, sym.jacobian(rates, state))),
         seen=Function("seen", inputs, sym.beside(seen, sym.jacobian(seen, state))),
     )
+
+
+def _seen(places: list[Symbol], sways: list[Symbol], lines: tuple[StraightWay, ...]) -> list[Symbol]:
+    """Take places of all bodies along the lines, and then the end load's sways along them."""
+    seen = []
+    for k in range(0, len(places), 3):
+        for (x, y), origin in ((line.way, line.origin) for line in lines):
+            seen.append(x * places[k] + y * places[k + 1] - (x * origin[0] + y * origin[1]))
+    for line in lines:
+        parts = (way * one for way, one in zip(line.way[1:], sways[1:], strict=False))
+        seen.append(sum(parts, line.way[0] * sways[0]))
+    return seen
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -120,10 +146,10 @@ class FollowedMachines:
     Attributes
     ----------
     states : (machines, intervals, steps + 1, n) array
-    along : (machines, intervals, steps + 1, n, n + 1) array
-        Derivatives by the state at the interval's begin, and by its jerk.
+    along : (machines, intervals, steps + 1, n, n + lines) array
+        Derivatives by the state at the interval's begin, and by its jerks.
     seen : (machines, intervals, steps + 1, y) array
-    seen_along : (machines, intervals, steps + 1, y, n + 1) array
+    seen_along : (machines, intervals, steps + 1, y, n + lines) array
     """
 
     states: Array
@@ -143,7 +169,7 @@ def followed(
     nodes : (machines, intervals, n) array
         States at which intervals begin.
     p : (machines, parameters) array
-    jerks : (intervals,) array
+    jerks : (intervals, lines) array
         Of the trolley, m/s³.
     hoist : (intervals, 2 steps + 1, 3) array
         Its place, velocity and acceleration, at the steps and half between them.
@@ -151,15 +177,17 @@ def followed(
         s.
     """
     machines, intervals, n = nodes.shape
-    pushed = np.zeros((n, 1))
-    pushed[TROLLEY - 1] = 1.0
-    z, along = nodes, np.broadcast_to(np.eye(n, n + 1), (machines, intervals, n, n + 1))
+    spend(EVALUATION * machines * intervals * 2.0 * (hoist.shape[1] - 1) * n * (n + 1))
+    lines = swing.lines
+    pushed = np.zeros((n, lines))
+    pushed[CARRIED * np.arange(lines) + CARRIED - 1, np.arange(lines)] = 1.0
+    z, along = nodes, np.broadcast_to(np.eye(n, n + lines), (machines, intervals, n, n + lines))
     states, alongs = [z], [along]
     parameters = p[:, None]
 
     def slope(z: Array, along: Array, half: int) -> tuple[Array, Array]:
         both = swing.rate(z, hoist[:, half], parameters)
-        rates = both[..., 0] + jerks[:, None] * pushed[:, 0]
+        rates = both[..., 0] + jerks @ pushed.T
         change = both[..., 1:] @ along
         change[..., n:] += pushed
         return rates, change
