@@ -20,12 +20,14 @@ from json_page import require_documented
 
 from gen_profile.cli import main
 from gen_profile.cli.entry import cli
+from gen_profile.cli.group import DefaultGroup
 
 
 def commands_of(group: click.Group, before: str = "") -> dict[str, click.Command]:
     """List the commands of a group by their words, those of groups within it among them."""
     found = {}
-    for name, command in group.commands.items():
+    commands = group.load() if isinstance(group, DefaultGroup) else group.commands
+    for name, command in commands.items():
         if isinstance(command, click.Group):
             found |= commands_of(command, f"{before}{name} ")
         else:

@@ -14,7 +14,7 @@ from click.shell_completion import ShellComplete
 from command_line import PROGRAM, run_here, run_process
 
 from gen_profile.cli import progress
-from gen_profile.cli.commands import cli
+from gen_profile.cli.entry import LATER, cli
 
 COMMANDS = sorted(cli.commands)
 
@@ -122,6 +122,33 @@ def test_a_bug_is_told_without_a_traceback(monkeypatch):
     monkeypatch.setattr(logging, "basicConfig", lambda **_: None)
     with pytest.raises(ZeroDivisionError):
         run_here("--debug")
+
+
+def test_help_says_of_commands_that_are_not_imported_what_they_say_themselves():
+    told = {name: summary for summaries in LATER.values() for name, summary in summaries.items()}
+    assert told == {name: " ".join(cli.load()[name].help.split("\n\n")[0].split()) for name in told}
+    own = {command.callback.__module__ for command in cli.load().values()}
+    assert own == {*LATER, "gen_profile.cli.commands"}
+
+
+ONLY_HELP = """
+import sys
+sys.argv = ["gen-profile", "--help"]
+from gen_profile.cli import main
+try:
+    main()
+finally:
+    print(*sys.modules, file=sys.stderr)
+"""
+
+
+def test_help_loads_no_command_s_module():
+    done = subprocess.run(
+        [sys.executable, "-c", ONLY_HELP], capture_output=True, encoding="utf-8", check=True
+    )
+    loaded = set(done.stderr.split())
+    assert "gen_profile.cli.commands" in loaded
+    assert not loaded & {*LATER, "attrs", "numpy"}
 
 
 def test_an_interrupt_is_no_bug(monkeypatch):

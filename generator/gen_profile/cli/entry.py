@@ -11,21 +11,54 @@ from typing import Any
 
 import click
 
-from gen_profile.cli import (  # noqa: F401  # each adds its commands
-    can,
-    commissioning,
-    deployment,
-    fmu,
-    planner,
-    report,
-    streaming,
-    studio,
-    sweep,
-)
 from gen_profile.cli.commands import cli
+from gen_profile.cli.group import Later
 from gen_profile.cli.outcome import print_error, unprinted
 from gen_profile.support.errors import UnknownProgram
-from gen_profile.support.private_folder import agree
+
+# Commands of modules that are imported once one of theirs is called, and what the help says of them.
+LATER = {
+    "gen_profile.cli.can": {"can": "Look at CAN buses."},
+    "gen_profile.cli.commissioning.commission": {
+        "commission": "Go from a tape measure to a controller, step by step."
+    },
+    "gen_profile.cli.commissioning.identify": {
+        "identify": "Find parameters from measurements on site, and write a spec.",
+        "learn": "Narrow a spec's ranges by what runs of a motion showed.",
+    },
+    "gen_profile.cli.commissioning.log_swing": {
+        "log-swing": "Log how a load swings, for identify and learn, until Ctrl-C."
+    },
+    "gen_profile.cli.deployment.commands": {
+        "deploy": "Put a playback block's table, a library's, or a planner's numbers into a controller.",
+        "plc-sim": "Simulate a controller that runs a playback block, behind an OPC UA, ADS or S7 server.",
+    },
+    "gen_profile.cli.fmu": {
+        "fmu": "Write an FMU of a plant, profile, planner, or a plant with either; or two of them as an SSP."
+    },
+    "gen_profile.cli.planner": {
+        "planner": "Write a PLC block that plans every motion itself, and execute it."
+    },
+    "gen_profile.cli.report": {
+        "report": "Write everything about a design, or about a planner block and its proof, into one HTML "
+        "file."
+    },
+    "gen_profile.cli.streaming.commands": {
+        "stream": "Stream setpoints to CiA 402 drives, and stop them safely.",
+        "drive-sim": "Simulate CiA 402 drives that move the machine's FMU.",
+    },
+    "gen_profile.cli.studio": {
+        "studio": "Turn every knob of a spec in the browser, and see the swing at once."
+    },
+    "gen_profile.cli.sweep": {
+        "sweep": "Design, check and export every combination of some values.",
+        "lookup": "Find the nearest safe profile of a sweep.",
+        "library": "Combine a sweep's PLC blocks into one.",
+    },
+}
+for module, summaries in LATER.items():
+    for name, summary in summaries.items():
+        cli.add_command(Later(name, module, summary))
 
 
 def run() -> None:
@@ -62,6 +95,8 @@ def _done() -> Any:
         hashes = ", ".join(f"{path.name} (SHA-256 {sha256})" for path, sha256 in error.programs.items())
         if not click.confirm(f"{error}\nLet {hashes} run?", err=True):
             raise
+        from gen_profile.support.private_folder import agree
+
         for sha256 in error.programs.values():
             agree(sha256)
         return cli.main(prog_name="gen-profile", standalone_mode=False)

@@ -1,5 +1,7 @@
-"""Command groups of which one command runs when none is named."""
+"""Command groups of which one command runs when none is named, and commands that load when called."""
 
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +12,35 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.suggestion import suggestion
 
 
+class Later(click.Command):
+    """Stands for a command of a module that is not imported yet, in its group's help."""
+
+    def __init__(self, name: str, module: str, summary: str) -> None:
+        super().__init__(name, help=summary)
+        self.module = module
+
+
 class DefaultGroup(click.Group):
     """Put `default` before arguments that begin with neither a command nor an option of the group."""
 
     def __init__(self, *arguments: Any, default: str = "design", **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.default = default
+
+    def load(self) -> Mapping[str, click.Command]:
+        """Give all commands, none of which stands for another."""
+        for command in list(self.commands.values()):
+            if isinstance(command, Later):
+                import_module(command.module)  # which adds it
+        return self.commands
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, and import it."""
+        if isinstance(later := self.commands.get(args[0]), Later):
+            import_module(later.module)
+        return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, the default command put in."""
@@ -31,12 +56,14 @@ class DefaultGroup(click.Group):
     def _refuse_mistyped(self, ctx: click.Context, args: list[str]) -> None:
         """Refuse a first word that is meant as a command: the default would complain of the rest."""
         word = args[0] if args and not ctx.resilient_parsing else ""
-        near = suggestion(word, self.commands)
+        if not word.isidentifier() or Path(word).exists():
+            return
+        near = suggestion(word, self.load())
         inner = (name for name, group in self.commands.items() if word in getattr(group, "commands", ()))
         if group := next(inner, ""):
             near = f"; did you mean '{group} {word}'?"
         meant = "did you mean" in near or (len(args) > 1 and not args[1].startswith("-"))
-        if word.isidentifier() and meant and not Path(word).exists():
+        if meant:
             raise SpecError(f"There is no command or spec {word}{near}")
 
     def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
