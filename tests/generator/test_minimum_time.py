@@ -2,6 +2,7 @@
 
 import math
 import re
+from random import Random
 
 import attrs
 import numpy as np
@@ -275,14 +276,29 @@ def test_every_duration_from_the_shortest_on_has_a_motion(preset):
     """The mesh of a fixed duration is as fine as that of the shortest, where it must be."""
     limits = LIMITED[preset]
     shortest_found = plan(preset_spec(preset, [*limits, "move.duration=minimum"])).spec.move.duration
-    # a hall crane's search uses its work up for a little more, or not, by the last bits of linear algebra
-    for times in (1.0,) if preset == "hall-crane" else (1.0, 1.0015, 1.006):
+    for times in (1.0, 1.0015, 1.006):
         spec = preset_spec(preset, [*limits, f"move.duration={times * shortest_found!r}"])
         motion = plan(spec).motion
         assert motion.duration == times * shortest_found
         for column, axis in enumerate(spec.machine().actuated):
             allowed = spec.limits.of(column)
             assert greatest(motion, 2, column) <= (1.0 + 1e-6) * allowed.acceleration, axis
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_other_machines_have_a_motion_of_every_duration_from_the_shortest_on(seed):
+    random = Random(seed)
+    preset = random.choice([*LIMITED])
+    numbers = [limit.partition("=") for limit in LIMITED[preset] if limit.startswith("limits.")]
+    changes = [f"{name}={random.uniform(0.6, 1.5) * float(number)!r}" for name, _, number in numbers]
+    move = preset_spec(preset).move
+    share = random.uniform(0.6, 1.3)
+    target = [a + share * (b - a) for a, b in zip(move.start, move.target, strict=True)]
+    changes.append(f"move.target={target!r}")
+    shortest_found = plan(preset_spec(preset, [*changes, "move.duration=minimum"])).spec.move.duration
+    duration = random.uniform(1.0, 1.05) * shortest_found
+    assert plan(preset_spec(preset, [*changes, f"move.duration={duration!r}"])).motion.duration == duration
 
 
 @pytest.mark.slow

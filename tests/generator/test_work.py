@@ -1,5 +1,6 @@
 """What a search may cost, and what interrupts compiled code."""
 
+import math
 import signal
 
 import numpy as np
@@ -13,7 +14,7 @@ from gen_profile.methods.solvers.direct.set_up import DirectOptions
 from gen_profile.methods.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.support.interrupts import interrupts_collected
-from gen_profile.support.work import OutOfWork, Overtaken, budget, left, spend
+from gen_profile.support.work import OutOfWork, Overtaken, afford, budget, clock_left, left, spend
 
 
 def test_a_budget_within_another_takes_from_both():
@@ -40,6 +41,22 @@ def test_the_clock_of_all_threads_ends_what_takes_longer_than_an_answer_may(monk
             spend(0.3)
         with pytest.raises(OutOfWork):
             spend(0.0)
+
+
+def test_a_part_may_have_its_own_share_of_the_clock(monkeypatch):
+    now = 10.0
+    monkeypatch.setattr("gen_profile.support.work.time.process_time", lambda: now)
+
+    def slow():
+        nonlocal now
+        now += 0.6 * 3.0
+        spend(1.0)
+
+    assert clock_left() == math.inf
+    with budget(9.0, clock=3.0):
+        assert afford(slow, 5.0, 0.5 * clock_left()) is None
+        assert clock_left() == pytest.approx(1.2)
+        spend(0.1)  # what is around it goes on
 
 
 def test_a_search_that_costs_too_much_is_given_up(monkeypatch):

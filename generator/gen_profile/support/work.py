@@ -87,6 +87,14 @@ def left() -> float:
     return least
 
 
+def clock_left() -> float:
+    """Tell for how long in s the processor's clock lets the budgets go on: infinitely long without any."""
+    ends, own = math.inf, _current.get()
+    while own is not None:
+        ends, own = min(ends, own.ends), own.outer
+    return ends - time.process_time()
+
+
 def spend(seconds: float) -> None:
     """Count work that is done next.
 
@@ -101,8 +109,14 @@ def spend(seconds: float) -> None:
         own = own.outer
 
 
-def afford(find: Callable[[], Found], seconds: float) -> Found | None:
+def afford(find: Callable[[], Found], seconds: float, clock: float = math.inf) -> Found | None:
     """Find something for so much work in s; None where that is not enough.
+
+    Parameters
+    ----------
+    find : callable
+    seconds, clock : float
+        As in `budget`.
 
     Raises
     ------
@@ -110,7 +124,7 @@ def afford(find: Callable[[], Found], seconds: float) -> Found | None:
         A budget around this one is used up, too.
     """
     try:
-        with budget(seconds):
+        with budget(seconds, clock):
             return find()
     except OutOfWork:
         spend(0.0)

@@ -1,17 +1,14 @@
 """Which solver for which problem."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 
 import attrs
 import numpy as np
 
-from gen_profile.dynamics.evaluation.residual_sway import modal_amplitudes
 from gen_profile.dynamics.evaluation.simulation import (
-    TRANSIENT_SAMPLES,
-    PlantSimulation,
     greatest_overshoot,
 )
 from gen_profile.dynamics.problem.limits import Breach, breaches
@@ -20,6 +17,7 @@ from gen_profile.dynamics.problem.overshoot import counted
 from gen_profile.dynamics.problem.problem import Problem
 from gen_profile.methods.solvers.direct import solver as direct
 from gen_profile.methods.solvers.direct import worst_case
+from gen_profile.methods.solvers.direct.conic import ConicStatus
 from gen_profile.methods.solvers.direct.relaxation import (
     SHORTEST_WITHIN,
     Relaxation,
@@ -27,6 +25,7 @@ from gen_profile.methods.solvers.direct.relaxation import (
     shortest,
     wideable,
 )
+from gen_profile.methods.solvers.direct.set_up import USUAL, DirectOptions
 from gen_profile.methods.solvers.direct.solver import ProgramSequence
 from gen_profile.methods.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.methods.solvers.indirect import solver as indirect
@@ -36,9 +35,8 @@ from gen_profile.methods.solvers.solution import SIMPLER, WIDER, Solution, Statu
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.values import SolverName
-from gen_profile.support.errors import CosimulationError
 from gen_profile.support.progress import Progress, no_progress
-from gen_profile.support.work import OutOfWork, afford, budget, left, spend
+from gen_profile.support.work import OutOfWork, afford, budget, clock_left, left, spend
 
 ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
@@ -51,6 +49,10 @@ FINER_MESHES = 0.4  # of the work that is left, for finer meshes that keep the l
 STARTING = 0.85  # likewise, for what begins at rest
 # likewise, for the least cost from two other starts, after which the motion of least violation will do
 OTHER_STARTS = 0.4, 0.9
+# where a mesh is bisected already, and the motion of least violation known that follows the equations
+ON_FINE_MESHES = attrs.evolve(USUAL, max_bisections=0, step_tolerance=direct.FOLLOWED_STEP)
+# of the processor's time that is left, for a cheaper motion than one that is found: the rest judges it
+CHEAPER = 0.7
 INEXACT = 1e-3  # share of a limit by which programs may break it for no other reason than their accuracy
 # times that share less of the limits is asked for then, and how often
 KEPT_FURTHER, KEPT_FURTHER_ROUNDS = 2.0, 2
@@ -60,7 +62,6 @@ BLEND = 4.0  # order of the norm by which these times and the period count toget
 RANGE = 2.0  # times the work for a whole range
 # rad and iterations, from which on a motion may be one of several optimal ones; rad within limits
 SWINGS_FAR, MANY_ITERATIONS, FAR_WITHIN_LIMITS = 0.15, 10, 0.35
-REST = 5e-2  # of the greatest sway on the way: more is left where intervals are too long for a motion
 BETTER = 1.0 - 1e-3  # times the cost of a motion, below which another one is given in its place
 
 
@@ -90,10 +91,15 @@ def attempt(
     if method == "direct":
         solution = in_time(directly, DIRECTLY)
     else:
-        solution = in_time(partial(indirect.solve, problem), SOLVING)
+        # within limits the direct method finds most of what the simplified one does not
+        simply = method == "auto" and bool(problem.limits.stated())
+        solution = in_time(partial(indirect.solve, problem, simply=simply), SOLVING)
     if method == "auto" and not keeps_limits(solution) and solution.status is not Status.INFEASIBLE:
         other = in_time(directly, DIRECTLY)
-        solution = solution if other.optimum is None and solution.optimum is None else other
+        if simply and solution.optimum is other.optimum is None and other.status is not Status.INFEASIBLE:
+            solution = in_time(partial(indirect.solve, problem), SOLVING)
+        unfound = other.optimum is solution.optimum is None and other.status is not Status.INFEASIBLE
+        solution = solution if unfound or keeps_limits(solution) else other
     return solution if method == "indirect" or coarse or near is not None else _compared(problem, solution)
 
 
@@ -147,44 +153,51 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
 def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Solution:
     """Begin at the motion of least violation, else at the optimum without limits.
 
-    Just above the shortest duration only meshes that are fine where limits begin to bind have a motion. Where
-    both starts fail, the motion of least violation is taken, if it keeps the limits.
+    Just above the shortest duration only meshes that are fine where limits begin to bind have a motion, and
+    programs for the least cost may not settle on them, or take too much work: then the motion next to that of
+    least violation that follows the equations is taken, if it keeps the limits.
     """
+    near, options = nearest, USUAL
     if not coarse:
         with suppress(OutOfWork), budget(FINER_MESHES * left()):
-            while nearest.wider > KEPT_AS_WIDE and (finer := _refined(problem, nearest)) is not None:
-                nearest = finer
+            while near.wider > KEPT_AS_WIDE and (finer := _refined(problem, near)) is not None:
+                near, options = finer, ON_FINE_MESHES
         spend(0.0)
-    for start, share in zip((nearest.start, direct.without_limits), OTHER_STARTS, strict=True):
-        begun = partial(_begun, problem, start, coarse=coarse)
-        solution = afford(begun, share * left()) or given_up(problem)
+    start, kept = near.start(problem), None
+    if start is not None and near.wider <= 1.0:
+        following = afford(partial(direct.next_to, problem, start), OTHER_STARTS[0] * left())
+        if following is not None and following.verdict is ConicStatus.SOLVED:
+            start, motion = following, direct.conclude(following, following.iterations)
+            kept = attrs.evolve(motion, other_costs=()) if keeps_limits(motion) else None
+    starts: Sequence[Callable[[Problem], ProgramSequence | None]] = (lambda _: start, direct.without_limits)
+    for begin, share in zip(starts, OTHER_STARTS, strict=True):
+        fine = options is ON_FINE_MESHES
+        clock = math.inf if kept is None else CHEAPER * clock_left()
+        begun = partial(_begun, problem, begin, coarse=coarse, options=options)
+        solution = afford(begun, (OTHER_STARTS[-1] if fine else share) * left(), clock) or given_up(problem)
+        options = USUAL
+        if fine and solution.optimum is not None:  # which even finer ones may lower
+            begun = partial(_begun, problem, begin)
+            cheaper = afford(begun, OTHER_STARTS[-1] * left(), CHEAPER * clock_left()) or solution
+            solution = min(solution, cheaper, key=_cost)
         if solution.optimum is not None:
-            first = start is not direct.without_limits
+            first = begin is not direct.without_limits
             return solution if first else attrs.evolve(solution, other_costs=())
-    if nearest.wider > 1.0 or not _followed(nearest.solution):
-        return solution
-    return attrs.evolve(nearest.solution, other_costs=())
+    return solution if kept is None else kept
 
 
-def _followed(solution: Solution) -> bool:
-    """Whether a motion leaves the nominal machine at rest, as it does not on intervals that are too long."""
-    problem = solution.problem
-    if solution.optimum is None:
-        return False
-    motion, machine = optimal_profile(solution), [problem.parameters]
-    try:
-        swing = PlantSimulation(problem.plant, motion, machine, motion.duration, problem.initial)
-        (end,) = swing.at(np.array([motion.duration]))
-        most = np.abs(swing.sway(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))).max()
-    except CosimulationError:
-        return False
-    return bool((modal_amplitudes(problem.plant, problem.parameters, end) <= REST * most).all())
+def _cost(solution: Solution) -> float:
+    return math.inf if solution.optimum is None else solution.optimum.cost
 
 
 def _begun(
-    problem: Problem, start: Callable[[Problem], ProgramSequence | None], *, coarse: bool = False
+    problem: Problem,
+    start: Callable[[Problem], ProgramSequence | None],
+    *,
+    coarse: bool = False,
+    options: DirectOptions = USUAL,
 ) -> Solution:
-    return _with_reserve(problem, start(problem), coarse=coarse)
+    return _with_reserve(problem, start(problem), coarse=coarse, options=options)
 
 
 def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:
@@ -193,14 +206,18 @@ def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:
     return None if finer is None else Relaxation(problem, (), finer).least(wideable(problem))
 
 
-def _with_reserve(problem: Problem, near: ProgramSequence | None, *, coarse: bool) -> Solution:
+def _with_reserve(
+    problem: Problem, near: ProgramSequence | None, *, coarse: bool, options: DirectOptions = USUAL
+) -> Solution:
     """Solve directly; where a limit is broken by as much as programs are inexact, ask for so much less."""
-    solution = direct.solve(problem, near, coarse=coarse)
+    solution = direct.solve(problem, near, coarse=coarse, options=options)
     for _ in range(KEPT_FURTHER_ROUNDS):
         excess = max((broken.excess for broken in _broken(solution)), default=0.0)
         if not 0.0 < excess < INEXACT:
             break
-        other = direct.solve(problem.within(1.0 - KEPT_FURTHER * excess), near, coarse=coarse)
+        other = direct.solve(
+            problem.within(1.0 - KEPT_FURTHER * excess), near, coarse=coarse, options=options
+        )
         if other.optimum is None:
             break
         solution, problem = attrs.evolve(other, problem=solution.problem), other.problem

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from itertools import count
 from typing import Any
@@ -37,6 +37,22 @@ _VERDICTS = {
     "PrimalInfeasible": ConicStatus.INFEASIBLE,
     "AlmostPrimalInfeasible": ConicStatus.INFEASIBLE,
 }
+
+_DECIDED = {"Solved", "AlmostSolved", "PrimalInfeasible"}
+# Settings of further tries, and whether an end asks for them. Where factors fail on very uneven intervals,
+# pivots are raised ten times as much as usually (a hundred times leads to the same motions); steepest costs
+# are better scaled by our units alone.
+_RAISED: tuple[Callable[[str], bool], Mapping[str, Any]] = (
+    lambda end: end in {"NumericalError", "InsufficientProgress"},
+    {"static_regularization_constant": 1e-7},
+)
+_FURTHER_TRIES: Sequence[tuple[Callable[[str], bool], Mapping[str, Any]]] = (
+    (
+        lambda end: end not in _DECIDED,
+        {"static_regularization_constant": 1e-8, "iterative_refinement_enable": True},
+    ),
+    (lambda end: end == "NumericalError", {"equilibrate_enable": False}),
+)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -201,10 +217,17 @@ class ConicProgram:
         cones = len(sides) * [("SecondOrderConeT", sides.shape[1])]
         self._add(*self._giving(matrix, sides.ravel(), gives.ravel()), *cones)
 
-    def solve(self, quadratic: Entries, linear: Array) -> ConicSolution:
+    def solve(self, quadratic: Entries, linear: Array, *, sharp: bool = True) -> ConicSolution:
         """Solve for a cost, P given whole and symmetric; it should be of the order of 1 or more.
 
         What is much smaller is not minimised: programs end when the cost is right to the tolerance.
+
+        Parameters
+        ----------
+        quadratic : Entries
+        linear : (variables,) array
+        sharp : bool
+            Whether the cost hardly curves: raised pivots would let such a program circle about its solution.
         """
         settings = clarabel.DefaultSettings()
         settings.verbose = False
@@ -215,12 +238,11 @@ class ConicProgram:
         settings.iterative_refinement_enable = {kind for kind, _ in self._cones} == {"ZeroConeT"}
         settings.presolve_enable = False  # which would forbid to take over its structure
         solution = self._solved(quadratic, linear, settings, self._workspace)
-        if str(solution.status) not in ("Solved", "AlmostSolved", "PrimalInfeasible"):
-            settings.iterative_refinement_enable = True
-            solution = self._solved(quadratic, linear, settings, Workspace())
-        if str(solution.status) == "NumericalError":  # steepest costs are better scaled by our units alone
-            settings.equilibrate_enable = False
-            solution = self._solved(quadratic, linear, settings, Workspace())
+        for asked, changes in _FURTHER_TRIES if sharp else (_RAISED, *_FURTHER_TRIES):
+            if asked(str(solution.status)):
+                for name, value in changes.items():
+                    setattr(settings, name, value)
+                solution = self._solved(quadratic, linear, settings, Workspace())
         ends = np.cumsum([len(side) for side in self._sides])[:-1]
         return ConicSolution(
             verdict=_VERDICTS.get(str(solution.status), ConicStatus.FAILED),

@@ -44,6 +44,7 @@ COARSE_STEP = 1e-2  # step after which a motion on even intervals will do to be 
 # step after which a mesh is refined: what programs on coarse ones end at need not be exact, but programs on
 # finer ones, which take longer, shall settle from there
 ROUGH_STEP = 0.1
+FOLLOWED_STEP = 1e-4  # likewise, after which a motion follows the equations, to about its square
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
 # solved exactly; they cost their square, and ten times or a tenth of them give the same motions
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
@@ -226,7 +227,7 @@ def solve(
         nonlocal setup, iterations, start
         behind = problem.nominal_overshoot
         goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit, overshoot_limit=behind)
-        if problem.limits.stated() and not coarse:
+        if problem.limits.stated() and not coarse and setup.options.max_bisections:
             result = refined(start, goal)
         else:
             result = sequence(start, goal, COARSE_STEP if coarse else None)
@@ -310,13 +311,22 @@ def refined(start: Iterate, goal: Goal) -> ProgramSequence:
     return min(ends, key=rank)
 
 
-def near_by(start: Iterate, goal: Goal) -> ProgramSequence:
+def near_by(start: Iterate, goal: Goal, tolerance: float | None = None) -> ProgramSequence:
     """Find the motion next to one that does not quite follow the equations yet.
 
     Programs for the least cost settle slowly, or not at all, where equations bend much and limits bind. Those
     for the least departure do so in a few steps, and cost hardly more if the motion was nearly the cheapest.
     """
-    return sequence(start, attrs.evolve(goal, nearest=start))
+    return sequence(start, attrs.evolve(goal, nearest=start), tolerance)
+
+
+def next_to(problem: Problem, near: ProgramSequence) -> ProgramSequence:
+    """Find the motion next to one near by, on its mesh, that follows the equations and keeps the limits."""
+    sway_cost, _ = resolve_sway_cost(problem)
+    setup, start = begun_at(set_up(problem)[0], near)
+    limits = problem.nominal_sway, problem.nominal_overshoot
+    goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=limits[0], overshoot_limit=limits[1])
+    return near_by(start, goal, FOLLOWED_STEP)
 
 
 def settled(result: ProgramSequence) -> ProgramSequence:
@@ -369,7 +379,7 @@ def sequence(start: Iterate, goal: Goal, tolerance: float | None = None) -> Prog
         cost = goal.pose(program, iterate, maps)
         if not goal.setup.sees_all:
             cost = goals.held(*cost, transcription, iterate)
-        solutions.append(program.solve(*cost))
+        solutions.append(program.solve(*cost, sharp=goal.effort_price is not None))
         if solutions[-1].verdict is not ConicStatus.SOLVED:
             verdict = solutions[-1].verdict
             break

@@ -119,17 +119,17 @@ class Transcription:
         """Number of intervals."""
         return len(self.piece.length)
 
-    @property
+    @cached_property
     def breadth(self) -> int:
         """Local coordinates of all axes on one interval."""
         return len(self.target) * self.piece.size
 
-    @property
+    @cached_property
     def variables(self) -> int:
         """Number of variables without those of a goal."""
         return int(self.node_columns[-1]) + len(self.machines[0].scale)
 
-    @property
+    @cached_property
     def units(self) -> Array:
         """About how large each variable is: as a quintic's, the snap as if jerk changed in an interval."""
         quintic = np.broadcast_to(QUINTIC_PEAKS, (self.intervals, len(QUINTIC_PEAKS)))
@@ -138,19 +138,19 @@ class Transcription:
         local = np.tile(sizes[:, orders], len(self.target)).ravel()
         return np.concatenate([local, np.ones(self.variables - len(local))])
 
-    @property
+    @cached_property
     def importance(self) -> Array:
         """How much every number of an iterate counts for its size: the axes' motion, which determines all."""
         axes = self.intervals * self.breadth
         states = sum(len(machine.scale) for machine in self.machines) * self.intervals * STAGES
         return np.concatenate([1.0 / self.units[:axes], np.zeros(states)])
 
-    @property
+    @cached_property
     def local_columns(self) -> IntArray:
         """First column of every interval's axis coordinates."""
         return np.arange(self.intervals) * self.breadth
 
-    @property
+    @cached_property
     def node_columns(self) -> IntArray:
         """First column of the nominal machine's state at every node."""
         return self.intervals * self.breadth + np.arange(self.intervals + 1) * len(self.machines[0].scale)
@@ -239,7 +239,7 @@ class Transcription:
         places = self.local_columns[:, None] + np.arange(self.breadth)
         return squares(whole.reshape(self.intervals, self.breadth, -1), places)
 
-    @property
+    @cached_property
     def coupled(self) -> IntArray:
         """Columns of every interval's axis coordinates, then of the state at its beginning."""
         n = len(self.machines[0].scale)

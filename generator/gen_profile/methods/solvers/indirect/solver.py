@@ -33,7 +33,7 @@ from gen_profile.methods.solvers.indirect.extremal import failure, judged, too_s
 from gen_profile.methods.solvers.indirect.newton import NewtonOutcome, solve_newton
 from gen_profile.methods.solvers.indirect.refinement import refine
 from gen_profile.methods.solvers.indirect.simplified_newton import solve_simplified
-from gen_profile.methods.solvers.solution import HORIZONTAL, LONGER, Solution, Status
+from gen_profile.methods.solvers.solution import HORIZONTAL, LATER, LONGER, Solution, Status
 from gen_profile.support.one_thread import one_thread
 
 INTERVALS = 30  # at least
@@ -82,13 +82,15 @@ def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
 
 
 @one_thread
-def solve(problem: Problem, options: IndirectOptions = USUAL) -> Solution:
+def solve(problem: Problem, options: IndirectOptions = USUAL, *, simply: bool = False) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
     Parameters
     ----------
     problem : Problem
     options : IndirectOptions
+    simply : bool
+        By the simplified Newton's method only.
 
     Returns
     -------
@@ -104,7 +106,7 @@ def solve(problem: Problem, options: IndirectOptions = USUAL) -> Solution:
     unweighted = canonical_problem(problem, system)
     asked, redundant = independence(unweighted)
     if redundant:
-        solution = solve(without(problem, redundant), options)
+        solution = solve(without(problem, redundant), options, simply=simply)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     final = np.where(asked, unweighted.final, np.nan)
     unweighted = attrs.evolve(unweighted, final=final, options=options)
@@ -112,6 +114,8 @@ def solve(problem: Problem, options: IndirectOptions = USUAL) -> Solution:
         simple = _solve_simply(problem, unweighted)
         if simple is not None:
             return simple
+    if simply:
+        return failure(problem, Status.DIVERGED, 1, LATER)
     try:
         return solve_fully(problem, unweighted)
     except np.linalg.LinAlgError:
