@@ -98,3 +98,16 @@ def test_a_stop_that_waits_for_another_axis_to_be_planned_does_not_count_as_fail
     out = block.hold(750, bStop=1.0)
     assert np.flatnonzero(out["bBusy"])[-1] * 0.02 < 6.0
     assert np.abs(out["fPosition_y"] - out["fPosition_y"][0]).max() < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rope", [3.5, 9.0])
+def test_an_axis_begins_while_another_one_is_planned(slow_gantry, rope):
+    """The first one took all operations as long as it had a ramp to seek: the other one stood for 6 s."""
+    block = CountedBlock(slow_gantry, fActPosition_x=80.0, fActPosition_y=12.0, fL=rope)
+    block.hold(50)
+    block.hold(2, bVelocity=1.0)
+    block.hold(500, fVelocityCommand_x=2.0)
+    out = block.hold(60, fVelocityCommand_x=-2.0, fVelocityCommand_y=0.63)
+    assert out["fVelocity_y"].any()
+    assert 0.02 * np.argmax(out["fVelocity_y"] != 0.0) < 0.6

@@ -82,6 +82,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         # where a sensor is, it stands to damp
         "goes_on": "(nState = cMoving) OR (nState = cStanding)" if c.sensor else "nState = cMoving",
         "prompt": "bPrompt := bPromptStop," if may_stop_promptly(c) else "",
+        "operations": "nShare" if len(c.axes) > 1 else "nWork",
         "together": "nTogether := nTogether, bHeld := bHeld, " if len(c.axes) > 1 else "",
         # a rope that changes is calmed on the way, and then while nothing forbids to move
         "left_for_good": "(nState = cStanding) AND" if c.rates else "",
