@@ -192,6 +192,45 @@ def test_a_motion_that_leads_beyond_the_places_of_now_is_stopped_first(blocks, c
     assert table.ask(CHOOSE, nNow=20, bOutside=0.0)["nKind"] == next_
 
 
+def test_a_tap_leads_two_slots_of_its_speed_and_begins_within_two_slots(blocks):
+    """An axis that had waited for 3.4 s set out half a second after its stick was let go, for 2 m."""
+    table, slot = Table(blocks), {"fCycle": 0.05, "fPlace": 10.0, "bStands": 1.0}
+    for _ in range(68):
+        table.command(SPEED, -0.6, **slot)
+    tapped = table.command(SPEED, 0.0)
+    assert tapped["nDoes"] == TARGET
+    assert tapped["fAim"] == pytest.approx(10.0 - 2.0 * 0.25 * 0.6)
+    does = [table.ask(COMMAND, bNew=0.0)["nDoes"] for _ in range(20)]
+    assert does[:9] == [TARGET] * 9 and does[11:] == [STOP] * 9
+
+
+def test_a_speed_below_a_limit_that_fell_is_ramped_to_in_part_where_all_of_it_is_not_found(blocks):
+    """Where what was committed was to become a little faster, the same ramp was tried on and on."""
+    table, committed = Table(blocks), {"nNow": 80.0, "nDeclineNow": 30.0, "fKeptNow": 0.9, "fSpeed": 0.5}
+    table.command(SPEED, -0.8, fLimit=0.85, fPlace=25.0)
+    tried = table.ask(CHOOSE, **committed)
+    assert (tried["nKind"], tried["fRamp"]) == (RAMP, pytest.approx(-0.8))
+    for _ in range(4):
+        table.fails(tried)
+        tried = table.ask(CHOOSE, **committed)
+    assert -0.7 < tried["fRamp"] < 0.5
+
+
+def test_a_target_that_creeps_is_led_to_by_what_failed_for_the_one_before(blocks):
+    """Each was sought from the first guess on again, so none was found, and the axis went on for 3 s."""
+    table, committed = Table(blocks), {"nNow": 80.0, "nDeclineNow": 30.0, "fKeptNow": 0.9, "fSpeed": 0.5}
+    tries = []
+    for step in range(4):
+        table.command(TARGET, 5.0 - 0.02 * step, fPlace=40.0)
+        tried = table.ask(CHOOSE, **committed)
+        assert tried["nKind"] == RAMP
+        tries.append((tried["nRamp"], tried["fRamp"]))
+        table.fails(tried)
+    assert len(set(tries)) == 4
+    table.command(TARGET, 45.0)
+    assert table.ask(CHOOSE, **committed)["fRamp"] > 0.0
+
+
 def test_from_rest_what_swings_is_left_where_it_cannot_be_calmed(blocks):
     table = Table(blocks)
     table.command(SPEED, 0.5, fPlace=20.0, bStands=1.0)
