@@ -72,3 +72,18 @@ def test_what_is_left_goes_with_the_root_of_the_period_where_a_rope_changes_at_r
         followed.issued["fSwayLeft"][changed:] = stated
         found = kinds(attrs.evolve(followed, modes=MODES, retold=retold, sway_limit=limit, **known))
         assert (kind_of(WORDS["understated"]) in found) is refused
+
+
+def test_a_live_parameter_that_is_back_for_one_cycle_has_changed_all_the_same():
+    """Of three values the one between counts: the block tells of the change (``nPromise`` 1) in time."""
+    watch = SimpleNamespace(
+        known=SimpleNamespace(live={"L": (3.0, 9.0)}),
+        spec=SimpleNamespace(planner=SimpleNamespace(live_rate={})),
+    )
+    watch.inputs = ["bEnable", "fL"]
+    for gap, drifts in ((1, True), (2, False)):
+        rope = np.full(100, 6.0)
+        rope[30:80] = 5.0
+        rope[50 : 50 + gap] = 6.0
+        script = SimpleNamespace(inputs=np.column_stack([np.ones(100), rope]))
+        assert BlockWatch._drifts(watch, script, np.arange(100), 1.0, 35).any() == drifts

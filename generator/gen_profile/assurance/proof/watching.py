@@ -300,6 +300,7 @@ class BlockWatch:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")][now]
             apart = (np.abs(value - value[0]) > share * LEAST_RATE * high) & (value >= low) & (value <= high)
+            apart[1:-1] |= apart[:-2] & apart[2:]  # of three in a row, the one between counts
             for begin, end in runs_of(apart):
                 drifts[begin + cycles : end] |= end - begin > cycles
         return drifts
