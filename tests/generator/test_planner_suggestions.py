@@ -27,7 +27,12 @@ def history(faults=(), promise=True, came=(), takes=1.0, **rest):
 def proof(fraction, faults=(), judged=None):
     judged = judged or history()
     return SimpleNamespace(
-        fraction=lambda _: fraction, faults=faults, judged=(judged,), worst=judged, passed=fraction <= 1.0
+        fraction=lambda _: fraction,
+        faults=faults,
+        judged=(judged,),
+        worst=judged,
+        passed=fraction <= 1.0,
+        count=200,
     )
 
 
@@ -36,7 +41,7 @@ def test_each_change_is_made_as_large_as_it_must_be(power):
     """Whatever power of the errors, the velocity, and the allowed sway the sway goes with."""
     spec = parse_spec(BAY)
 
-    def swaying(changed):
+    def swaying(changed, count):
         limits, check = changed.limits, changed.check
         assert limits.acceleration / limits.velocity == pytest.approx(0.3, rel=0.1)
         uncertain = changed.checked_ranges()["L1"][1] / 6.0 - 1.0
@@ -52,9 +57,9 @@ def test_each_change_is_made_as_large_as_it_must_be(power):
 
 def test_nothing_is_named_that_does_not_help_or_cannot_be():
     spec = parse_spec(HOIST, ["check.uncertain={}"])
-    assert planner_suggestions(spec, proof(5.0), lambda _: proof(3.0)) == ()
+    assert planner_suggestions(spec, proof(5.0), lambda *_: proof(3.0)) == ()
 
-    def refused(changed):
+    def refused(changed, count):
         if changed.limits != spec.limits:
             raise SpecError("too slow")
         return proof(0.5)
@@ -62,7 +67,18 @@ def test_nothing_is_named_that_does_not_help_or_cannot_be():
     assert [list(one.values) for one in planner_suggestions(spec, proof(5.0), refused)] == [
         ["check.residual_sway"]
     ]
-    assert planner_suggestions(spec, proof(5.0, faults=("altered",)), lambda _: proof(0.5)) == ()
+    assert planner_suggestions(spec, proof(5.0, faults=("altered",)), lambda *_: proof(0.5)) == ()
+
+
+def test_few_histories_tell_what_fails_and_all_what_passes():
+    spec, counts = parse_spec(HOIST, ["check.uncertain={}"]), []
+
+    def needs_more(_, count):
+        counts.append(count)
+        return proof(0.5 if count < 200 or len(counts) > 2 else 3.0)
+
+    assert planner_suggestions(spec, proof(5.0), needs_more)
+    assert counts[:4] == [40, 200, 40, 200]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +97,7 @@ def test_whether_faults_may_come_of_sway_is_told_by_values(values, tried):
     """Whatever the words of a fault are."""
     spec = parse_spec(HOIST, ["check.uncertain={}"])
     failed = proof(0.5, judged=history(faults=("by and by, at times",), **values))
-    assert bool(planner_suggestions(spec, failed, lambda _: proof(0.5))) == tried
+    assert bool(planner_suggestions(spec, failed, lambda *_: proof(0.5))) == tried
 
 
 @pytest.mark.slow

@@ -35,6 +35,7 @@ def prove(
     histories: int = HISTORIES,
     workers: int | None = None,
     scheduler: str | None = None,
+    compares: bool = True,
     progress: Progress = no_progress,
 ) -> Proof:
     """Prove a written block on many histories, which the whole spec draws, `check.seed` among it.
@@ -50,6 +51,8 @@ def prove(
         Processors to use; all that there are by default. What is found does not depend on it.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers run the histories instead.
+    compares : bool
+        Whether some commands are compared with the quickest motions, which takes its time.
     progress : callable
         Told what is being done.
 
@@ -78,7 +81,7 @@ def prove(
             among = [one for one in judged if (one.group == RHYTHMS) == climbs]
             numbering = numbering.after_round([one.number for one in _worst(spec, among)])
             judged += judge(numbering, numbers)
-        return _verdict(spec, loop, numbering, judged, progress)
+        return _verdict(spec, loop, numbering, judged, progress, compares=compares)
 
 
 def seed_of(spec: Spec) -> int:
@@ -170,7 +173,13 @@ def _required(spec: Spec) -> list[tuple[str, str]]:
 
 
 def _verdict(
-    spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory], progress: Progress
+    spec: Spec,
+    loop: ClosedLoop,
+    numbering: Numbering,
+    judged: Sequence[JudgedHistory],
+    progress: Progress,
+    *,
+    compares: bool = True,
 ) -> Proof:
     """Bound the error at the worst histories, and let FMPy judge these and some others."""
     sound = [one for one in judged if not one.faults]
@@ -186,8 +195,10 @@ def _verdict(
     chosen = np.random.default_rng(numbering.seed).permutation(len(short))
     some = [short[k] for k in chosen[: max(FEWEST_BY_FMPY, len(sound) // BY_FMPY)]]
     by_fmpy = {one.number: one for one in (*short[:1], *some)}
-    progress("comparing some with the quickest motions")
-    judged, apart = _compared(judged, numbering.seed), [0.0]
+    if compares:
+        progress("comparing some with the quickest motions")
+        judged = _compared(judged, numbering.seed)
+    apart = [0.0]
     for done, one in enumerate(by_fmpy.values()):
         progress("co-simulating some by FMPy", done, len(by_fmpy))
         apart.append(loop.distance_from_fmpy(one.history, one.cycles))

@@ -121,8 +121,9 @@ def deploy_planner(
     suggestions: tuple[Suggestion, ...] = ()
     if proof is not None and not proof.passed and not keep_failed:
         progress("looking for what would pass")
+        again = partial(prove_on, compares=spec.planner.lateness is not None)
         suggestions = planner_suggestions(
-            spec, proof, lambda changed: prove_on(changed, planner_block(changed).text)
+            spec, proof, lambda changed, count: again(changed, planner_block(changed).text, histories=count)
         )
     return Deployment(
         spec=spec,

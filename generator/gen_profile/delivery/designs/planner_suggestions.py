@@ -17,12 +17,14 @@ from gen_profile.support.units import RATES
 # stops at the first change that passes, and aims at 0.8 of the limit, as other histories may sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 UNKNOWN = 1.25  # times the limit: at least so much a block counts that shows one of the next
+FEW = 5  # first, as most fail: by so much fewer histories
 GIVEN_UP = f"nErrorId {NO_MOTION:.0f}"  # a command, as any motion might leave more sway than allowed
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
+Prove = Callable[[Spec, int], Proof]
 
 
-def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Suggestion, ...]:
+def planner_suggestions(spec: Spec, proof: Proof, prove: Prove) -> tuple[Suggestion, ...]:
     """Look for changes that help, where sway is too much, or faults may come of it.
 
     What is wrong besides these may come of it: whatever is named is tried in full.
@@ -32,8 +34,8 @@ def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
     spec : Spec
     proof : Proof
         That failed.
-    prove : Spec → Proof
-        Of the block of a changed spec, on as many histories.
+    prove : Spec, int → Proof
+        Of the block of a changed spec, on so many histories.
     """
     faulty = [judged for judged in proof.judged if judged.faults]
     if proof.faults or (faulty and not any(map(_may_come_of_sway, faulty))):
@@ -50,15 +52,15 @@ def _may_come_of_sway(judged: JudgedHistory) -> bool:
     return (owed and not judged.promise) or given_up or any(one.is_late(LATENESS) for one in judged.obeyed)
 
 
-def _tried(
-    spec: Spec, failed: Proof, prove: Callable[[Spec], Proof], change: Change, power: float
-) -> Suggestion | None:
+def _tried(spec: Spec, failed: Proof, prove: Prove, change: Change, power: float) -> Suggestion | None:
     """Divide by a factor until the proof passes; the sway is taken to go with a power of it."""
     passed: list[Suggestion] = []
 
     def excess(factor: float) -> float:
         changed, values = change(spec, 1.0 / factor)
-        proof = failed if factor == 1.0 else prove(changed)
+        proof = failed if factor == 1.0 else prove(changed, failed.count // FEW)
+        if proof is not failed and proof.passed:
+            proof = prove(changed, failed.count)
         fraction = proof.fraction(proof.worst)
         if proof.passed:
             passed.append(Suggestion(values=values, spec=changed, fraction=fraction))
