@@ -224,7 +224,9 @@ def _unknown(run: Followed) -> tuple[Flags, Flags]:
         if sees[order.begin : order.end].any():
             must_be[order.begin + int(np.argmax(sees[order.begin : order.end])) :] = False
     # after braking; and once too much has added up, which no motion makes up for, and which may be forgotten
-    for begin in (*run.brakings, *np.flatnonzero(run.issued["nPromise"] == ADDED_UP)[:1]):
+    left = run.issued.get("fSwayLeft", np.zeros(run.cycles))  # which another reason may hide
+    added_up = (run.issued["nPromise"] == ADDED_UP) | (left > run.sway_limit)
+    for begin in (*run.brakings, *np.flatnonzero(added_up)[:1]):
         reports = (at for at in run.rest_reports if at >= begin and run.guided[at] and run.stands[at])
         may_be[begin : min(reports, default=run.cycles)] = True
     return may_be | (np.cumsum(run.lost_sensors) > 0), must_be
