@@ -55,6 +55,7 @@ def test_a_rope_that_changes_before_a_quick_stop_is_known_after_it():
         assert block.hold(3000, fVelocityCommand=0.6)["fVelocity"][-1] == pytest.approx(0.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stop", "set_first"), [("quiet", 0.0), ("prompt", 1.0)])
 def test_a_spec_says_how_axes_stop_where_the_controller_does_not(stop, set_first):
     spec = preset_spec("bay-crane", [f'planner.stop="{stop}"'])
