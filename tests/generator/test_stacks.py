@@ -69,6 +69,10 @@ def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
         ("Place [cm];Height [cm]\n8;6\n", "path.file: bay.csv: line 1 names another unit than m"),
         ("from,to,height\n8,10.5,nan\n", "path.file: bay.csv: line 2 must be two, three or five numbers"),
         ("height,from,to\n6,8,10.5\n", "path.file: bay.csv: line 1 names a column behind the height"),
+        (
+            "place,height\n0,0\n20000,10400\n30000,0\n",
+            "path.stacks: reach 10400 m, far above path.rail of 36 m",
+        ),
     ],
 )
 def test_no_row_of_a_file_is_left_out_or_misread(tmp_path, text, sentence):

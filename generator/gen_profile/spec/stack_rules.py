@@ -20,6 +20,8 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
 
+TALLEST = 1000.0  # m above the rail, from which on heights are taken to be in mm
+
 Fault = tuple[str, ...]
 
 
@@ -54,6 +56,13 @@ def stack_faults(spec: Spec, plant: Plant) -> Iterator[Fault]:
             "needs a machine of a hoist and one or two axes that carry the load along, such as "
             "single-pendulum-crane or hall-crane",
         )
+        return
+    highest = max((row[-1] for row in path.stacks), default=path.rail)
+    if highest - path.rail > TALLEST:
+        template = (
+            "reach {height:g} m, far above path.rail of {rail:g} m; state places and heights in m, not mm"
+        )
+        yield "path.stacks", Phrase(template, height=highest, rail=path.rail), "path.file", "path.profile"
         return
     yield from _methods(spec)
     yield from _in_plan_view(spec, axes)
