@@ -52,13 +52,16 @@ class StackOptions:
     tries : int
         Durations, where the machines themselves have too little room,
     longer : float
-        and by which fraction each is longer than the one before.
+        by which fraction the second is longer than the first,
+    growth : float
+        and times as large from one to the next.
     """
 
     answer: tuple[float, float] = (16.0, 40.0)
     rounds: int = 8
     tries: int = 12
     longer: float = 2e-3
+    growth: float = 1.3
 
 
 OPTIONS = StackOptions()
@@ -87,7 +90,8 @@ class StackSearch:
         def excess(duration: float) -> float:
             up = lifted(duration)
             about = None if up is None else stretched(near, up) if near else resting(self.bay, up)
-            course = None if about is None else self.solved(about, FEW_STEPS)
+            steps = STEPS if search is EXACT else FEW_STEPS
+            course = None if about is None else self.solved(about, steps)
             if course is None:
                 return math.inf
             found[duration] = course
@@ -115,13 +119,14 @@ class StackSearch:
         """Find the quickest course that machines themselves follow with room; it ends on a cycle."""
         bay = self.bay
         course, lifted = self.chosen = self.chosen or self.linear()
-        duration = course.up.duration
+        duration, longer = course.up.duration, self.options.longer
         for _ in range(self.options.tries):
             up = lifted(in_cycles(bay.spec, duration))
             assert up is not None  # in more time than before
             if (settled := self.settled(stretched(course, up))) is not None:
                 return settled
-            duration *= 1.0 + self.options.longer
+            duration *= 1.0 + longer
+            longer *= self.options.growth
         raise none_found(bay)
 
     def linear(self) -> tuple[Course, Lifted]:
@@ -139,7 +144,7 @@ class StackSearch:
         self.programs += alone.programs
         if len(bay.machines) > 1:
             rough = with_others(bay, rough)
-        near = self.solved(rough, FEW_STEPS) or rough
+        near = self.solved(rough) or rough
         if len(bay.machines) > 1:
             near = _there(bay, self.quickest(lifted, near.up.duration, ROUGH, near))
         return self.quickest(lifted, near.up.duration, EXACT, near) or near, lifted
