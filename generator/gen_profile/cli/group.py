@@ -1,5 +1,6 @@
 """Command groups of which one command runs when none is named, and commands that load when called."""
 
+import os
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -56,7 +57,7 @@ class DefaultGroup(click.Group):
     def _refuse_mistyped(self, ctx: click.Context, args: list[str]) -> None:
         """Refuse a first word that is meant as a command: the default would complain of the rest."""
         word = args[0] if args and not ctx.resilient_parsing else ""
-        if not word.isidentifier() or Path(word).exists():
+        if not word.isidentifier() or os.path.exists(word):  # noqa: PTH110  (of a name that is too long, too)
             return
         near = suggestion(word, self.load())
         inner = (name for name, group in self.commands.items() if word in getattr(group, "commands", ()))
