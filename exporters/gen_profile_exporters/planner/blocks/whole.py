@@ -85,7 +85,7 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         "operations": "nShare" if len(c.axes) > 1 else "nWork",
         "together": "nTogether := nTogether, bHeld := bHeld, " if len(c.axes) > 1 else "",
         # a rope that changes is calmed on the way, and then while nothing forbids to move
-        "left_for_good": "(nState = cStanding) AND" if c.rates else "",
+        "left_for_good": "(nState = cStanding) AND NOT bBegin AND" if c.rates else "",
         "first_suffix": c.axes[0].suffix,
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
         "shell_constants": constant_lines(_constants(c)),
