@@ -246,6 +246,22 @@ def test_a_block_that_states_a_shorter_reaction_is_not_held_to_shorter_stops():
     assert {"far", "loose"} <= {what for what, *_ in limits[0]}
 
 
+@pytest.mark.parametrize(("faster", "found"), [(0.0, False), (0.03, False), (0.3, True)])
+def test_a_prompt_stop_is_no_faster_from_when_it_is_obeyed_on(faster, found):
+    """A ramp goes on for one and a half slots at most, and corrections may add a little."""
+    stopping = with_orders(
+        REST,
+        attrs.evolve(MOVE, end=250),
+        order(250, CYCLES, STOP),
+        prompt=np.ones(CYCLES, dtype=bool),
+    )
+    velocity = stopping.issued["fVelocity"]
+    velocity[820:] = 0.0
+    velocity[280:] = np.minimum(velocity[280:], velocity[279] + faster)
+    stopping.issued["fAcceleration"] = np.gradient(velocity, CYCLE)
+    assert (kind_of(WORDS["hurries"]) in kinds(stopping, {TOLD: 20, 250: 30})) == found
+
+
 def test_busy_tells_of_a_stick_that_is_about_to_be_followed():
     """A slow machine's axis, planned for longer than a fifth of a period, was said to have come to rest."""
     slow = with_orders(REST, attrs.evolve(MOVE, end=2000), attrs.evolve(STICKS, begin=2000), STOPS)

@@ -23,6 +23,8 @@ from gen_profile.assurance.proof.orders import DISABLED, POSITION, QUICK_STOP, S
 from gen_profile.assurance.proof.promptness import lost
 
 STILL = 1e-6  # m, from a target that an axis need not leave for
+FIXED = 1.5  # slots, for which a ramp goes on once an order is obeyed
+FASTER = 0.02  # of the greatest velocity, by which corrections may make an axis faster that stops promptly
 
 _LINES = (Path(__file__).parents[2] / "lists" / "obedience.txt").read_text("utf-8").splitlines()
 WORDS = {what: words for what, _, words in (line.partition(": ") for line in _LINES)}
@@ -56,6 +58,7 @@ def measured(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[All
     for judge in (*own, *stopping.JUDGES, *statements.JUDGES):
         yield from judge(run)
     yield from _reactions(run, reactions)
+    yield from _prompt_stops(run, reactions)
 
 
 def _directions(run: Followed) -> Iterator[Allowance]:
@@ -171,6 +174,27 @@ def _reactions(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[A
         if takes > allowed and _obeys_anyway(run, order, order.begin + run.after(allowed)):
             continue  # what came before ends or goes on as the order asks
         yield Allowance("reaction", order.begin, takes, allowed)
+
+
+def _prompt_stops(run: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
+    """Judge that an axis which is to stop promptly becomes no faster once it obeys.
+
+    Of one axis alone it is known from when on it does; of several, only how long that may take.
+    """
+    for k, own in enumerate(run.limits):
+        speed = np.abs(run.velocity[k])
+        for begin, end in runs_of(run.prompt_stops[k]):
+            reacted = reactions.get(begin) if len(run.limits) == 1 else None
+            if reacted is None:
+                at = max(begin, 1)
+                slack = MISJUDGED * own.velocity
+                fastest = float(speed[at - 1 : begin + run.after(run.reaction)].max())
+            else:
+                at = max(begin + reacted, 1)
+                gain = max(float(run.acceleration[k, at - 1] * np.sign(run.velocity[k, at - 1])), 0.0)
+                slack = gain * (FIXED * SLOT * run.period + 0.5 * gain / own.jerk) + FASTER * own.velocity
+                fastest = float(speed[at - 1])
+            yield from greatest("hurries", speed[at - 1 : end], fastest + slack, at - 1)
 
 
 def _obeys_anyway(run: Followed, order: TimedOrder, at: int) -> bool:

@@ -183,14 +183,4 @@ def far(run: Followed) -> Iterator[Allowance]:
             yield from greatest("far", way, fastest * takes + run.wander, begin)
 
 
-def hurries(run: Followed) -> Iterator[Allowance]:
-    """Judge that an axis which stops promptly becomes no faster once what was committed may be replaced."""
-    for k, own in enumerate(run.limits):
-        speed = np.abs(run.velocity[k])
-        for begin, end in runs_of(run.prompt_stops[k]):
-            reacted = min(begin + run.after(run.reaction), end)
-            fastest = float(speed[max(0, begin - 1) : reacted].max()) + MISJUDGED * own.velocity
-            yield from greatest("hurries", speed[begin:end], fastest, begin)
-
-
-JUDGES = (stops, let_go, far, hurries)
+JUDGES = (stops, let_go, far)
