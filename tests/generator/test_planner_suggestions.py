@@ -81,6 +81,19 @@ def test_few_histories_tell_what_fails_and_all_what_passes():
     assert counts[:4] == [40, 200, 40, 200]
 
 
+def test_cures_are_tried_on_one_history_at_least():
+    counts = []
+
+    def passes(_, count):
+        counts.append(count)
+        return proof(0.5)
+
+    one = proof(5.0)
+    one.count = 1
+    assert planner_suggestions(parse_spec(HOIST, ["check.uncertain={}"]), one, passes)
+    assert set(counts) == {1}
+
+
 @pytest.mark.parametrize(
     ("values", "tried"),
     [

@@ -58,7 +58,7 @@ def _tried(spec: Spec, failed: Proof, prove: Prove, change: Change, power: float
 
     def excess(factor: float) -> float:
         changed, values = change(spec, 1.0 / factor)
-        proof = failed if factor == 1.0 else prove(changed, failed.count // FEW)
+        proof = failed if factor == 1.0 else prove(changed, max(1, failed.count // FEW))
         if proof is not failed and proof.passed:
             proof = prove(changed, failed.count)
         fraction = proof.fraction(proof.worst)
