@@ -125,8 +125,8 @@ def test_a_bug_is_told_without_a_traceback(monkeypatch):
 
 
 def test_help_says_of_commands_that_are_not_imported_what_they_say_themselves():
-    told = {name: summary for summaries in LATER.values() for name, summary in summaries.items()}
-    assert told == {name: " ".join(cli.load()[name].help.split("\n\n")[0].split()) for name in told}
+    stated = {name: summary for summaries in LATER.values() for name, summary in summaries.items()}
+    assert stated == {name: " ".join(cli.load()[name].help.split("\n\n")[0].split()) for name in stated}
     own = {command.callback.__module__ for command in cli.load().values()}
     assert own == {*LATER, "gen_profile.cli.commands"}
 

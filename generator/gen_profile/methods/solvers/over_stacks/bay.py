@@ -263,7 +263,7 @@ class Bay:
     def _own(self, zone: StackZone, end: int) -> tuple[Array, Array] | None:
         """Lines around a body's own place where it starts or ends within a zone; none elsewhere."""
         assert self.guide is not None
-        x, y = self.guide.places[end, zone.body]
+        x, y = self.guide.route[end]  # a course in too little time may end elsewhere
         if not zone.area.holds((x, y)):
             return None
         own = next(one for one in zone.own if float(one.outside(x, y)) <= 0.0)

@@ -122,6 +122,6 @@ def guide_along(route: tuple[Place, ...], times: Sequence[float], bodies: int, w
     share, points = np.linspace(0.0, 1.0, SAMPLES), np.array(route)
     leg = np.clip(np.searchsorted(reached, share, side="right") - 1, 0, len(route) - 2)
     passed = ((share - reached[leg]) / np.maximum(np.diff(reached)[leg], 1e-9))[:, None]
-    eased = passed**3 * (10.0 - 15.0 * passed + 6.0 * passed**2)
-    places = points[leg] + eased * np.diff(points, axis=0)[leg]
+    smooth = passed**3 * (10.0 - 15.0 * passed + 6.0 * passed**2)
+    places = points[leg] + smooth * np.diff(points, axis=0)[leg]
     return Guide(route=route, places=np.repeat(places[:, None], bodies, axis=1), window=window)

@@ -137,7 +137,7 @@ class StackSearch:
         if bay.guide is None:
             rough = _there(bay, alone.quickest(lifted, start, ROUGH))
         else:
-            rough = alone.turned(_there(bay, alone.quickest(lifted, start, FIRST)), lifted)
+            rough = alone.shortened(_there(bay, alone.quickest(lifted, start, FIRST)), lifted)
             self.bay = bay = attrs.evolve(bay, guide=alone.bay.guide)
         if rough.up.duration > bay.quickest_lift(bay.needed) + DECIDED_BY_HOIST:
             rough, lifted = alone.otherwise_lifted(rough, lifted, bay.needed)
@@ -149,7 +149,7 @@ class StackSearch:
             near = _there(bay, self.quickest(lifted, near.up.duration, ROUGH, near))
         return self.quickest(lifted, near.up.duration, EXACT, near) or near, lifted
 
-    def turned(self, course: Course, lifted: Lifted) -> Course:
+    def shortened(self, course: Course, lifted: Lifted) -> Course:
         """Shorten a way around something; lines past corners turn when loads pass them."""
         shorter, least = SHORTER, max(self.bay.quickest_lift(self.bay.needed), self.bay.directly())
         while shorter > LEAST_SHORTER:
@@ -217,6 +217,7 @@ class StackSearch:
                 settled = self.settled(self.solved(course) or course)
                 if settled is not None:
                     return settled
+            self.bay = bay  # lines that turned with a course which is none would mislead the next one
         return None
 
     def settled(self, course: Course) -> Course | None:
