@@ -409,8 +409,9 @@ def test_a_gantry_is_damped_in_both_directions_and_in_one_where_a_sensor_fails()
 
     issued = gantry.run(14.0, noisy)
     for axis in "xy":
-        assert np.abs(issued[f"sway_{axis}"][-250:]).max() < 1.2 * ALLOWED
-        assert np.abs(issued[f"fSwayEstimated_{axis}"] - issued[f"sway_{axis}"])[-250:].max() < 0.01
+        # after 10.2 s: in turn, each axis has half the operations
+        assert np.abs(issued[f"sway_{axis}"][-190:]).max() < ALLOWED
+        assert np.abs(issued[f"fSwayEstimated_{axis}"] - issued[f"sway_{axis}"])[-190:].max() < 0.01
         assert np.abs(issued[f"fAcceleration_{axis}"]).max() <= 0.3 * (1.0 + ROUNDING)
         assert np.abs(np.diff(issued[f"fAcceleration_{axis}"])).max() <= 0.02 * (1.0 + ROUNDING)
         assert set(issued[f"nSensorFault_{axis}"]) <= {*SOUND} and not issued[f"nSensorFault_{axis}"][-1]

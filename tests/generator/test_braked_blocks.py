@@ -17,7 +17,7 @@ from gen_profile_exporters.planner.blocks.whole import whole_block
 pytestmark = pytest.mark.slow
 SPEC = preset_spec("bay-crane", ["planner.zones=true"])
 SWITCHES = {  # what a block does that is right where an input is 0, and wrong where it is 1
-    "fLate": ("fHighest) THEN nBrake := 1;", "fHighest) AND (fLate = 0.0) THEN nBrake := 1;"),
+    "fLate": ("fLiveHigh) THEN nBrake := 1;", "fLiveHigh) AND (fLate = 0.0) THEN nBrake := 1;"),
     "fGoesOn": (
         "IF (nBrake > 0) OR (nState = cBraking) THEN",
         "IF (fGoesOn = 1.0) AND (nBrake > 0) THEN nLost := cPromiseSway; nBrake := 0; END_IF;\n"
