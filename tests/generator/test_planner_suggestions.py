@@ -117,7 +117,7 @@ def test_whether_faults_may_come_of_sway_is_told_by_values(values, tried):
 def test_what_a_refusal_names_passes(tmp_path, monkeypatch):
     first, *_ = suggestions.CHANGES.items()  # one is tried as the others are
     monkeypatch.setattr(suggestions, "CHANGES", dict([first]))
-    swaying = BAY.replace("residual_sway = 0.05", "residual_sway = 0.002").replace("L1 = 0.05", "L1 = 0.1")
+    swaying = BAY.replace("residual_sway = 0.05", "residual_sway = 0.005").replace("L1 = 0.05", "L1 = 0.2")
     (tmp_path / "bay.toml").write_text(swaying)
     options = ("planner", "write", tmp_path / "bay.toml", "--out", tmp_path / "out", "--histories", 8)
     failed = run_here(*options, "--json")

@@ -260,6 +260,7 @@ def test_a_prompt_stop_is_no_faster_from_when_it_is_obeyed_on(faster, found):
     velocity[280:] = np.minimum(velocity[280:], velocity[279] + faster)
     stopping.issued["fAcceleration"] = np.gradient(velocity, CYCLE)
     assert (kind_of(WORDS["hurries"]) in kinds(stopping, {TOLD: 20, 250: 30})) == found
+    assert kind_of(WORDS["hurries"]) not in kinds(stopping, {TOLD: 20, 250: CYCLES})  # it ended before
 
 
 def test_busy_tells_of_a_stick_that_is_about_to_be_followed():

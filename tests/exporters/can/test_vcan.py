@@ -23,6 +23,7 @@ HERE = Path(__file__).parent
 TIMEOUT = 0.1  # s
 PERIOD = 0.03  # s; a kernel in a process, on a busy machine, wakes late by milliseconds
 CYCLES = round(3.0 / PERIOD) + 1
+PATIENCE = 30.0  # s, for a simulated drive on a busy machine to answer
 YEAR = 365 * 86400.0  # s
 QUICK_STOP = b"\x02\x00"
 SLACK = 0.05  # s, for a simulated drive on a busy machine to speak up
@@ -40,7 +41,8 @@ def scenarios(tmp_path_factory, cache):
         if not folder.exists():
             folder.mkdir()
             environment = {"GEN_PROFILE_CACHE": str(cache)}
-            spec = ["--set", f"can.timeout={TIMEOUT}", "--set", f"can.sync_period={PERIOD}"]
+            keys = (f"timeout={TIMEOUT}", f"sync_period={PERIOD}", f"sdo_timeout={PATIENCE}")
+            spec = [word for key in keys for word in ("--set", f"can.{key}")]
             subprocess.run(
                 [PROGRAM, "--preset", "paper", *spec, "--export", "can", "--out", folder],
                 check=True,

@@ -191,6 +191,8 @@ def _prompt_stops(run: Followed, reactions: Mapping[int, int | None]) -> Iterato
                 fastest = float(speed[at - 1 : begin + run.after(run.reaction)].max())
             else:
                 at = max(begin + reacted, 1)
+                if at > end:  # it was replaced before it was obeyed
+                    continue
                 gain = max(float(run.acceleration[k, at - 1] * np.sign(run.velocity[k, at - 1])), 0.0)
                 slack = gain * (FIXED * SLOT * run.period + 0.5 * gain / own.jerk) + FASTER * own.velocity
                 fastest = float(speed[at - 1])
