@@ -143,15 +143,18 @@ def remedy(
     problem = relaxation.problem
     needed, longer, others = None, None, list[Suggestion | None]()
     stated = problem.limits.stated()
-    wider = partial(_wider_limits, spec, relaxation, options)
-    alone = [partial(wider, {place: value}) for place, value in stated.items()]
+    alone = [
+        partial(_wider_limits, spec, relaxation, options, {place: value}) for place, value in stated.items()
+    ]
     time_limits = {place: stated[place] for place in time_dependent_limits(problem)}
     families = [
         limits
         for limits in ([time_limits] if time_limits == stated else [time_limits, stated])
         if len(limits) > 1
     ]
-    together = [partial(wider, limits, options.widest) for limits in families]
+    together = [
+        partial(_wider_limits, spec, relaxation, options, limits, options.widest) for limits in families
+    ]
     with suppress(OutOfWork):  # of the budget for the whole answer: name what was found so far
         if not in_time:
             needed = _in_time(partial(least_duration, relaxation), options.fraction)
@@ -309,10 +312,11 @@ def _wider_limits(
     relaxation: Relaxation,
     options: SuggestionOptions,
     limits: Mapping[str, Any],
+    most: float = math.inf,
 ) -> Suggestion | None:
     """Widen some limits as little as works, the others as they are."""
     nearest = relaxation.least(tuple(limits))
-    if nearest is None:
+    if nearest is None or nearest.wider > most:
         return None
     needed = max(nearest.wider, 1.0)
 
