@@ -34,20 +34,20 @@ def test_narrower_limits_cost_more_and_not_hundreds_of_times_as_much():
     """From rest none of these is found, and programs for the least cost hardly settle in the last ones."""
     costs = [
         solution_of("plant.L=11", f"limits.velocity={limit}").optimum.cost
-        for limit in (5.0, 4.9, 4.7, 4.5, 4.3, 4.0, 3.9)
+        for limit in (5.0, 4.9, 4.7, 4.5, 4.3, 4.0, 3.9, 3.8, 3.7)
     ]
     assert costs == sorted(costs)
     assert costs[1] < 1.1 * costs[0]
     # on 30 intervals of four points, from its optimum without limits, IPOPT needs 676.5 with 4.7 m/s
     assert costs[2] == pytest.approx(676.5, rel=2e-3)
-    assert costs[-1] < 9.0 * costs[0]
+    assert costs[-1] < 17.0 * costs[0]
 
 
 @pytest.mark.slow
 def test_a_motion_by_which_the_load_does_not_rest_is_none_and_a_longer_one_is_named():
-    """Programs end at 50 m/s² on intervals that are too long for it, and would leave half a metre of sway."""
-    with pytest.raises(gp.SolverDiverged) as refusal:
-        gp.plan(preset_spec("gantry-crane", [*MOVE, "plant.L=11", "limits.velocity=3.8"]))
+    """No bound says that there is none, though even intervals would need limits 1.3 times as wide."""
+    with pytest.raises(gp.SolverDiverged, match="there may be one") as refusal:
+        gp.plan(preset_spec("gantry-crane", [*MOVE, "plant.L=11", "limits.velocity=3.3"]))
     (longer, *_) = refusal.value.suggestions
     assert 9.0 < longer.values["move.duration"] < 13.0
     assert gp.plan(longer.spec).figures["sway_residual_peak_m"] < 1e-3

@@ -196,14 +196,14 @@ def tried(spec: Spec, *, coarse: bool = False, options: SuggestionOptions = USUA
         return choice.given_up(problem)
     if spec.solver.solver != "direct" and problem.worst_case is None:
         smooth = afford(partial(choice.attempt, problem, "indirect"), options.at_once)
-        if smooth is not None and (smooth.status is Status.INFEASIBLE or _kept(smooth)):
+        if smooth is not None and _kept(smooth):
             return smooth
     if coarse:  # whether there is a motion does not depend on what it costs
         problem = attrs.evolve(problem, sway_weight=0.0)
     solution = transient_sway.kept_by_all(problem, "direct", coarse=coarse)
     if solution.optimum is None or transient_sway.keeps_sway(solution, SWAY_TOLERANCE):
         return solution
-    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+    return attrs.evolve(solution, status=Status.DIVERGED, optimum=None)
 
 
 def _kept(solution: Solution) -> bool:

@@ -109,7 +109,7 @@ def _behind(problem: Problem, solve: Callable[[Problem], Solution]) -> Solution:
         problem = attrs.evolve(problem, overshoot_margin=margin)
     if keeps_behind(solution):
         return solution
-    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+    return attrs.evolve(solution, status=Status.DIVERGED, optimum=None)
 
 
 def keeps_behind(solution: Solution) -> bool:
@@ -162,7 +162,7 @@ def _kept(
         if _is_accepted(problem, nominal, worst, accepted):
             return -math.inf
         if worst == math.inf:
-            solutions.append(attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None))
+            solutions.append(attrs.evolve(solution, status=Status.DIVERGED, optimum=None))
             return -math.inf
         return max(math.log(worst / nominal / spread), SPREAD.precision)
 

@@ -408,8 +408,8 @@ def conclude(result: ProgramSequence, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
     problem = result.setup.problem
     status, advice = Status.CONVERGED, ""
-    if result.verdict is ConicStatus.INFEASIBLE:
-        status, advice = Status.INFEASIBLE, WIDER
+    if result.verdict is ConicStatus.INFEASIBLE:  # on this mesh, about this motion
+        status, advice = Status.DIVERGED, WIDER
     elif result.verdict is not ConicStatus.SOLVED:
         status, advice = Status.DIVERGED, LATER
     elif greatest_angle(result) > HORIZONTAL:

@@ -38,7 +38,7 @@ def within_sway(problem: Problem, attempt: Callable[[float | None], Solution]) -
         if stricter == asked:
             break
         if stricter == 0.0:  # it could not be followed
-            return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+            return attrs.evolve(solution, status=Status.DIVERGED, optimum=None)
         asked = stricter
     return solution
 
