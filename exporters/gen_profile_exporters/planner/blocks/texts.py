@@ -142,6 +142,7 @@ def _following(constants: PlannerConstants, account: str | None) -> dict[str, st
         "is_measured": int(constants.sensor is not None),
         "left": f"bLeft := {left}," if account else "",
         "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
+        "still": " AND (fSwayLeft <= cSwayLimit)" if account else "",
         "unmeasured": "bUncalm" if constants.rates else "FALSE",
         "calm_slots": LITTLE,
         "room": ROOM.format("cCalmRoom" if constants.sensor else "fPart") if straight else "",
