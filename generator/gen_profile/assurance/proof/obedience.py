@@ -193,9 +193,10 @@ def _prompt_stops(run: Followed, reactions: Mapping[int, int | None]) -> Iterato
                 at = max(begin + reacted, 1)
                 if at > end:  # it was replaced before it was obeyed
                     continue
-                gain = max(float(run.acceleration[k, at - 1] * np.sign(run.velocity[k, at - 1])), 0.0)
-                slack = gain * (FIXED * SLOT * run.period + 0.5 * gain / own.jerk) + FASTER * own.velocity
-                fastest = float(speed[at - 1])
+                velocity, gains = float(run.velocity[k, at - 1]), float(run.acceleration[k, at - 1])
+                slack = FASTER * own.velocity
+                goes_on = velocity + gains * (FIXED * SLOT * run.period + 0.5 * abs(gains) / own.jerk)
+                fastest = max(abs(velocity), abs(goes_on))  # also where it turns round
             yield from greatest("hurries", speed[at - 1 : end], fastest + slack, at - 1)
 
 
