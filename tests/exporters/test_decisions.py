@@ -74,6 +74,34 @@ def test_a_motion_is_sought_in_fewer_slots_until_none_is_left_between(blocks, co
         assert now == fewest
 
 
+def test_a_stop_that_is_not_found_quietly_for_two_periods_is_a_prompt_one_once(blocks):
+    """A load that may hardly sway more kept an axis on its way of 23 m."""
+    table = Table(blocks)
+    table.command(STOP)
+    given = {"nNow": 150.0, "bLeadsNow": 1.0, "bLeads": 1.0, "fSpeed": 0.1}
+    tried = table.ask(CHOOSE, **given)
+    assert (tried["nKind"], tried["nLength"]) == (REST, SLOTS)
+    table.fails(tried)
+    assert table.ask(CHOOSE)["bNoRoom"]  # what is committed leads there no more
+    prompt = table.ask(CHOOSE, bLeadsNow=0.0, bLeads=0.0)
+    assert (prompt["nKind"], prompt["nLength"]) == (PROMPTLY, 11)
+    while (prompt := table.ask(CHOOSE))["nKind"] == PROMPTLY:
+        table.fails(prompt)
+    assert table.ask(CHOOSE)["nDoes"] == STOP
+    short = Table(blocks)
+    short.command(STOP)
+    short.fails(short.ask(CHOOSE, **given | {"nNow": 50.0}) | {"nLength": 49})
+    assert short.ask(CHOOSE)["nDoes"] == STOP
+
+
+def test_an_axis_that_a_ramp_would_lead_beyond_its_target_is_not_slowed_to_the_pace_of_others(two):
+    cases = ((0.6, 2.0, THERE), (0.6, -2.0, THERE), (-0.6, 4.0, THERE), (0.0, 4.0, RAMP), (0.6, 5.0, RAMP))
+    for speed, way, kind in cases:
+        table = Table(two)
+        table.command(TARGET, 20.0 + way, fPlace=20.0, fSpeed=speed, bStands=float(speed == 0.0))
+        assert table.ask(CHOOSE, nOthers=130.0)["nKind"] == kind, (speed, way)
+
+
 def test_what_failed_counts_a_slot_less_in_each_slot(blocks):
     table = Table(blocks)
     table.command(STOP)
