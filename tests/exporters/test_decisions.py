@@ -40,7 +40,7 @@ class Table:
         self.names = list(self.block.outputs)
         self.given = dict.fromkeys(self.block.inputs, 0.0)
         self.given |= {"fUnit": 1.0, "fLimit": 1.0, "fHighest": 50.0, "fLength": 0.25, "fReach": 10.0}
-        self.given["fMostChange"] = 0.05
+        self.given |= {"fMostChange": 0.05, "fBuildUp": 0.8}
         self.ask(BEGIN)
 
     def ask(self, order, **given):
