@@ -283,6 +283,15 @@ def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginn
     assert kinds(last) == {kind_of(WORDS["swings"])}
 
 
+@pytest.mark.parametrize(("left", "found"), [(0.02, True), (0.03, False)])
+def test_a_stop_that_errors_left_half_of_the_sway_for_may_use_it(left, found):
+    """Axes went on to their target, as no stop without any sway was to be found."""
+    orders = (REST, attrs.evolve(MOVE, end=700), order(700, CYCLES, STOP))
+    stopping = attrs.evolve(FAULTS["swings"], received=as_told(*orders))
+    stopping.issued["fSwayLeft"] = np.full(CYCLES, left)
+    assert (kind_of(WORDS["swings"]) in kinds(stopping)) == found
+
+
 def test_a_block_that_is_disabled_and_taken_over_has_no_fault():
     assert kinds(disabled()) == set()
 

@@ -197,8 +197,14 @@ class Followed:
 
     @cached_property
     def stopped_from(self) -> int:
-        """Cycle from which on a prompt stop may have left the machine as given swinging."""
-        return int(np.argmax(np.append(self.prompt_stops.any(axis=0), True)))
+        """Cycle from which on a stop may have left the machine as given swinging.
+
+        A prompt one, or one for which errors had left less than half of the allowed sway: it may use the rest.
+        """
+        left = self.issued.get("fSwayLeft", np.zeros(self.cycles))
+        stops = (order.begin for order in self.orders if order.kind == STOP)
+        crowded = (begin for begin in stops if left[max(begin - 1, 0)] > 0.5 * self.sway_limit)
+        return min(int(np.argmax(np.append(self.prompt_stops.any(axis=0), True))), next(crowded, self.cycles))
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""

@@ -132,7 +132,7 @@ def _unseen(run: Followed) -> float:
 
 def _asked(run: Followed, axis: int, begin: int) -> float:
     """Tell how far in m a stick that is let go of may lead an axis on, by what it asked for last."""
-    lasts = ACTS * SLOT * run.period
+    lasts = ACTS * (SLOT * run.period + 0.5 * run.cycle)  # of whole cycles
     since = begin - run.after(lasts)
     sticks = (o for o in run.orders if o.kind == VELOCITY and since < o.end and o.begin < begin)
     return lasts * max((min(abs(o.values[axis]), o.tops[axis]) for o in sticks), default=0.0)
