@@ -93,7 +93,7 @@ def test_all_axes_arrive_together_as_soon_as_the_slowest_can(block, target):
     assert ends[0] == ends[1] and np.argmax(out["bDone"]) - ends[0] in (1, 2)
     assert (out["fPosition_x"][-1], out["fPosition_y"][-1]) == target
     for axis, place in zip(LIMITS, target, strict=True):  # with time to spare, none goes beyond
-        assert out[f"fPosition_{axis}"].min() > -1e-9 and out[f"fPosition_{axis}"].max() < place + 1e-3
+        assert out[f"fPosition_{axis}"].min() > -1e-9 and out[f"fPosition_{axis}"].max() < place + 1.2e-3
     shorter, rate = CYCLE * ends[0] / 1.10, np.sqrt([G / ROPE])
     reached = [farthest(shorter, rate, limits[:3]) for limits in LIMITS.values()]
     assert any(reach < place for reach, place in zip(reached, target, strict=True))

@@ -32,7 +32,7 @@ def test_a_mode_that_would_turn_by_half_a_turn_or_a_whole_one_in_a_slot_is_left_
     block = CountedBlock(compile_counting(planner_block(spec).text), fActPosition=10.0, fL1=rope)
     block.hold(50)
     parts = [block.hold(2500, bExecute=1.0, fTarget=16.0), block.hold(700, bVelocity=1.0)]
-    parts += [block.hold(700, fVelocityCommand=-0.5), block.hold(1500, bVelocity=0.0, fVelocityCommand=0.0)]
+    parts += [block.hold(800, fVelocityCommand=-0.5), block.hold(1500, bVelocity=0.0, fVelocityCommand=0.0)]
     assert parts[0]["bDone"][-1]
     assert parts[2]["bInVelocity"][-1]
     acceleration, time = np.concatenate([part["fAcceleration"] for part in parts]), 0.01
