@@ -66,7 +66,7 @@ def _renamed(text: str, name: str, own: str) -> str:
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
     varied = c.stated_error > 0.0 and not c.rates
     stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
-    stated |= {"exact": not varied, "measured": c.sensor is not None, "stays": not c.rates}
+    stated |= {"exact": not varied and not c.rates, "measured": c.sensor is not None, "stays": not c.rates}
     stated["several"] = len(c.axes) > 1
     stated["prompt"] = may_stop_promptly(c)
     body = (FOLDER / "shell.st").read_text("ascii")
@@ -84,8 +84,6 @@ def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
         "prompt": "bPrompt := bPromptStop," if may_stop_promptly(c) else "",
         "operations": "nShare" if len(c.axes) > 1 else "nWork",
         "together": "nTogether := nTogether, bHeld := bHeld, " if len(c.axes) > 1 else "",
-        # a rope that changes is calmed on the way, and then while nothing forbids to move
-        "left_for_good": "(nState = cStanding) AND NOT bBegin AND" if c.rates else "",
         "first_suffix": c.axes[0].suffix,
         "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(c.live)),
         "shell_constants": constant_lines(_constants(c)),
