@@ -87,8 +87,8 @@ def test_a_target_behind_the_axis_replaces_a_plan_that_waits_to_begin(text, wait
     driver.hold(0.1, bVelocity=1).hold(6.0, fVelocityCommand=0.5).hold(1.5, fVelocityCommand=-0.5)
     place = driver.hold(12.37, bVelocity=0, bStop=1).parts[-1]["fPosition"][-1]
     driver.hold(waits, bStop=0, bExecute=1, fTarget=place + 9.0).hold(CYCLE, bExecute=0)
-    turned = driver.hold(6.0, bExecute=1, fTarget=1.0).parts[-1]
-    assert turned["fPosition"].max() < place + 0.2
+    back = driver.hold(6.0, bExecute=1, fTarget=1.0).parts[-1]
+    assert back["fPosition"].max() < place + 0.2
 
 
 def test_time_to_go_counts_the_turn(text):
