@@ -199,7 +199,7 @@ class Followed:
     def stopped_from(self) -> int:
         """Cycle from which on a stop may have left the machine as given swinging.
 
-        A prompt one, or one for which errors had left less than half of the allowed sway: it may use the rest.
+        A prompt one, or one for which errors had left less than half of the allowed sway, as it may use that.
         """
         left = self.issued.get("fSwayLeft", np.zeros(self.cycles))
         stops = (order.begin for order in self.orders if order.kind == STOP)
