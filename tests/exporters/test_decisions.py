@@ -74,7 +74,7 @@ def test_a_motion_is_sought_in_fewer_slots_until_none_is_left_between(blocks, co
         assert now == fewest
 
 
-def test_a_stop_that_is_not_found_quietly_for_two_periods_is_a_prompt_one_once(blocks):
+def test_a_stop_that_is_not_found_quietly_is_a_prompt_one_once(blocks):
     """A load that may hardly sway more kept an axis on its way of 23 m."""
     table = Table(blocks)
     table.command(STOP)
@@ -90,7 +90,7 @@ def test_a_stop_that_is_not_found_quietly_for_two_periods_is_a_prompt_one_once(b
     assert table.ask(CHOOSE)["nDoes"] == STOP
     short = Table(blocks)
     short.command(STOP)
-    short.fails(short.ask(CHOOSE, **given | {"nNow": 50.0}) | {"nLength": 49})
+    short.fails(short.ask(CHOOSE, **given | {"nNow": 40.0}) | {"nLength": 39})
     assert short.ask(CHOOSE)["nDoes"] == STOP
 
 
