@@ -45,16 +45,18 @@ def solve_newton(problem: BoundaryValueProblem, guess: Trajectory) -> NewtonOutc
     problem : BoundaryValueProblem
     guess : Trajectory
     """
-    current, damping = _iterate(problem, guess), 1.0
+    current, damping, before = _iterate(problem, guess), 1.0, 1.0  # of the motion's size
     if current is None:
         return NewtonOutcome(solution=None, iterations=1, residual=float("inf"))
     for iteration in range(1, problem.options.max_iterations + 1):
-        if current.step < problem.options.tolerance:  # the next error is of the order of its square
+        # to the solution, as the last steps let it be foreseen
+        distance = current.step * min(current.step / before, 1.0)
+        if distance < problem.options.tolerance:
             return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         trial = _iterate(problem, current.trajectory.blend(current.following, damping))
         if trial is not None and _shortens(problem, current, trial, damping):
             stalled = trial.step < ROUNDING_STEP and trial.step > SLOWER_THAN_NEWTON * current.step
-            current, damping = trial, min(1.0, 2.0 * damping)
+            current, damping, before = trial, min(1.0, 2.0 * damping), current.step
         else:
             stalled, damping = current.step < ROUNDING_STEP, damping / 2.0
         if stalled:

@@ -32,7 +32,7 @@ from gen_profile.support.work import spend
 BELIEVED_RATE = 0.01  # least quotient of steps that is taken for the rate of convergence
 SLOW_SIMPLIFIED = 0.5  # fraction of the step before beyond which another method is the better one
 CONTROLS_WORK = 1e-7  # s of work for the square of the number of controls
-MOST_CONTROLS = 800  # up to which to solve for all of them at once
+MOST_CONTROLS = 1200  # up to which to solve for all of them at once; above 1500 the full method is as quick
 
 
 @attrs.frozen(kw_only=True, eq=False)
