@@ -124,10 +124,8 @@ def plan_view(spec: Spec, places: Array) -> Panel:
         ends = Style(colour=colour, dash="dot", width=1.2)
         way, half = places[:, :, number, :2], np.array(size[:2]) / 2.0
         name = Phrase("swept by the {body}", body=body)
-        for part in [way] if straight else np.array_split(way, PARTS, axis=1):
-            corners = (part[..., None, :] + half * CORNERS).reshape(-1, 2)
-            outline = corners[ConvexHull(corners).vertices] if half.all() else part[0]
-            lines.append(Line(name, outline[:, 0], outline[:, 1], Style(colour=colour, fill=0.2)))
+        x, y = _covered(way, half, 1 if straight else PARTS).T
+        lines.append(Line(name, x, y, Style(colour=colour, fill=0.2)))
         name = Phrase("middle of the {body}, nominal", body=body)
         lines.append(Line(name, way[0, :, 0], way[0, :, 1], Style(colour=colour, width=1.8)))
         name = Phrase("{body} at start and target", body=body)
@@ -137,6 +135,20 @@ def plan_view(spec: Spec, places: Array) -> Panel:
     assert axes is not None
     x_label, y_label = (f"{names[axis]} (m)" for axis in axes.along)
     return Panel("From above", y_label, lines, x_label=x_label, even=True)
+
+
+def _covered(way: Array, half: Array, parts: int) -> Array:
+    """Outline what a box covers, (points, 2), by hulls of so many parts of its way; NaN is behind each.
+
+    They turn the same way round, so that they are one shape where they overlap.
+    """
+    ends = np.linspace(0, way.shape[1] - 1, parts + 1).astype(np.intp)
+    hulls: list[Array] = []
+    for first, last in pairwise(ends.tolist()):
+        corners = (way[:, first : last + 1, None] + half * CORNERS).reshape(-1, 2)
+        hulls += [corners[ConvexHull(corners).vertices] if half.all() else way[0, first : last + 1]]
+        hulls += [np.full((1, 2), np.nan)]
+    return np.concatenate(hulls)
 
 
 def is_straight(spec: Spec, places: Array) -> bool:
