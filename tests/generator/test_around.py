@@ -2,14 +2,17 @@
 
 from itertools import pairwise
 
+import attrs
 import numpy as np
 import pytest
 from generator.hall import BOXES, MACHINE, hall, shortage, two_masses
 
 import gen_profile as gp
-from gen_profile.methods.solvers.over_stacks.around import route_around
+from gen_profile.methods.solvers.over_stacks.around import route_around, way_of
 from gen_profile.methods.solvers.over_stacks.guide import blocks, guide_along, parting
 from gen_profile.methods.solvers.over_stacks.plan import sketched
+from gen_profile.methods.solvers.over_stacks.program import resting
+from gen_profile.methods.solvers.over_stacks.searches import StackSearch
 from gen_profile.presentation.charts.side_view import gone_around, path_figure
 from gen_profile.presentation.studio.curves_json import side_json
 from gen_profile.spec.plan_view import Area
@@ -137,11 +140,16 @@ class TestMotion:
         (wall,) = (line for line in side.lines if str(line.name) == "gone around")
         assert wall.y.max() == WALL[-1]
         assert max(line.y.max() for line in side.lines if str(line.name) == "stacks") == 3.5
-        swept = [line for line in above.lines if str(line.name) == "swept by the payload"]
-        assert len(swept) > 10
-        for line in swept:  # hulls of parts do not cover the wall, as one hull of all would
-            middle = np.array([line.x.mean(), line.y.mean()])
-            assert Area(tuple(WALL[:2]), tuple(WALL[2:4])).outside(*middle) > 0.5
+        (swept,) = (line for line in above.lines if str(line.name) == "swept by the payload")
+        points = np.stack([swept.x, swept.y], axis=1)
+        gaps = np.flatnonzero(np.isnan(swept.x))
+        hulls = [points[first + 1 : last] for first, last in pairwise([-1, *gaps])]
+        assert len(hulls) > 10
+        for hull in hulls:  # of parts do not cover the wall, as one hull of all would
+            assert Area(tuple(WALL[:2]), tuple(WALL[2:4])).outside(*hull.mean(axis=0)) > 0.5
+            x, y = hull.T
+            turning = x * np.roll(y, -1) - y * np.roll(x, -1)
+            assert turning.sum() > 0.0  # all alike, so they are one shape
         places = sketched(plan.spec)
         assert gone_around(plan.spec, places[None]) == {0}
         assert [one["number"] for one in side_json(plan.spec, places[None])["stacks"]] == [0, 1]
@@ -168,6 +176,15 @@ class TestMotion:
             times = np.linspace(0.0, one.motion.duration, 5001)
             jerks.append(np.square(one.motion.derivative(times, 3)[:, :2]).mean())
         assert jerks[0] < 0.5 * jerks[1]
+
+
+def test_lines_that_turned_with_a_worse_course_turn_back(monkeypatch):
+    search = StackSearch(bay=way_of(past_a_wall()))
+    bay = search.bay
+    course = attrs.evolve(resting(bay, bay.lifted(20.0, bay.top)), room=-1.0, miss=2.0)
+    monkeypatch.setattr(StackSearch, "solved", lambda *_: attrs.evolve(course, room=-0.5, miss=3.0))
+    assert search.in_turns(course) is course
+    assert search.bay is bay
 
 
 class TestRefusals:

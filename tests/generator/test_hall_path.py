@@ -109,6 +109,14 @@ class TestMotion:
         assert worst_of(plan, plan.motion, (0.9, 1.0, 1.1)) <= NEARER
 
     @pytest.mark.slow
+    def test_a_slow_hoist_has_an_answer_as_well(self):
+        hoist = {**LIMITS["axis"]["hoist"], "velocity": 0.05}
+        spec = hall(limits={"sway": 0.6, "axis": {**LIMITS["axis"], "hoist": hoist}})
+        plan = gp.plan(spec)
+        assert worst_of(plan, plan.motion, (0.9, 1.1)) <= NEARER
+        assert plan.motion.duration <= 1.01 * bay_of(spec).quickest_pass()
+
+    @pytest.mark.slow
     def test_without_robustness(self):
         found = gp.plan(hall(robustness={"method": None, "uncertain": None}))
         assert worst_of(found, found.motion, (1.0,)) <= NEARER

@@ -6,7 +6,19 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from generator.quay import RAIL, ROPE, SIDEWAYS, STACKS, WIDTH, followed, quay, shortage
+from generator.quay import (
+    ABOVE,
+    HEIGHT,
+    LIMITS,
+    RAIL,
+    ROPE,
+    SIDEWAYS,
+    STACKS,
+    WIDTH,
+    followed,
+    quay,
+    shortage,
+)
 from scipy.integrate import solve_ivp
 
 import gen_profile as gp
@@ -14,6 +26,8 @@ from gen_profile.assurance.verification.batch import Feed, many_machines, residu
 from gen_profile.dynamics.evaluation.clearance import nearest
 from gen_profile.dynamics.evaluation.simulation import body_places
 from gen_profile.dynamics.problem.dynamics import parameter_rows
+from gen_profile.methods.solvers.over_stacks.bay import bay_of
+from gen_profile.methods.solvers.over_stacks.program import MOST_INTERVALS, Program, resting
 from gen_profile.motion.profile import sample
 from gen_profile.presentation.charts.side_view import path_figure
 from gen_profile.presentation.report.build import report
@@ -89,6 +103,34 @@ class TestMotion:
         times = np.linspace(0.0, back.motion.duration, 20001)
         x, z, _ = followed(back.motion, ROPE, times)
         assert shortage(x, z, back.spec.path, 36.0, 0.0) <= NEARER
+
+
+class TestSlowHoists:
+    @pytest.mark.parametrize("velocity", [1.5, 0.05])
+    def test_the_least_time_is_known_about(self, plan, velocity):
+        """The lowest load is above the highest stack as long as the trolley takes past it, hardly longer."""
+        hoist = {**LIMITS["axis"]["hoist"], "velocity": velocity}
+        bay = bay_of(quay(limits={"sway": 1.5, "axis": {**LIMITS["axis"], "hoist": hoist}}))
+        low, high, top = STACKS[2]
+        level = RAIL - 1.1 * ROPE - 30.1 - HEIGHT / 2.0 - ABOVE
+
+        def held(duration):
+            times = np.linspace(0.0, duration, 200001)
+            return float((level + bay.lifted(duration, bay.top).at(times)[:, 0] >= top).mean() * duration)
+
+        least, past = bay.quickest_pass(), (high - low + WIDTH + 2.0 * SIDEWAYS) / 4.0
+        assert held(0.995 * least) < past <= held(1.005 * least)
+        if velocity == 1.5:
+            assert least == pytest.approx(plan.motion.duration, rel=0.03)
+
+    def test_long_intervals_are_integrated_as_finely(self):
+        bay = bay_of(quay(robustness={"method": None, "uncertain": None}))
+        programs = [
+            Program(bay=bay, about=resting(bay, bay.lifted(duration, bay.top))) for duration in (40.0, 400.0)
+        ]
+        assert [len(one.about.jerks) for one in programs] == [100, MOST_INTERVALS]
+        assert programs[1].step <= programs[0].step
+        assert [one.followed[0].states.shape[2] - 1 for one in programs] == [8, 40]
 
 
 class TestLook:

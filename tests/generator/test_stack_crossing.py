@@ -71,6 +71,14 @@ def test_the_hoist_goes_through_the_height_that_is_needed_without_a_rest():
     assert gp.plan(spec).motion.duration < 0.99 * bay.quickest_lift(bay.needed)
 
 
+def test_a_duration_just_above_the_shortest_has_a_motion_where_the_hoist_waits():
+    spec = random_bay(LOW_STACKS)
+    duration = round(1.003 * gp.plan(spec).motion.duration, 2)
+    found = gp.plan(gp.evolve_spec(spec, move={"duration": duration}))
+    assert found.motion.duration == pytest.approx(duration)
+    assert found.passage.nearest.room >= -NEARER
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", sorted({*range(BAYS), LOW_STACKS}))
 def test_no_other_program_is_much_quicker(number):

@@ -217,7 +217,9 @@ class ConicProgram:
         cones = len(sides) * [("SecondOrderConeT", sides.shape[1])]
         self._add(*self._giving(matrix, sides.ravel(), gives.ravel()), *cones)
 
-    def solve(self, quadratic: Entries, linear: Array, *, sharp: bool = True) -> ConicSolution:
+    def solve(
+        self, quadratic: Entries, linear: Array, *, sharp: bool = True, scaled: bool = True
+    ) -> ConicSolution:
         """Solve for a cost, P given whole and symmetric; it should be of the order of 1 or more.
 
         What is much smaller is not minimised: programs end when the cost is right to the tolerance.
@@ -228,6 +230,8 @@ class ConicProgram:
         linear : (variables,) array
         sharp : bool
             Whether the cost hardly curves: raised pivots would let such a program circle about its solution.
+        scaled : bool
+            Whether rows and variables are scaled first; some programs that are scaled well get stuck then.
         """
         settings = clarabel.DefaultSettings()
         settings.verbose = False
@@ -236,6 +240,7 @@ class ConicProgram:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = PROGRAM_TOLERANCE
         # refinement takes a third of the time, mostly without effect; equations alone need no more than it
         settings.iterative_refinement_enable = {kind for kind, _ in self._cones} == {"ZeroConeT"}
+        settings.equilibrate_enable = scaled
         settings.presolve_enable = False  # which would forbid to take over its structure
         solution = self._solved(quadratic, linear, settings, self._workspace)
         for asked, changes in _FURTHER_TRIES if sharp else (_RAISED, *_FURTHER_TRIES):

@@ -13,6 +13,7 @@ from gen_profile.dynamics.problem.linearization import linearize
 from gen_profile.methods.solvers.over_stacks.guide import Guide, Numbers
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces, Rates, highest, least_time
 from gen_profile.methods.solvers.over_stacks.swing import CARRIED, Swing, swing_of, swings_along
+from gen_profile.methods.solvers.search import Search, least
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant, decides
 from gen_profile.spec.model import AxisLimitsSpec, Spec
@@ -24,6 +25,7 @@ FINE = 4001  # times at which levels are compared; between them they are straigh
 UNLIMITED = 1e4  # in place of a limit of the trolley that is not stated
 EDGE = 1e-9  # s, to either side of a crossing
 PLAN = (StraightWay(), StraightWay(way=(0.0, 1.0)))  # both axes by themselves
+OVER = Search(precision=2e-3, close=2e-3, downward=True)  # for how long loads are above stacks
 LEVEL = 1e-5  # m, by which a level may be too low: between the times at which it is known it is higher
 
 
@@ -200,6 +202,32 @@ class Bay:
     def quickest_lift(self, lift: float) -> float:
         """Least time in s that the hoist takes to rest at a height and go on from there to the target."""
         return least_time(lift, self.rates) + least_time(self.rise - lift, self.rates)
+
+    def quickest_pass(self) -> float:
+        """Estimate the least time in s in which the hoist holds loads above stacks until the trolley is past.
+
+        It goes at full speed from before one stack to behind another one; ways around something count for
+        nothing. As loads swing, it may take longer, or less.
+        """
+        passed = [zone for zone in self.zones if self.passes(zone) and not zone.overhead]
+        speed = self.limits[0].velocity or UNLIMITED
+        ends = np.array([(zone.low, zone.high) for zone in passed]).reshape(-1, 2)
+        (before, behind) = np.sort(np.sign(self.target[0] - self.start[0]) * ends).T
+        ways = behind - before[:, None] if self.guide is None else np.zeros((len(passed), len(passed)))
+
+        def excess(duration: float) -> float:
+            up = self.lifted(duration, self.top)
+            if up is None or up.peak() < self.needed:
+                return math.inf
+            fine = np.linspace(0.0, duration, FINE)
+            lift = up.at(fine)[:, 0]
+            held = [_crossings(fine, self.hang[:, zone.body].min() + lift, zone.top) for zone in passed]
+            rises, falls = np.array(held).reshape(-1, 2).T
+            lacking = np.where(ways > 0.0, ways / speed - (falls - rises[:, None]), -math.inf)
+            return float(lacking.max(initial=-duration)) / duration
+
+        found = least(excess, self.quickest_lift(self.needed), OVER)
+        return self.quickest_lift(self.needed) if found is None else found
 
     def lifted(self, duration: float, top: float, waits: tuple[float, float] = (0.0, 0.0)) -> Pieces | None:
         """Find the hoist's motion upwards, at most as high as the top; none in too little time."""

@@ -66,7 +66,7 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
     InfeasibleProblem, SolverDiverged
         With what is in the way, and by how much.
     """
-    began, reserve = time.perf_counter(), RESERVE
+    began, reserve, before = time.perf_counter(), RESERVE, -math.inf
     progress("solving")
     planner = StackSearch(bay=way_of(spec, reserve))
     _require_height(planner.bay)
@@ -81,7 +81,9 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
         near = _nearest(spec, motion)
         if near.room >= -ENOUGH:
             break
-        reserve += OVERALL - near.room
+        if near.room < before + ENOUGH:
+            planner.lengthen()
+        reserve, before = reserve + OVERALL - near.room, near.room
         planner.bay = bay_of(spec, reserve, planner.bay.guide)
     else:
         raise none_found(planner.bay)
@@ -113,7 +115,7 @@ def sketched(spec: Spec) -> Array | None:
     planner, lifted = StackSearch(bay=bay), partial(bay.lifted, top=bay.top)
     course: Course | None = None
     if spec.move.shortest:
-        start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
+        start = max(bay.quickest_pass(), bay.quickest_travel())
         course = planner.quickest(lifted, start, ROUGH if bay.guide is None else FIRST)
     elif (up := lifted(spec.move.duration)) is not None:
         course = planner.solved(resting(bay, up))

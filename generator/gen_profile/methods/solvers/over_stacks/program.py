@@ -20,6 +20,8 @@ from gen_profile.methods.solvers.over_stacks.swing import CARRIED, FollowedMachi
 from gen_profile.motion.profile import Array
 
 INTERVAL = 0.4  # s, about, of constant jerk
+MOST_INTERVALS = 200  # longer ones have more steps of integration
+ROUNDING = 0.25  # of an interval, by which it may be longer than usual
 STEPS, FEW_STEPS = 8, 4  # in each interval; few suffice as long as durations are searched roughly
 MARGIN = 0.3  # m, of spare room that is worth knowing
 MISSING = 30.0  # times a metre too near to a stack, a metre beside the target counts
@@ -62,7 +64,7 @@ class Course:
 
 def resting(bay: Bay, up: Pieces) -> Course:
     """Begin where everything hangs still at the start."""
-    intervals = max(math.ceil(up.duration / INTERVAL), 4)
+    intervals = min(max(math.ceil(up.duration / INTERVAL), 4), MOST_INTERVALS)
     begin = np.tile(bay.begin, (intervals + 1, 1))
     other = np.tile(bay.begin[: bay.others.states], (len(bay.machines) - 1, intervals + 1, 1))
     return Course(up=up, jerks=np.zeros((intervals, len(bay.lines))), nodes=(begin, other))
@@ -70,26 +72,36 @@ def resting(bay: Bay, up: Pieces) -> Course:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Program:
-    """All machines linear about a course, in so many steps of every interval."""
+    """All machines linear about a course, looked at in so many steps of every interval."""
 
     bay: Bay
     about: Course
     steps: int = STEPS
 
     @property
+    def finer(self) -> int:
+        """Times as many steps of integration as others, in intervals that are longer."""
+        return max(1, math.ceil(self.about.up.duration / len(self.about.jerks) / INTERVAL - ROUNDING))
+
+    @property
+    def count(self) -> int:
+        """Steps of integration in each interval."""
+        return self.finer * self.steps
+
+    @property
     def step(self) -> float:
         """Of integration in s."""
-        return self.about.up.duration / len(self.about.jerks) / self.steps
+        return self.about.up.duration / len(self.about.jerks) / self.count
 
     @cached_property
     def followed(self) -> list[FollowedMachines]:
         """What the machines do, the nominal one first; each is alone along the first axis."""
         bay, about = self.bay, self.about
         intervals = len(about.jerks)
-        half = np.arange(2 * self.steps * intervals + 1) * self.step / 2.0
+        half = np.arange(2 * self.count * intervals + 1) * self.step / 2.0
         lifted = -about.up.at(half.astype(np.float64))[:, :3]
         lifted[:, 0] += bay.spec.move.start[bay.hoist]
-        rows = np.arange(intervals)[:, None] * 2 * self.steps + np.arange(2 * self.steps + 1)
+        rows = np.arange(intervals)[:, None] * 2 * self.count + np.arange(2 * self.count + 1)
         nominal, others = about.nodes
         follow = partial(followed, jerks=about.jerks, hoist=lifted[rows], step=self.step)
         first = follow(bay.nominal, nominal[None, :-1], bay.machines[:1])
@@ -189,7 +201,7 @@ class Program:
         weight[jerks], linear[jerks] = 1.0 / scale, self.about.jerks / scale
         linear[-1], linear[-2] = (DEAR, 0.0) if smooth else (1.0, MISSING)
         costs = squares(weight[:, None, None], np.arange(self.variables)[:, None])
-        solution = program.solve(costs, linear)
+        solution = program.solve(costs, linear, scaled=False)
         if solution.verdict is not ConicStatus.SOLVED:
             return None
         return attrs.evolve(self._course(solution.x, jerks), smooth=smooth)
@@ -225,7 +237,7 @@ class Program:
 
     def _trolley(self, program: ConicProgram) -> None:
         """Hold travel, velocity, acceleration and jerk to limits, by control points of half intervals."""
-        jerks, span = self.about.jerks, self.step * self.steps
+        jerks, span = self.about.jerks, self.step * self.count
         intervals = np.arange(len(jerks))
         for line, limits in enumerate(self.bay.limits):
             carried = CARRIED * line + np.arange(CARRIED)
@@ -265,7 +277,7 @@ class Program:
         """Keep the bodies of a machine beside stacks while they are low."""
         bay, up = self.bay, self.about.up
         every = self.steps // FEW_STEPS
-        grid = np.arange(every, len(self.about.jerks) * self.steps + 1, every) * self.step
+        grid = np.arange(every, len(self.about.jerks) * self.count + 1, every) * self.step
         events = bay.events(machine, up)
         times = np.unique(np.concatenate([grid, events - 1e-7, events, events + 1e-7]))
         times = times[(times > 0.0) & (times <= up.duration)]
@@ -280,8 +292,8 @@ class Program:
     def _at(self, machine: int, body: int, times: Array) -> tuple[Numbers, Array, Array]:
         """Tell where a body of a machine is at some times, straight between steps, and its derivatives."""
         one, (intervals, lines) = self.followed[machine], self.about.jerks.shape
-        number = np.minimum((times / self.step).astype(np.intp), intervals * self.steps - 1)
-        k, j = np.divmod(number, self.steps)
+        number = np.minimum((times / self.step).astype(np.intp), intervals * self.count - 1)
+        k, j = np.divmod(number, self.count)
         share, own = (times / self.step - number)[:, None], slice(lines * body, lines * (body + 1))
         now = (1.0 - share) * one.seen[0, k, j, own] + share * one.seen[0, k, j + 1, own]
         weights = share[:, None]
@@ -294,7 +306,7 @@ class Program:
         if limit is None:
             return
         one, intervals = self.followed[machine], np.arange(len(self.about.jerks))
-        every = 1 if lines == 1 else self.steps // FEW_STEPS
+        every = self.finer if lines == 1 else self.count // FEW_STEPS
         now, along = one.seen[0, :, every::every, -lines:], one.seen_along[0, :, every::every, -lines:]
         if lines == 1:
             matrix = self._rows(intervals, along[:, :, 0], machine)

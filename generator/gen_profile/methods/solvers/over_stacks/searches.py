@@ -10,10 +10,16 @@ import numpy as np
 from gen_profile.methods.solvers.draft import in_cycles
 from gen_profile.methods.solvers.over_stacks.bay import Bay
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
-from gen_profile.methods.solvers.over_stacks.program import FEW_STEPS, STEPS, Course, Program, resting
+from gen_profile.methods.solvers.over_stacks.program import (
+    FEW_STEPS,
+    MISSING,
+    STEPS,
+    Course,
+    Program,
+    resting,
+)
 from gen_profile.methods.solvers.over_stacks.swing import CARRIED
 from gen_profile.methods.solvers.search import Search, least
-from gen_profile.motion.profile import Array
 from gen_profile.spec.values import LONGEST_MOVE
 from gen_profile.support.errors import Code, Reason, SolverDiverged
 from gen_profile.support.phrase import Phrase
@@ -34,6 +40,7 @@ NEARLY = (
 )
 SHORTER, LEAST_SHORTER = 0.12, 4e-3  # of the duration, by which a way around something is shortened at once
 MORE, LESS = 1.3, 0.4  # times as much next, where it has room or has not
+LENGTHENED = 1.005  # times as long, where asking for more clearance gives none
 LEAST_WINDOW = 0.4  # s, by which loads may pass corners early or late
 
 Lifted = Callable[[float], Pieces | None]  # from a duration in s to the hoist's motion
@@ -57,7 +64,7 @@ class StackOptions:
         and times as large from one to the next.
     """
 
-    answer: tuple[float, float] = (16.0, 40.0)
+    answer: tuple[float, float] = (24.0, 40.0)
     rounds: int = 8
     tries: int = 12
     longer: float = 2e-3
@@ -95,8 +102,8 @@ class StackSearch:
             if course is None:
                 return math.inf
             found[duration] = course
-            lacking = max(-course.room, course.miss) if course.miss > ENOUGH else -course.room
-            return (lacking - ENOUGH) / max(self.bay.way, 1.0)
+            missing = max(-course.room, course.miss) if course.miss > ENOUGH else -course.room
+            return (missing - ENOUGH) / max(self.bay.way, 1.0)
 
         duration = least(excess, start, search, LONGEST_MOVE)
         return None if duration is None else found[duration]
@@ -129,10 +136,17 @@ class StackSearch:
             longer *= self.options.growth
         raise none_found(bay)
 
+    def lengthen(self) -> None:
+        """Take more time than the least that was found: its machines lack what no greater clearance gives."""
+        if self.chosen is not None:
+            course, lifted = self.chosen
+            up = lifted(LENGTHENED * course.up.duration)
+            self.chosen = course if up is None else stretched(course, up), lifted
+
     def linear(self) -> tuple[Course, Lifted]:
         """Find how the hoist lifts, and the quickest course of machines that are linear about another."""
         bay, alone = self.bay, StackSearch(bay=self.bay.alone())
-        start = max(bay.quickest_lift(bay.needed), bay.quickest_travel())
+        start = max(alone.bay.quickest_pass(), bay.quickest_travel())
         lifted: Lifted = partial(bay.lifted, top=bay.top)
         if bay.guide is None:
             rough = _there(bay, alone.quickest(lifted, start, ROUGH))
@@ -146,23 +160,24 @@ class StackSearch:
             rough = with_others(bay, rough)
         near = self.solved(rough) or rough
         if len(bay.machines) > 1:
-            near = _there(bay, self.quickest(lifted, near.up.duration, ROUGH, near))
+            start = max(bay.quickest_pass(), near.up.duration)
+            near = _there(bay, self.quickest(lifted, start, ROUGH, near))
         return self.quickest(lifted, near.up.duration, EXACT, near) or near, lifted
 
     def shortened(self, course: Course, lifted: Lifted) -> Course:
         """Shorten a way around something; lines past corners turn when loads pass them."""
-        shorter, least = SHORTER, max(self.bay.quickest_lift(self.bay.needed), self.bay.directly())
+        shorter, least = SHORTER, max(self.bay.quickest_pass(), self.bay.directly())
         while shorter > LEAST_SHORTER:
             duration = max((1.0 - shorter) * course.up.duration, least)
             up = lifted(duration)
             window = max(shorter * course.up.duration / 2.0, LEAST_WINDOW)
-            before, self.bay = self.bay, self.bay.guided_by(self.places(course), window / course.up.duration)
+            before, self.bay = self.bay, self.guided(course, window / course.up.duration)
             again = None if up is None else self.solved(stretched(course, up), FEW_STEPS)
             if again is not None and has_room(again):
                 course, shorter = again, MORE * shorter
             else:
                 self.bay, shorter = before, LESS * shorter
-        self.bay = self.bay.guided_by(self.places(course), LEAST_WINDOW / course.up.duration)
+        self.bay = self.guided(course, LEAST_WINDOW / course.up.duration)
         return course
 
     def in_turns(self, course: Course) -> Course:
@@ -170,16 +185,17 @@ class StackSearch:
         for _ in range(self.options.rounds):
             if has_room(course):
                 break
-            self.bay = self.bay.guided_by(self.places(course), LEAST_WINDOW / course.up.duration)
+            before, self.bay = self.bay, self.guided(course, LEAST_WINDOW / course.up.duration)
             again = self.solved(course, FEW_STEPS)
-            if again is None or again.room <= course.room:
+            if again is None or lacking(again) >= lacking(course):
+                self.bay = before
                 break
             course = again
         return course
 
-    def places(self, course: Course) -> Array:
-        """Where the nominal machine's bodies are at even times of a course."""
-        return Program(bay=self.bay, about=course).places
+    def guided(self, course: Course, window: float) -> Bay:
+        """Let lines past corners turn with the nominal machine's bodies on a course."""
+        return self.bay.guided_by(Program(bay=self.bay, about=course).places, window)
 
     def otherwise_lifted(self, best: Course, lifted: Lifted, needed: float) -> tuple[Course, Lifted]:
         """Look for a lower top, then for waits of the hoist, that are quicker: where the trolley decides.
@@ -218,7 +234,9 @@ class StackSearch:
                 if settled is not None:
                     return settled
             self.bay = bay  # lines that turned with a course which is none would mislead the next one
-        return None
+        quickest, lifted = self.chosen = self.chosen or self.linear()
+        up = lifted(duration) if quickest.up.duration <= duration else None
+        return None if up is None else self.settled(stretched(quickest, up))
 
     def settled(self, course: Course) -> Course | None:
         """Linearise anew until machines do what the program says; the smoothest such course, with room."""
@@ -228,7 +246,9 @@ class StackSearch:
                 break
             self.programs += 1
             smoother = program.solve(smooth=True)
-            if smoother is None:
+            if smoother is None or (
+                course.smooth and not has_room(smoother) and smoother.room < course.room + ENOUGH
+            ):
                 return None
             course = smoother
         return course if has_room(course) else None
@@ -237,6 +257,11 @@ class StackSearch:
 def has_room(course: Course) -> bool:
     """Whether a course reaches its target with nearly as much room as it shall have."""
     return course.room >= -ENOUGH and course.miss <= ENOUGH
+
+
+def lacking(course: Course) -> float:
+    """Weigh what a course lacks as programs do: room to stacks, and its way to the target, which is dear."""
+    return MISSING * course.miss - course.room
 
 
 def with_others(bay: Bay, course: Course) -> Course:
