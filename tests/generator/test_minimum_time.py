@@ -310,6 +310,20 @@ def test_other_machines_have_a_motion_of_every_duration_from_the_shortest_on(see
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("only_counted_work")
+@pytest.mark.parametrize("duration", [13.876, 14.015])  # the shortest, and 1 % more
+def test_a_motion_that_takes_many_programs_to_follow_the_equations_has_the_work_for_them(duration):
+    """Thirteen on 111 intervals, half of the work that is left: no other start leads to one."""
+    machine = "plant={type='hall-crane', L0=2.2237, L2=2.058, m1=309.58, m2=5867.8, c=236.04}"
+    limits = ["limits.velocity=0.97901", "limits.acceleration=0.51747"]
+    move = ["move.target=[10.293, 4.1172, 1.9414]", f"move.duration={duration}"]
+    with budget(*choice.ANSWER):
+        assert choice.keeps_limits(
+            choice.attempt(problem_of(preset_spec("hall-crane", [machine, *limits, *move])))
+        )
+
+
+@pytest.mark.slow
 def test_what_is_only_not_found_is_not_called_impossible():
     """Half a per cent below the shortest no bound says that there is none; at half of it one does."""
     limits = ["robustness.uncertain={L1=0.1}", *LIMITED["double-pendulum-crane"]]

@@ -49,6 +49,7 @@ MOST_VIOLATED = 1.25
 KEPT_AS_WIDE = 1.0 - 1e-5  # likewise, where no finer mesh is needed to keep them
 FINER_MESHES = 0.4  # of the work that is left, for finer meshes that keep the limits
 STARTING = 0.85  # likewise, for what begins at rest
+FOLLOWING = 0.7  # likewise, for the motion next to that of least violation that follows the equations
 # likewise, for the least cost from two other starts, after which the motion of least violation will do
 OTHER_STARTS = 0.4, 0.9
 # where a mesh is bisected already, and the motion of least violation known that follows the equations
@@ -166,7 +167,7 @@ def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Soluti
         spend(0.0)
     start, kept = near.start(problem), None
     if start is not None and near.wider <= 1.0:
-        following = afford(partial(direct.next_to, problem, start), OTHER_STARTS[0] * left())
+        following = afford(partial(direct.next_to, problem, start), FOLLOWING * left())
         if following is not None and following.verdict is ConicStatus.SOLVED:
             start, motion = following, direct.conclude(following, following.iterations)
             kept = attrs.evolve(motion, other_costs=()) if keeps_limits(motion) else None
