@@ -268,7 +268,7 @@ def test_a_value_that_takes_too_much_work_leaves_enough_for_an_ample_one(monkeyp
 
     monkeypatch.setattr(suggestions, "tried", tried)
     with budget(16.0):
-        found = suggestions.least_change(spec, lambda factor: {"move.duration": factor}, fraction=0.5)
+        found = suggestions.least_change(spec, lambda factor: {"move.duration": factor})
     assert 1.3 <= found.values["move.duration"] < 1.4
 
 

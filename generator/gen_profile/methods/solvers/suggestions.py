@@ -62,8 +62,8 @@ class SuggestionOptions:
     widest : float
         Times as wide as they are, all limits together are worth naming.
     fraction, fraction_later : float
-        Of the work that is left, which one suggestion may take, and one duration tried; and a longer move in
-        all, which nearly always works.
+        Of the work that is left, which one suggestion may take, and one value tried on few intervals; and a
+        longer move in all, which nearly always works.
     at_once : float
         s of work, in which a motion without limits is found, or is not worth the while.
     """
@@ -229,7 +229,6 @@ def least_change(
     spec: Spec,
     change: Change,
     known_spread: float = 1.0,
-    fraction: float = 1.0,
     options: SuggestionOptions = USUAL,
 ) -> Suggestion | None:
     """Find the least factor of a change that works, as near as the work that is left allows.
@@ -241,8 +240,6 @@ def least_change(
         What a factor makes of the spec's values.
     known_spread : float
         How many times as much as the nominal machine the worst one is supposed to sway.
-    fraction : float
-        Of the work that is left, which one factor may take.
     options : SuggestionOptions
     """
     coarsely, finely = options.search, attrs.evolve(options.search, close=math.inf)
@@ -250,7 +247,8 @@ def least_change(
     @cache
     def solved(factor: float, *, coarse: bool) -> Plan:
         changed = spec.changed(change(factor))
-        solution = afford(partial(tried, changed, coarse=coarse, options=options), fraction * left())
+        share = options.fraction if coarse else 1.0
+        solution = afford(partial(tried, changed, coarse=coarse, options=options), share * left())
         return drafted(changed, solution or choice.given_up(problem_of(changed)))
 
     def excess(factor: float, *, coarse: bool) -> float:
@@ -304,7 +302,7 @@ def _longer(
 
     most = options.most if time_dependent_limits(relaxation.problem) else options.most_later
     options = attrs.evolve(options, most=most, farther=options.farther_later)
-    return least_change(spec, change, relaxation.problem.sway_spread, options.fraction, options)
+    return least_change(spec, change, relaxation.problem.sway_spread, options)
 
 
 def _wider_limits(
@@ -329,7 +327,7 @@ def _wider_limits(
             for place, value in limits.items()
         }
 
-    return least_change(spec, change, relaxation.problem.sway_spread, options=options)
+    return least_change(spec, change, relaxation.problem.sway_spread, options)
 
 
 def _less_robust(spec: Spec, options: SuggestionOptions) -> Suggestion | None:
