@@ -49,7 +49,7 @@ def test_a_motion_by_which_the_load_does_not_rest_is_none_and_a_longer_one_is_na
     with pytest.raises(gp.SolverDiverged, match="there may be one") as refusal:
         gp.plan(preset_spec("gantry-crane", [*MOVE, "plant.L=11", "limits.velocity=3.3"]))
     (longer, *_) = refusal.value.suggestions
-    assert 9.0 < longer.values["move.duration"] < 13.0
+    assert 9.0 < longer.values["move.duration"] < 16.0
     assert gp.plan(longer.spec).figures["sway_residual_peak_m"] < 1e-3
 
 

@@ -294,7 +294,7 @@ def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     steps = np.diff(source.at_sync[:300, 0])  # until it stops
     assert steps.max() == pytest.approx(0.15 * COUNTS * CYCLE, rel=0.01)
     way = source.at_sync[:, 0]
-    assert (np.maximum.accumulate(way) - way).max() < 0.005 * COUNTS  # it may back up for the load, by a hair
+    assert (np.maximum.accumulate(way) - way).max() < 0.01 * COUNTS  # it may back up for the load, a little
     assert any("stick at 0.15 m/s" in words for words in bench.phases)
 
 
