@@ -134,8 +134,8 @@ def least_widening(problem: Problem, machine: LinearMachine) -> float:
     if solution.verdict is not ConicStatus.SOLVED:
         return 0.0
     weighed = (solution.multipliers[0] @ (gains * units / sizes)).reshape(len(axes), -1)
-    bends = np.abs(np.diff(weighed, 2, axis=1)).sum()
-    return float(solution.x[-1]) / (1.0 + float(bends) * step / 12.0)
+    curvature = np.abs(np.diff(weighed, 2, axis=1)).sum()
+    return float(solution.x[-1]) / (1.0 + float(curvature) * step / 12.0)
 
 
 def linear_machine(problem: Problem) -> LinearMachine | None:
