@@ -180,7 +180,7 @@ class TestRefusals:
             walls,
             move={"start": [0.0, 30.1], "target": [22.5 + WIDTH / 2.0 + SIDEWAYS, 26.0]},
             check={"residual_sway": 0.005},
-            robustness={"uncertain": {"L0": 0.5}},
+            robustness={"uncertain": {"L0": 0.8}},
         )
         with pytest.raises(gp.SolverDiverged, match=r"stack from 20\.1 to 22\.5 m.* it has 0 m more at the"):
             gp.plan(spec)

@@ -39,7 +39,7 @@ SLIGHTLY = 1e-6  # likewise, at which angles are
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class LinearMachine:
+class DrivenMachine:
     """A machine at rest, dimensionless: ``y' = A y + B q̈_a``, from `start` to ``end y = 0``.
 
     Attributes
@@ -97,7 +97,7 @@ def impossible(problem: Problem) -> bool:
         return least_widening(longer, machine) > 1.0 + NOTICED + swings**2 / 2.0
 
 
-def least_widening(problem: Problem, machine: LinearMachine) -> float:
+def least_widening(problem: Problem, machine: DrivenMachine) -> float:
     """Bound from below how many times as wide limits must be for a machine; 0 where nothing is known."""
     axes, n = _axes(problem, machine), len(machine.A)
     if not axes or any(problem.final_velocity):
@@ -138,7 +138,7 @@ def least_widening(problem: Problem, machine: LinearMachine) -> float:
     return float(solution.x[-1]) / (1.0 + float(curvature) * step / 12.0)
 
 
-def linear_machine(problem: Problem) -> LinearMachine | None:
+def linear_machine(problem: Problem) -> DrivenMachine | None:
     """Linearise the nominal machine at rest; None where it changes with its axes' places, or a drive lags."""
     if problem.tau is not None:
         return None
@@ -163,7 +163,7 @@ def linear_machine(problem: Problem) -> LinearMachine | None:
         angles = machine.equations.angle(states, still, machine.parameters)[:, :, 0].T / SLIGHTLY
         if not angles.any():  # which says nothing of how far it is from linear
             return None
-    return LinearMachine(
+    return DrivenMachine(
         A=at_rest[0, :, :n],
         B=at_rest[0, :, n + 2 * m :],
         start=machine.start,
@@ -172,13 +172,13 @@ def linear_machine(problem: Problem) -> LinearMachine | None:
     )
 
 
-def nothing(axes: int) -> LinearMachine:
+def nothing(axes: int) -> DrivenMachine:
     """No load at all on axes."""
     none = np.zeros((0, 0))
-    return LinearMachine(A=none, B=np.zeros((0, axes)), start=np.zeros(0), end=none, angles=none)
+    return DrivenMachine(A=none, B=np.zeros((0, axes)), start=np.zeros(0), end=none, angles=none)
 
 
-def _axes(problem: Problem, machine: LinearMachine) -> list[_Axis]:
+def _axes(problem: Problem, machine: DrivenMachine) -> list[_Axis]:
     """List the axes whose rates are limited."""
     limited = [_rates(problem, column) for column in range(len(problem.target))]
     return [
@@ -194,7 +194,7 @@ def _rates(problem: Problem, column: int) -> Array:
     return np.array([math.inf if limit is None else limit for limit in stated])
 
 
-def _driving(problem: Problem, machine: LinearMachine, column: int, order: int) -> _Axis:
+def _driving(problem: Problem, machine: DrivenMachine, column: int, order: int) -> _Axis:
     """Find what a derivative of an axis does to a machine; its velocity acts on y less B times itself."""
     n = len(machine.A)
     flow = np.zeros((n + order + 1, n + order + 1))  # states, the axis' lower derivatives, and u
@@ -210,7 +210,7 @@ def _driving(problem: Problem, machine: LinearMachine, column: int, order: int) 
     return _Axis(column=column, order=order, limits=limits, gains=np.array(gains[::-1]).T)
 
 
-def _unmoved_by_others(problem: Problem, machine: LinearMachine, axes: Sequence[_Axis]) -> NDArray[np.bool_]:
+def _unmoved_by_others(problem: Problem, machine: DrivenMachine, axes: Sequence[_Axis]) -> NDArray[np.bool_]:
     """Tell which end conditions axes without limits do not change."""
     free = set(range(len(problem.target))) - {axis.column for axis in axes}
     moved = [_driving(problem, machine, column, 2).gains[: len(machine.A)] for column in free]
@@ -218,7 +218,7 @@ def _unmoved_by_others(problem: Problem, machine: LinearMachine, axes: Sequence[
     return np.asarray(np.max([np.zeros(len(machine.end)), *changes], axis=0) <= UNFELT)
 
 
-def _greatest_angle(problem: Problem, machine: LinearMachine) -> float:
+def _greatest_angle(problem: Problem, machine: DrivenMachine) -> float:
     """Bound in rad how far any motion within the limits can swing a linear machine."""
     if not len(machine.angles):
         return 0.0
