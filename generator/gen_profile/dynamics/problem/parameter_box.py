@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from gen_profile.dynamics.problem.linearization import eigenvalues_at
 from gen_profile.dynamics.problem.problem import Problem
-from gen_profile.dynamics.problem.sampling import halton
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 
@@ -176,11 +175,14 @@ def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:
     steps = np.array([1.0 / (len(line) - 1) for line in lines])
     if ranges == 1:
         return Start(places=lines[0], steps=steps)
+    from scipy.stats import qmc  # noqa: PLC0415  # half a second
+
     corners = list(product((0.0, 1.0), repeat=ranges)) if ranges <= CORNERS else []
-    coarse = halton(min(FEWEST_SPREAD * ranges, most), ranges)
+    points = qmc.Halton(ranges, scramble=False)
+    coarse = points.random(min(FEWEST_SPREAD * ranges, most))
     span = np.ptp(phase_of(np.concatenate([coarse, *lines])), axis=0)
     count = int(min(np.prod(1.0 + span), most))
-    spread = [coarse, halton(max(count - len(coarse), 0), ranges, begin=len(coarse)), *_on_faces(coarse)]
+    spread = [coarse, points.random(max(count - len(coarse), 0)), *_on_faces(coarse)]
     return Start(places=np.concatenate([np.array(corners).reshape(-1, ranges), *lines, *spread]), steps=steps)
 
 
