@@ -23,6 +23,7 @@ READ, WRITE, READ_WRITE = 2, 3, 9  # commands
 HANDLE, VALUE, RELEASE, UPLOAD, UPLOAD_INFO = 0xF003, 0xF005, 0xF006, 0xF00B, 0xF00F  # index groups
 UNKNOWN_COMMAND, UNKNOWN_GROUP, BAD_SIZE, NO_SYMBOL, OLD_SYMBOL = 0x8, 0x702, 0x705, 0x710, 0x711
 STRUCTURE, LARGEST = 65, 1 << 20  # data type of the entry of an instance; bytes of a telegram
+POLL = 0.02  # s, within which the server notices that it is to end
 TYPES = {"b": np.dtype("?"), "n": np.dtype("<i4")}  # of variables, by their first letter; others are LREAL
 
 
@@ -57,7 +58,7 @@ class SimulatedAdsController(SimulatedController):
         except OSError as error:
             raise OutputError(f"port {self.port}: {error.strerror}; name another one.") from error
         with server:
-            threading.Thread(target=server.serve_forever, daemon=True).start()
+            threading.Thread(target=server.serve_forever, args=(POLL,), daemon=True).start()
             try:
                 yield f"ads://{LOOPBACK}:{self.port}/{NET_ID}:{AMS_PORT}"
             finally:

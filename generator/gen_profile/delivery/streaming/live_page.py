@@ -20,6 +20,7 @@ from gen_profile.delivery.streaming.live import OVER, Glance, View
 LOOPBACK = "127.0.0.1"
 MOST_POINTS = 500  # of a curve
 FAREWELL = 0.5  # s, for the page to see the end
+POLL = 0.02  # s, within which the server notices that it is to end
 FILES = {
     "": ("live.html", "text/html; charset=utf-8"),
     "live.js": ("live.js", "text/javascript; charset=utf-8"),
@@ -60,7 +61,7 @@ class Server(ThreadingHTTPServer):
         return f"http://{self.host}{self.path}"
 
     def __enter__(self) -> Server:
-        Thread(target=self.serve_forever, daemon=True).start()
+        Thread(target=self.serve_forever, args=(POLL,), daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
