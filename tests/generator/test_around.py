@@ -106,6 +106,7 @@ class TestLines:
         assert normals[-200:] == pytest.approx(np.tile((-1.0, 0.0), (200, 1)))
 
 
+@pytest.mark.slow
 class TestMotion:
     def test_hook_and_load_keep_the_clearance(self, plan):
         assert worst_of(plan, (1.0,)) <= NEARER
@@ -154,7 +155,6 @@ class TestMotion:
         assert gone_around(plan.spec, places[None]) == {0}
         assert [one["number"] for one in side_json(plan.spec, places[None])["stacks"]] == [0, 1]
 
-    @pytest.mark.slow
     def test_no_rope_of_the_range_comes_nearer(self):
         spec = hall(path={"stacks": [BOXES[0], [*BOXES[1][:4], 9.0]]})
         plan = gp.plan(spec)
@@ -165,7 +165,6 @@ class TestMotion:
             _, load = two_masses(plan.motion, {**MACHINE, "L0": rope * MACHINE["L0"]}, whole)
             assert np.abs(load[-1001:, :2] - np.array(spec.move.target[:2])).max() <= 0.05
 
-    @pytest.mark.slow
     def test_more_time_is_used_for_less_jerk(self, plan):
         longer = gp.plan(
             past_a_wall(move={"start": [2.0, 4.0, 6.0], "target": [26.0, 5.0, 5.0], "duration": 40.0})

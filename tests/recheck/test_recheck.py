@@ -190,6 +190,7 @@ def test_forgeries_are_refused_by_both(quick, tmp_path, forge, said):
         check(*contents(artefact, certificate))
 
 
+@pytest.mark.slow
 def test_an_altered_setpoint_is_refused_though_the_hash_is_made_to_fit(copied):
     artefact, certificate = copied
     lines = artefact.read_text().splitlines()
@@ -208,6 +209,7 @@ def test_an_altered_setpoint_is_refused_though_the_hash_is_made_to_fit(copied):
         check(*contents(artefact, certificate))
 
 
+@pytest.mark.slow
 def test_a_spec_with_other_limits_is_refused_though_its_hash_is_written_into_the_certificate(copied):
     artefact, certificate = copied
     document = json.loads(certificate.read_text())
@@ -220,6 +222,7 @@ def test_a_spec_with_other_limits_is_refused_though_its_hash_is_written_into_the
             check(artefact.read_bytes(), json.dumps(other.to_dict()).encode(), json.dumps(document).encode())
 
 
+@pytest.mark.slow
 def test_what_is_not_the_move_of_the_spec_is_refused(genuine, tmp_path):
     """A file that stands still leaves no sway; one may leave the travel, or swing at the start."""
     artefact, manifest, certificate = contents(*genuine)
@@ -258,6 +261,7 @@ def spec_sha(spec):
     return hashlib.sha256(json.dumps(spec, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
+@pytest.mark.slow
 def test_a_manifests_other_spec_is_none_of_the_artefacts(genuine):
     artefact, manifest, certificate = contents(*genuine)
     document = json.loads(manifest)
@@ -284,6 +288,7 @@ def test_a_blocks_table_is_not_read_from_comments(decoy):
     assert found.positions[0][-1] != pytest.approx(spec.move.target[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twice", ['"bounds_m": {}, ', '"format": 1, '])
 def test_a_key_that_stands_twice_is_refused_by_both(copied, twice):
     artefact, certificate = copied
@@ -294,6 +299,7 @@ def test_a_key_that_stands_twice_is_refused_by_both(copied, twice):
         check(*contents(artefact, certificate))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["[" * 200_000, '{"a": Infinity}', '{"a": 1e999}', "", "{}", "[]"])
 def test_what_is_no_certificate_is_said_to_be_none(genuine, text):
     artefact, manifest, _ = contents(*genuine)
