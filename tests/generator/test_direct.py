@@ -123,6 +123,17 @@ def test_no_duration_does_where_the_target_is_out_of_reach():
         choice.minimum_time(limited(acceleration=1.0, travel=(0.0, 0.2)))
 
 
+@pytest.mark.usefixtures("coarse")
+@pytest.mark.parametrize(
+    "settings", [["limits.acceleration=0.3"], ["limits.acceleration=0.3", "robustness.method=range"]]
+)
+def test_the_tests_fixture_halves_the_intervals_of_every_program(monkeypatch, settings):
+    asked, mesh = [], set_up._mesh
+    monkeypatch.setattr(set_up, "_mesh", lambda one, options: asked.append(options) or mesh(one, options))
+    choice.attempt(problem_of(preset_spec("paper", settings)))
+    assert {options.intervals for options in asked} == {20}
+
+
 def test_a_wild_move_is_refused_not_returned():
     solution = direct.solve(crane_problem(duration=0.4, sway_weight=0.0))
     assert solution.optimum is None

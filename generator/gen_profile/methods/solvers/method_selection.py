@@ -26,7 +26,7 @@ from gen_profile.methods.solvers.direct.relaxation import (
     shortest,
     wideable,
 )
-from gen_profile.methods.solvers.direct.set_up import USUAL, DirectOptions
+from gen_profile.methods.solvers.direct.set_up import DirectOptions
 from gen_profile.methods.solvers.direct.solver import ProgramSequence
 from gen_profile.methods.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.methods.solvers.indirect import solver as indirect
@@ -53,7 +53,7 @@ FOLLOWING = 0.7  # likewise, for the motion next to that of least violation that
 # likewise, for the least cost from two other starts, after which the motion of least violation will do
 OTHER_STARTS = 0.4, 0.9
 # where a mesh is bisected already, and the motion of least violation known that follows the equations
-ON_FINE_MESHES = attrs.evolve(USUAL, max_bisections=0, step_tolerance=direct.FOLLOWED_STEP)
+ON_FINE_MESHES = DirectOptions(max_bisections=0, step_tolerance=direct.FOLLOWED_STEP)
 # of the processor's time that is left, for a cheaper motion than one that is found: the rest judges it
 CHEAPER = 0.7
 INEXACT = 1e-3  # share of a limit by which programs may break it for no other reason than their accuracy
@@ -159,7 +159,7 @@ def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Soluti
     programs for the least cost may not settle on them, or take too much work: then the motion next to that of
     least violation that follows the equations is taken, if it keeps the limits.
     """
-    near, options = nearest, USUAL
+    near, options = nearest, None
     if not coarse:
         with suppress(OutOfWork), budget(FINER_MESHES * left()):
             while near.wider > KEPT_AS_WIDE and (finer := _refined(problem, near)) is not None:
@@ -177,7 +177,7 @@ def _from_nearest(problem: Problem, nearest: Relaxed, *, coarse: bool) -> Soluti
         clock = math.inf if kept is None else CHEAPER * clock_left()
         begun = partial(_begun, problem, begin, coarse=coarse, options=options)
         solution = afford(begun, (OTHER_STARTS[-1] if fine else share) * left(), clock) or given_up(problem)
-        options = USUAL
+        options = None
         if fine and solution.optimum is not None:  # which even finer ones may lower
             begun = partial(_begun, problem, begin)
             cheaper = afford(begun, OTHER_STARTS[-1] * left(), CHEAPER * clock_left()) or solution
@@ -197,7 +197,7 @@ def _begun(
     start: Callable[[Problem], ProgramSequence | None],
     *,
     coarse: bool = False,
-    options: DirectOptions = USUAL,
+    options: DirectOptions | None = None,
 ) -> Solution:
     return _with_reserve(problem, start(problem), coarse=coarse, options=options)
 
@@ -209,7 +209,7 @@ def _refined(problem: Problem, nearest: Relaxed) -> Relaxed | None:
 
 
 def _with_reserve(
-    problem: Problem, near: ProgramSequence | None, *, coarse: bool, options: DirectOptions = USUAL
+    problem: Problem, near: ProgramSequence | None, *, coarse: bool, options: DirectOptions | None = None
 ) -> Solution:
     """Solve directly; where a limit is broken by as much as programs are inexact, ask for so much less."""
     solution = direct.solve(problem, near, coarse=coarse, options=options)

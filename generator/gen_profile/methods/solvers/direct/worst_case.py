@@ -21,7 +21,6 @@ from gen_profile.dynamics.problem.problem import Problem, WorstCase
 from gen_profile.methods.solvers.direct import solver as direct
 from gen_profile.methods.solvers.direct.conic import ConicStatus
 from gen_profile.methods.solvers.direct.relaxation import Relaxed, shortest
-from gen_profile.methods.solvers.direct.set_up import USUAL as PROGRAMS
 from gen_profile.methods.solvers.direct.set_up import DirectOptions, Setup, set_up
 from gen_profile.methods.solvers.direct.solver import (
     COARSE_STEP,
@@ -55,7 +54,7 @@ class RangeOptions:
 
     Attributes
     ----------
-    direct : DirectOptions
+    direct : DirectOptions, optional
         Of the programs.
     held_back : float
         Times the acceleration of the motion that is exact and insensitive, which an axis may take that no
@@ -75,7 +74,7 @@ class RangeOptions:
         Of their integration, relative.
     """
 
-    direct: DirectOptions = PROGRAMS
+    direct: DirectOptions | None = None
     held_back: float = 1.5
     margin: float = 0.002
     slack: float = 1.003
