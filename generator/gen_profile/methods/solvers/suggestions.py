@@ -22,14 +22,18 @@ from gen_profile.methods.solvers.draft import Plan, drafted, suggested
 from gen_profile.methods.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.methods.solvers.search import Search, least
 from gen_profile.methods.solvers.solution import LONGER, Solution, Status
-from gen_profile.spec.model import Spec
+from gen_profile.spec.model import LimitsSpec, Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion, rounded_up
 from gen_profile.support.phrase import Phrase
+from gen_profile.support.units import RATES
 from gen_profile.support.work import OutOfWork, afford, budget, left, spend
 
 COARSE_VALUE = Search(precision=math.log(1.05), close=0.0, stride=math.log(1.07))
 AMPLE = math.log(1.3)  # step beyond a value that takes too much work: a smooth motion may do
+# powers of the duration with which smooth motions take less of limits, and how often that is tried
+SMOOTH_ORDERS, SMOOTH_TRIES = {**{name: n for n, name in enumerate(RATES, start=1)}, "sway": 2}, 3
+SPREADING = 0.2  # of the work that is left, to measure how much more than the nominal machine others sway
 NEAR = 1.05  # times the duration, from which on it is worth telling how long a move would take
 IN_VAIN = Phrase(
     "Longer moves, wider limits and less robustness were tried as far as the work allows, and none was found "
@@ -161,8 +165,10 @@ def remedy(
             if needed:
                 find = partial(_longer, spec, relaxation, options, needed)
                 longer = _in_time(find, options.fraction_later)
+            longer = longer or _in_time(partial(_smoother, spec, options), options.fraction)
         others += (_in_time(find, options.fraction) for find in alone)
-        for last_resort in (*together, partial(_less_robust, spec, options)):
+        smoothly = partial(_smoother, spec, options, in_time=True)
+        for last_resort in (smoothly, *together, partial(_less_robust, spec, options)):
             if not any(others):
                 others.append(_in_time(last_resort, options.fraction))
     advice = ""
@@ -222,7 +228,10 @@ def _relaxation(problem: Problem, spread: float = 1.0) -> Relaxation:
 def usual_spread(problem: Problem) -> float:
     """Tell how many times as much the worst machine sways on the way in a motion with wider limits."""
     nearest = choice.least_violation(problem) if transient_sway.limited(problem) else None
-    return 1.0 if nearest is None else transient_sway.spread(nearest.solution)
+    if nearest is None:
+        return 1.0
+    # of a motion near singular, such as on no rope at all, it takes all there is
+    return _in_time(partial(transient_sway.spread, nearest.solution), SPREADING) or 1.0
 
 
 def least_change(
@@ -328,6 +337,33 @@ def _wider_limits(
         }
 
     return least_change(spec, change, relaxation.problem.sway_spread, options)
+
+
+def _smoother(spec: Spec, options: SuggestionOptions, *, in_time: bool = False) -> Suggestion | None:
+    """Give the motion without limits so much more time that it keeps them, or widen those that it breaks.
+
+    Where limits leave out what a machine can do, such as to hoist beyond its rope, the relaxation finds
+    motions of which programs make nothing; what takes little of all limits is found at once.
+    """
+    asked = spec
+    for _ in range(SMOOTH_TRIES):
+        free = attrs.evolve(problem_of(asked), limits=LimitsSpec(), worst_case=None)
+        draft = drafted(asked, choice.attempt(free, "indirect"))
+        if draft.found is None:
+            return None
+        if not draft.broken:
+            return _tried(spec, {"move.duration": asked.move.duration}, options)
+        orders = [SMOOTH_ORDERS.get(broken.place.rpartition(".")[2]) for broken in draft.broken]
+        if None in orders:
+            return None
+        if in_time:
+            wider = {broken.place: rounded_up(options.first * broken.found) for broken in draft.broken}
+            return _tried(spec, wider, options)
+        shares = zip(draft.broken, filter(None, orders), strict=True)
+        longer = max((broken.found / broken.allowed) ** (1.0 / order) for broken, order in shares)
+        duration = rounded_up(options.first * longer * asked.move.duration)
+        asked = asked.changed({"move.duration": duration})
+    return None
 
 
 def _less_robust(spec: Spec, options: SuggestionOptions) -> Suggestion | None:
