@@ -157,10 +157,14 @@ def test_specs_without_a_turn_are_hashed_as_before():
 
 
 @pytest.mark.parametrize(
-    "options",
-    [{}, {"mode": "csv", "following_error": 0.1}, {"feed_forward": "both", "torque_per_acceleration": 40.0}],
+    ("move", "options"),
+    [
+        ((5.0, 14.0), {}),
+        ((-0.5, -7.0), {}),
+        ((20.0, 21.0), {"mode": "csv", "following_error": 0.1}),
+        ((-6.0, -7.2), {"feed_forward": "both", "torque_per_acceleration": 40.0}),
+    ],
 )
-@pytest.mark.parametrize("move", [(5.0, 14.0), (-0.5, -7.0), (-6.0, -7.2), (20.0, 21.0)])
 def test_a_stream_passes_the_end_of_the_turn(move, options):
     with Bench(
         profile=quintic(move, duration=4.0), make=DriveVariant(**NARROW), start=move[0], **RING, **options

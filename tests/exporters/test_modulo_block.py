@@ -67,8 +67,7 @@ def run(fb, outputs, inputs):
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("move", MOVES)
+@pytest.mark.parametrize(("move", "sign"), [*zip(MOVES, [1, 1, -1, -1], strict=True)])
 def test_it_issues_the_motion_s_place_within_the_turn(move, sign, layout):
     goal = goal_of(move, layout, sign=sign)
     text = structured_text.block_text(motion_of(move), goal)
@@ -136,8 +135,9 @@ def test_hold_and_override_go_on_through_the_end(move, layout):
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("move", MOVES[:2])
-@pytest.mark.parametrize(("cycle", "away"), [(15, 0.0), (40, -3.0), (55, 1.0)])
+@pytest.mark.parametrize(
+    ("move", "cycle", "away"), [(MOVES[0], 15, -3.0), (MOVES[0], 55, 0.0), (MOVES[1], 40, 1.0)]
+)
 def test_an_abort_on_the_way_continues_in_whatever_turn_the_axis_stands(move, layout, cycle, away):
     turn = turn_of(layout)
     fb = checked(text_of(move, layout))
@@ -251,20 +251,23 @@ def test_its_c_compiles_without_a_warning(layout, tmp_path):
 
 @pytest.mark.parametrize("tables", ["constants", "variables"])
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("name", ["plc", "plcopen-xml"])
-def test_forms_are_read_back_and_refused_where_the_turn_is_another(name, layout, tables):
+@pytest.mark.parametrize("name", ["plc", "plcopen-xml", "twincat", "siemens-scl"])
+def test_forms_are_read_back_refused_where_the_turn_is_another_and_have_no_cam(name, layout, tables):
     exporter, goal = find_exporter(name), goal_of((350.0, 1070.0), layout, tables)
-    (file,) = exporter.encode(motion_of((350.0, 1070.0)), goal)
-    back = exporter.replay(file.content, goal).position[:, 0]
+    files = exporter.encode(motion_of((350.0, 1070.0)), goal)
+    content = files[0].content
+    back = exporter.replay(content, goal).position[:, 0]
     assert back[[0, -1]] == pytest.approx(np.radians([350.0, 1070.0]), abs=1e-4)
+    assert not [file.filename for file in files if "cam" in file.filename or "GVL" in file.filename]
+    assert b"MC_MOTIONINPOSITION" not in b"".join(file.content for file in files)
     (axis,) = goal.axes
     for other in (None, 720.0):
         another = attrs.evolve(goal, axes=(attrs.evolve(axis, modulo=other),))
         with pytest.raises(ExportError, match="export "):
-            exporter.replay(file.content, another)
+            exporter.replay(content, another)
     turn = b"65536.0" if layout == "counts" else b"360.0"
-    altered = file.content.replace(turn, b"180.0")
-    assert altered != file.content
+    altered = content.replace(turn, b"180.0")
+    assert altered != content
     with pytest.raises(ExportError):
         exporter.replay(altered, goal)
 
@@ -295,21 +298,6 @@ def test_what_no_axis_could_follow_is_refused():
 
 
 @pytest.mark.parametrize("tables", ["constants", "variables"])
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("name", ["twincat", "siemens-scl"])
-def test_vendors_forms_are_read_back_and_have_no_cam(name, layout, tables):
-    exporter, goal = find_exporter(name), goal_of((350.0, 1070.0), layout, tables)
-    files = exporter.encode(motion_of((350.0, 1070.0)), goal)
-    back = exporter.replay(files[0].content, goal).position[:, 0]
-    assert back[[0, -1]] == pytest.approx(np.radians([350.0, 1070.0]), abs=1e-4)
-    assert not [file.filename for file in files if "cam" in file.filename or "GVL" in file.filename]
-    assert b"MC_MOTIONINPOSITION" not in b"".join(file.content for file in files)
-    (axis,) = goal.axes
-    with pytest.raises(ExportError, match="export "):
-        exporter.replay(files[0].content, attrs.evolve(goal, axes=(attrs.evolve(axis, modulo=None),)))
-
-
-@pytest.mark.parametrize("tables", ["constants", "variables"])
 @pytest.mark.parametrize("name", ["plc", "plcopen-xml", "twincat", "siemens-scl"])
 def test_forms_of_two_axes_are_read_back(name, tables):
     options = {"cycle_time": CYCLE, "unit": "deg", "start": 0.0, "export": {"plc_tables": tables}}
@@ -320,9 +308,8 @@ def test_forms_of_two_axes_are_read_back(name, tables):
     assert back.position[-1] == pytest.approx(move.target, abs=1e-6)
 
 
-@pytest.mark.parametrize("turn", [0, 3, -2])
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("move", MOVES)
+@pytest.mark.parametrize(("move", "turn"), [*zip(MOVES, [0, 3, -2, -2], strict=True)])
 def test_an_nc_axis_counts_on_from_the_turn_in_which_it_stands(move, layout, turn):
     full, source = turn_of(layout), parse_function_block(text_of(move, layout))
     begin, end = (place / 360.0 * full + turn * full for place in move)

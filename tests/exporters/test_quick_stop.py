@@ -63,6 +63,7 @@ def played():
     return rows, braked(rows)
 
 
+@pytest.mark.slow
 def test_limits_are_kept_and_every_state_ends_at_rest_where_it_was_said(played):
     rows, issued = played
     _, velocity, acceleration, most, jerk = rows.T
@@ -77,6 +78,7 @@ def test_limits_are_kept_and_every_state_ends_at_rest_where_it_was_said(played):
     assert np.all(np.abs(issued["fVelocity"]) <= (reached * (1.0 + 1e-12))[:, None])
 
 
+@pytest.mark.slow
 def test_it_says_between_which_places_it_stays(played):
     """One that comes back had its turn beyond both its beginning and its end."""
     rows, issued = played
@@ -90,6 +92,7 @@ def test_it_says_between_which_places_it_stays(played):
     assert np.all(low - said[0] <= a * CYCLE**2) and np.all(said[1] - high <= a * CYCLE**2)
 
 
+@pytest.mark.slow
 def test_setpoints_are_one_motion(played):
     """By Simpson's rule and the trapezoids, but where a cycle has a change of jerk within it."""
     rows, issued = played
@@ -101,6 +104,7 @@ def test_setpoints_are_one_motion(played):
     assert np.all(np.abs(way) <= CYCLE**2 / 6 * np.abs(np.diff(acceleration)) + bound * CYCLE**3 / 4 + 1e-9)
 
 
+@pytest.mark.slow
 def test_way_and_time_are_those_of_the_law_of_feedback(played):
     rows, issued = played
     step = 2e-3
