@@ -84,6 +84,13 @@ def run_here(*arguments: str | Path) -> Outcome:
     return outcome
 
 
+def error_of(*arguments: str | Path, code: int = 2) -> str:
+    """Call the entry point with what ends in an exit code other than 0; what it says of that."""
+    outcome = run_here(*arguments)
+    assert outcome.code == code, outcome.err
+    return outcome.err
+
+
 def run_process(*arguments: str | Path, cwd: Path | None = None, **environment: str) -> Outcome:
     """Start the installed program, with some environment variables changed."""
     done = subprocess.run(

@@ -12,7 +12,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 from asyncua import Server, ua
-from command_line import run_here
+from command_line import error_of, run_here
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -90,8 +90,7 @@ def test_a_table_gets_into_a_controller_and_back(files, access):
         == document
         == json.loads((new.parent / "deployments.json").read_text())["deployments"][0]
     )
-    refused = run_here("deploy", old, *access, "--verify")
-    assert refused.code == 4 and "does not use" in refused.err
+    assert "does not use" in error_of("deploy", old, *access, "--verify", code=4)
     assert "rolled back" in run_here("deploy", old, *access, "--rollback").out
     assert "in use already" in run_here("deploy", old, *access).out
     assert [one["action"] for one in recorded(old.parent)] == ["rolled back", "in use already"]
@@ -161,8 +160,7 @@ def test_what_stands_is_watched(files, fresh, tmp_path):
     assert head.startswith("time_s,call,phase,error,off_nominal,place_cycles,rate,cart_position_m,")
     assert re.fullmatch(r"0\.\d{3},\d+,idle,0,0,0\.0,0\.0,0\.0,0\.0,0\.0,began 20\S+\+00:00", first)
     assert len({len(line.split(",")) for line in log.read_text("utf-8").splitlines()}) == 1
-    refused = run_here("deploy", files / "new" / "paper.st", *where, "--watch")
-    assert refused.code == 4 and "does not use" in refused.err
+    assert "does not use" in error_of("deploy", files / "new" / "paper.st", *where, "--watch", code=4)
 
 
 @pytest.fixture
@@ -226,8 +224,9 @@ def test_a_motion_is_watched_and_another_deployment_ends_it(
 def test_a_server_that_does_not_show_the_state_is_told(files, fresh, monkeypatch):
     monkeypatch.setattr("gen_profile.delivery.deployment.opcua.STATE", "aNothing")
     where = ("--to", fresh, "--security", "none", "--watch")
-    found = run_here("deploy", files / "old" / "paper.st", *where)
-    assert found.code == 6 and "FB_paper shows no aNothing: let the server show it" in found.err
+    assert "FB_paper shows no aNothing: let the server show it" in error_of(
+        "deploy", files / "old" / "paper.st", *where, code=6
+    )
 
 
 def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, once_watched):
@@ -250,8 +249,7 @@ def test_a_controller_that_is_switched_off_ends_the_watch(files, monkeypatch, on
     ],
 )
 def test_options_that_do_not_go_together_are_refused(options, words, files, access):
-    found = run_here("deploy", files / "old" / "paper.st", *access, *options)
-    assert found.code == 2 and words in found.err
+    assert words in error_of("deploy", files / "old" / "paper.st", *access, *options)
 
 
 @pytest.mark.parametrize(
@@ -296,8 +294,9 @@ def test_a_file_that_cannot_be_deployed_is_named_before_the_access(file, words, 
 
 
 def test_a_wrapper_has_no_table(files, access):
-    found = run_here("deploy", files / "old" / "FB_paper_Axis.TcPOU", *access)
-    assert found.code == 5 and "is a wrapper; name the file of the playback block" in found.err
+    assert "is a wrapper; name the file of the playback block" in error_of(
+        "deploy", files / "old" / "FB_paper_Axis.TcPOU", *access, code=5
+    )
 
 
 @pytest.fixture(scope="module")
@@ -351,8 +350,9 @@ def test_odd_servers_are_told_apart(instance, words, files, odd, monkeypatch):
 
 def test_a_server_without_a_block_is_told(files, monkeypatch, odd):
     monkeypatch.setattr("gen_profile.delivery.deployment.opcua.REPLY", "aNothing")
-    found = run_here("deploy", files / "old" / "paper.st", "--to", odd, "--security", "none")
-    assert found.code == 6 and "shows no block with aRequest" in found.err
+    assert "shows no block with aRequest" in error_of(
+        "deploy", files / "old" / "paper.st", "--to", odd, "--security", "none", code=6
+    )
 
 
 def test_broken_connections_are_taken_up(files, plc, access, monkeypatch):
@@ -389,12 +389,14 @@ def expired(path):
 def test_expired_certificates_are_refused(files, plc, access, tmp_path, monkeypatch):
     expired(tmp_path / "me.pem")
     options = dict(zip(access[::2], access[1::2], strict=True)) | {"--certificate": tmp_path / "me.pem"}
-    own = run_here("deploy", files / "old" / "paper.st", *(word for pair in options.items() for word in pair))
-    assert own.code == 6 and "me.pem is good from" in own.err
+    assert "me.pem is good from" in error_of(
+        "deploy", files / "old" / "paper.st", *(word for pair in options.items() for word in pair), code=6
+    )
     tomorrow = datetime.now(UTC) + timedelta(days=365 * 6)
     monkeypatch.setattr(
         "gen_profile.delivery.deployment.certificates.datetime",
         type("Later", (), {"now": lambda _: tomorrow}),
     )
-    theirs = run_here("deploy", files / "old" / "paper.st", *access)
-    assert theirs.code == 6 and f"The certificate of {plc} is good from" in theirs.err
+    assert f"The certificate of {plc} is good from" in error_of(
+        "deploy", files / "old" / "paper.st", *access, code=6
+    )

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 from end_to_end.simulated_controllers import (
     MOVES,
     assert_deployed_and_watched,
@@ -78,8 +78,7 @@ def test_what_is_not_as_it_should_be_is_told_in_a_sentence(words, code, error, f
 
 
 def test_a_simulated_controller_needs_to_be_asked_for_no_security(files):
-    found = run_here("plc-sim", files / "old" / "paper.st", "--db", "7")
-    assert found.code == 2 and "--db: S7 has no security" in found.err
+    assert "--db: S7 has no security" in error_of("plc-sim", files / "old" / "paper.st", "--db", "7")
 
 
 class Bench:

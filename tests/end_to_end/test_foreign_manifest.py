@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 
 from gen_profile.delivery.deployment.table import read_table
 from gen_profile.planner.design import planner_block
@@ -127,9 +127,9 @@ def test_a_number_of_histories_that_means_nothing_is_refused(tmp_path, count):
     (tmp_path / "bay.st").write_text(BLOCK)
     written = manifest(parse_spec(BAY), "bay.st", "planner", sha256(BLOCK.encode()), histories=count)
     (tmp_path / "manifest.json").write_bytes(written)
-    outcome = run_here("check", tmp_path / "bay.st")
-    assert outcome.code == 2
-    assert f"check.histories must be a whole number from 1 on, found {count!r}" in outcome.err
+    assert f"check.histories must be a whole number from 1 on, found {count!r}" in error_of(
+        "check", tmp_path / "bay.st"
+    )
     table = read_table(tmp_path / "bay.st")
     with pytest.raises(OutputError, match="whole number from 1 on"):
         table.check(table.values, no_progress)

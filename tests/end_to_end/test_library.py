@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 from sweeps import archived, scheduler
 
 from gen_profile.delivery.deployment.table import read_table as read_block_table
@@ -68,15 +68,15 @@ def test_a_library_and_a_motion_of_its_names_are_kept_apart(swept, tmp_path):
     one = ("--preset", "paper-beta0", "--set", CYCLE, "--export", "plc", "--no-check", "--out")
     assert run_here(*one, tmp_path / "first", "--set", "name=bay 3").code == 0
     before = {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()}
-    done = run_here("library", swept, "--out", tmp_path / "first/bay_3.st")
-    assert done.code == 2 and "The folder holds 'bay 3', and the library would share fb_bay_3" in done.err
+    assert "The folder holds 'bay 3', and the library would share fb_bay_3" in error_of(
+        "library", swept, "--out", tmp_path / "first/bay_3.st"
+    )
     assert {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()} == before
     (tmp_path / "second").mkdir()
     for _ in range(2):  # its own files are no other's
         assert run_here("library", swept, "--out", tmp_path / "second/bay 3.st").code == 0
-    done = run_here(*one, tmp_path / "second", "--set", "name=bay 3")
-    assert (
-        done.code == 2 and "The folder holds the library of bay 3.json, and 'bay 3' would share" in done.err
+    assert "The folder holds the library of bay 3.json, and 'bay 3' would share" in error_of(
+        *one, tmp_path / "second", "--set", "name=bay 3"
     )
     assert run_here(*one, tmp_path / "second", "--set", "name=bay 4").code == 0
 
@@ -201,9 +201,9 @@ def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
 
 def test_a_sweep_of_which_nothing_passed_is_refused(tmp_path):
     folder = sweep(tmp_path / "swept", "--vary", "check.residual_sway=1e-9", "--set", "solver.method=zvd")
-    outcome = run_here("library", folder, "--out", tmp_path / "library.st")
-    assert outcome.code == 2
-    assert "passed, so there is nothing to put into a library" in outcome.err
+    assert "passed, so there is nothing to put into a library" in error_of(
+        "library", folder, "--out", tmp_path / "library.st"
+    )
 
 
 def test_no_folder_and_no_libraries_are_named(tmp_path):

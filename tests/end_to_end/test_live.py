@@ -17,7 +17,7 @@ from urllib.request import Request, urlopen
 import attrs
 import numpy as np
 import pytest
-from command_line import PROGRAM, run_here
+from command_line import PROGRAM, error_of, run_here
 from exporters.can.bench import HastyClock
 from headless import browser
 from rich.console import Console
@@ -128,8 +128,9 @@ def test_on_a_terminal(log):
 
 
 def test_without_a_terminal(log):
-    outcome = run_here("stream", log, "--simulate-drive", "--live", "terminal")
-    assert (outcome.code, "--live terminal: standard error is no terminal" in outcome.err) == (2, True)
+    assert "--live terminal: standard error is no terminal" in error_of(
+        "stream", log, "--simulate-drive", "--live", "terminal"
+    )
 
 
 @pytest.fixture

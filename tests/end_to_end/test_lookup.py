@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pyarrow
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 from pyarrow import parquet
 from sweeps import archived, scheduler
 
@@ -107,10 +107,11 @@ def test_nearness_counts_in_steps_of_the_grid(library, distance, length):
 
 
 def test_nothing_safe_is_said(library):
-    outcome = run_here("lookup", library, "--move.distance=0.4", "--plant.L1=0.34", "--solver.method=auto")
-    assert outcome.code == 4
-    assert "nearest profiles is safe there. The nearest profile that passed is case 2" in outcome.err
-    assert "Sweep a finer grid" in outcome.err
+    err = error_of(
+        "lookup", library, "--move.distance=0.4", "--plant.L1=0.34", "--solver.method=auto", code=4
+    )
+    assert "nearest profiles is safe there. The nearest profile that passed is case 2" in err
+    assert "Sweep a finer grid" in err
 
 
 @pytest.mark.parametrize(
@@ -182,21 +183,17 @@ def test_files_that_were_altered_or_lost_are_not_used(library, tmp_path):
     words = ("--move.distance=0.3", "--plant.L1=0.3", "--solver.method=auto")
     case = tmp_path / "copy" / "cases" / "0000" / "000" / "paper.csv"
     case.write_bytes(case.read_bytes().replace(b"0.1", b"0.2", 1))
-    outcome = run_here("lookup", tmp_path / "copy", *words)
-    assert outcome.code == 2 and "was altered; sweep again" in outcome.err
+    assert "was altered; sweep again" in error_of("lookup", tmp_path / "copy", *words)
     case.unlink()
-    outcome = run_here("lookup", tmp_path / "copy", *words)
-    assert outcome.code == 2 and "Cannot read" in outcome.err
+    assert "Cannot read" in error_of("lookup", tmp_path / "copy", *words)
 
 
 def test_a_folder_without_a_sweep_is_named(tmp_path):
-    outcome = run_here("lookup", tmp_path, "--plant.L1=0.3")
-    assert outcome.code == 2
-    assert "There is no sweep in" in outcome.err
+    assert "There is no sweep in" in error_of("lookup", tmp_path, "--plant.L1=0.3")
 
 
 def test_a_sweep_of_which_nothing_passed_is_named(library):
     """As of this one's shaped moves, which leave the hook swinging."""
-    outcome = run_here("lookup", library, "--move.distance=0.3", "--plant.L1=0.3", "--solver.method=zv")
-    assert outcome.code == 4
-    assert "has no profile that passed" in outcome.err
+    assert "has no profile that passed" in error_of(
+        "lookup", library, "--move.distance=0.3", "--plant.L1=0.3", "--solver.method=zv", code=4
+    )

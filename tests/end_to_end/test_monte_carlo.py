@@ -10,7 +10,7 @@ import json
 import attrs
 import numpy as np
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
@@ -256,9 +256,7 @@ def test_what_is_wrong_by_design_fails_on_its_sway(right, tmp_path, change):
     position = change(np.array([float(line.split(",")[1]) for line in lines]))
     rows = [f"{index / 1000:.3f},{float(value)!r}" for index, value in enumerate(position)]
     (tmp_path / "paper.csv").write_text("\n".join([head, *rows]) + "\n", "utf-8", newline="")
-    outcome = run_here("check", tmp_path / "paper.csv", "--preset", "paper", *ALONE)
-    assert outcome.code == 4
-    assert "sways by" in outcome.err
+    assert "sways by" in error_of("check", tmp_path / "paper.csv", "--preset", "paper", *ALONE, code=4)
 
 
 def test_what_is_right_passes(right):
@@ -283,9 +281,7 @@ def test_one_altered_count_fails_on_its_hash(right, tmp_path):
     time, _, value = text[1500].partition(",")
     text[1500] = f"{time},{float(value) + 1e-9:.12g}\n"
     (tmp_path / "paper.csv").write_text("".join(text), "utf-8", newline="")
-    outcome = run_here("check", tmp_path / "paper.csv")
-    assert outcome.code == 4
-    assert "altered after its export" in outcome.err
+    assert "altered after its export" in error_of("check", tmp_path / "paper.csv", code=4)
 
 
 @pytest.mark.slow

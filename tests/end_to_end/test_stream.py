@@ -15,7 +15,7 @@ import can
 import canopen
 import numpy as np
 import pytest
-from command_line import PROGRAM, run_here, run_process
+from command_line import PROGRAM, error_of, run_here, run_process
 from exporters.can.bench import MS, FakeClock, HastyClock, RigidLoad
 
 from gen_profile.delivery.streaming import stream as workflow
@@ -189,9 +189,9 @@ def test_a_spec_is_designed_first(tmp_path, monkeypatch):
 
 
 def test_a_spec_that_fails_its_check_is_not_streamed():
-    outcome = run_here("stream", "--preset", "paper", "--set", "check.residual_sway=1e-6", "--dry-run")
-    assert outcome.code == 4
-    assert "sways by" in outcome.err
+    assert "sways by" in error_of(
+        "stream", "--preset", "paper", "--set", "check.residual_sway=1e-6", "--dry-run", code=4
+    )
 
 
 class TestArtefact:
@@ -240,8 +240,9 @@ class TestArtefact:
         assert run_here(*swung, "--no-check", "--export", "can", "--out", tmp_path).code == 0
         for source in [(tmp_path / "paper.log", "--accept-unverified"), swung]:
             assert "move.initial: drives need a while" in self.refused(*source, "--simulate-drive")
-        alone = run_here("drive-sim", *swung, "--interface", "virtual", "--channel", "swung")
-        assert (alone.code, "move.initial: the simulated crane" in alone.err) == (4, True)
+        assert "move.initial: the simulated crane" in error_of(
+            "drive-sim", *swung, "--interface", "virtual", "--channel", "swung", code=4
+        )
 
     def test_missing(self, tmp_path):
         assert "Cannot read" in self.refused(tmp_path / "nothing.log")
@@ -250,13 +251,11 @@ class TestArtefact:
         assert "streamed as it is" in self.refused(deployed / "paper.log", "--node", "3")
 
     def test_without_a_bus(self, deployed):
-        outcome = run_here("stream", deployed / "paper.log")
-        assert (outcome.code, "name the bus" in outcome.err) == (2, True)
+        assert "name the bus" in error_of("stream", deployed / "paper.log")
 
     def test_with_a_bus_that_cannot_be_opened(self, deployed):
         bus = ("--interface", "socketcan", "--channel", "nowhere0")
-        outcome = run_here("stream", deployed / "paper.log", *bus)
-        assert (outcome.code, "cannot be opened" in outcome.err) == (2, True)
+        assert "cannot be opened" in error_of("stream", deployed / "paper.log", *bus)
 
     @pytest.mark.parametrize(
         ("interface", "cure"),
@@ -339,16 +338,15 @@ def test_a_machine_that_cannot_hold_the_cycle(deployed, monkeypatch):
             return super().now() + 15 * MS * (super().now() // (50 * MS) % 2)
 
     monkeypatch.setattr(workflow, "SystemClock", lambda *_: Slow(longest=MS))
-    outcome = run_here("stream", deployed / "paper.log", "--simulate-drive", "--self-test")
-    assert outcome.code == 6
-    assert "cannot hold a cycle of 20 ms" in outcome.err
+    assert "cannot hold a cycle of 20 ms" in error_of(
+        "stream", deployed / "paper.log", "--simulate-drive", "--self-test", code=6
+    )
 
 
 def test_eds_of_the_simulated_drive(tmp_path):
     assert run_here("drive-sim", "--eds", tmp_path / "drive.eds").code == 0
     assert canopen.import_od(str(tmp_path / "drive.eds"), 1)[0x1000].default == 0x0002_0192
-    outcome = run_here("drive-sim", "--eds", tmp_path / "drive.eds" / "below.eds")
-    assert (outcome.code, "Cannot write" in outcome.err) == (2, True)
+    assert "Cannot write" in error_of("drive-sim", "--eds", tmp_path / "drive.eds" / "below.eds")
 
 
 @pytest.mark.slow
@@ -453,9 +451,9 @@ class TestSlowMotions:
     def test_a_drive_that_counts_in_other_units(self, tmp_path, drive_away):
         own = ("--set", "can.gear=[3, 1]", "--set", "can.sync_period=0.02")
         run_here("--preset", "paper", *own, "--export", "can", "--out", tmp_path)
-        outcome = run_here("stream", tmp_path / "paper.log", *AWAY, "--to-start")
-        assert outcome.code == 6
-        assert "the drive holds another 6091h:01 than the spec" in outcome.err
+        assert "the drive holds another 6091h:01 than the spec" in error_of(
+            "stream", tmp_path / "paper.log", *AWAY, "--to-start", code=6
+        )
 
     @pytest.mark.parametrize(
         ("options", "words"),
@@ -469,8 +467,7 @@ class TestSlowMotions:
         ],
     )
     def test_what_cannot_be_meant(self, deployed, options, words):
-        outcome = run_here("stream", deployed / "paper.log", *AWAY, *options)
-        assert (outcome.code, words in outcome.err) == (2, True)
+        assert words in error_of("stream", deployed / "paper.log", *AWAY, *options)
 
 
 class TestSeveralBuses:
@@ -487,13 +484,10 @@ class TestSeveralBuses:
 
     def test_the_spec_names_the_channels(self):
         bus = ("--interface", "virtual", "--channel", "left")
-        outcome = run_here("stream", *self.SPEC, *bus)
-        assert (outcome.code, "--channel: the spec states every axis's" in outcome.err) == (2, True)
+        assert "--channel: the spec states every axis's" in error_of("stream", *self.SPEC, *bus)
 
     @pytest.mark.slow
     def test_a_channel_that_is_not_there(self):
-        outcome = run_here("drive-sim", *self.SPEC, "--interface", "socketcan")
-        assert (outcome.code, "interface socketcan, channel left: cannot be opened" in outcome.err) == (
-            2,
-            True,
+        assert "interface socketcan, channel left: cannot be opened" in error_of(
+            "drive-sim", *self.SPEC, "--interface", "socketcan"
         )

@@ -7,7 +7,7 @@ from contextlib import closing
 
 import attrs
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 from system_parts import program
 
 from gen_profile.spec.reading import preset_text
@@ -121,8 +121,7 @@ def test_holds_one_sweep_and_lets_one_write(store):
 def test_a_file_that_is_no_sweep_is_named(tmp_path, content):
     path = tmp_path / "swept.sqlite"
     path.write_bytes(content)
-    outcome = run_here("lookup", path, "--plant.L1", "0.4")
-    assert outcome.code == 2 and str(path) in outcome.err
+    assert str(path) in error_of("lookup", path, "--plant.L1", "0.4")
     assert run_here("lookup", tmp_path / "none.sqlite", "--plant.L1", "0.4").code == 2
     if content:
         with pytest.raises(OutputError, match="no sweep, or damaged"), opened(prepared(path)):

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from command_line import run_here
+from command_line import error_of, run_here
 from generator.free_swings import periods, swing
 from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
@@ -274,9 +274,9 @@ def test_logs_of_other_computers_and_encoders(tmp_path, encoding, unit, size):
 
 def test_degrees_that_are_taken_for_radians(tmp_path):
     (tmp_path / "log.csv").write_text("".join(f"{t};{v}\n" for t, v in ROWS), "utf-8")
-    outcome = run_here("identify", "--preset", "paper", "--free", "L1", "--swing", tmp_path / "log.csv")
-    assert outcome.code == 2
-    assert "the log's angle goes over 20 rad, more than half a turn; is it in deg?" in outcome.err
+    assert "the log's angle goes over 20 rad, more than half a turn; is it in deg?" in error_of(
+        "identify", "--preset", "paper", "--free", "L1", "--swing", tmp_path / "log.csv"
+    )
 
 
 @pytest.mark.slow
@@ -357,9 +357,7 @@ def test_a_contradiction_is_told(tmp_path):
 )
 def test_what_cannot_be_identified(tmp_path, monkeypatch, arguments, code, why):
     monkeypatch.chdir(tmp_path)
-    outcome = run_here("identify", "--preset", "paper", *arguments)
-    assert outcome.code == code
-    assert why in outcome.err
+    assert why in error_of("identify", "--preset", "paper", *arguments, code=code)
     assert list(tmp_path.iterdir()) == []
 
 
