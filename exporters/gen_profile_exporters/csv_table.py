@@ -219,7 +219,7 @@ def _column_order(heads: Sequence[str], target: Target) -> list[int]:
 def _unexpected(names: Sequence[str], extra: Sequence[str]) -> str:
     if extra:
         return f"column {extra[0]!r} is not one of this target's"
-    return f"column {next(name for name in names if names.count(name) > 1)} stands there twice"
+    return f"column {next(name for name in names if names.count(name) > 1)} appears twice"
 
 
 def _numbers(line: int, cells: Sequence[str], header: Sequence[str]) -> list[float]:

@@ -96,5 +96,5 @@ def require_short_steps(position: Array, turn: float, axis: AxisScale, cycle_tim
     if steps.size and steps.max() >= 0.5 * turn:
         raise ExportError(
             f"axis {axis.name}: it goes half a turn of axis.modulo or more in a cycle of {cycle_time:g} s "
-            f"(at {int(steps.argmax()) * cycle_time:g} s), and none could tell which way; shorten the cycle."
+            f"(at {int(steps.argmax()) * cycle_time:g} s), so the direction is ambiguous; shorten the cycle."
         )

@@ -185,7 +185,7 @@ class TestReplayRefuses:
             replayed([line.rpartition(",")[0] for line in lines])
         with pytest.raises(ExportError, match=r"line 1: column 'torque' is not one"):
             replayed([lines[0] + ",torque", *(line + ",0" for line in lines[1:])])
-        with pytest.raises(ExportError, match=r"line 1: column time_s stands there twice"):
+        with pytest.raises(ExportError, match=r"line 1: column time_s appears twice"):
             replayed([lines[0] + ",time_s", *(line + ",0" for line in lines[1:])])
 
     def test_units_of_another_spec(self):

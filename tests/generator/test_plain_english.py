@@ -25,7 +25,7 @@ NAMES = set(
 )
 
 BLOCK_NAMES = re.compile(r"\b[abcfn](?:Surrender|Vain|Vouched|Gone)\b")
-LEFT_OUT = re.compile(r"/uPlot/|/planner/text/")  # others' text, and that of a block which will be replaced
+LEFT_OUT = re.compile(r"/uPlot/")  # others' text
 
 
 def texts():

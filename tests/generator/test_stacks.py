@@ -115,7 +115,7 @@ def test_a_profile_counts_the_higher_end_of_every_piece():
             "move.start: the payload is too near to what is overhead from -2 to 2 m, 5 m high, by",
         ),
         ({"path": {"overhead": [[3.0, 2.0, 5.0]]}}, "path.overhead.0: must begin left of where it ends"),
-        ({"solver": {"method": "zvd"}}, "solver.method: knows no stacks"),
+        ({"solver": {"method": "zvd"}}, "solver.method: does not consider stacks"),
         ({"move": {"free": ["hoist"]}}, "move.free: both axes move"),
         (
             {"actuator": {"type": "first-order", "tau": 0.1}},
@@ -191,7 +191,7 @@ def test_which_axis_is_the_hoist():
 
 def test_planners_and_comparisons_refuse_stacks(tmp_path):
     for refused in (gp.compare, lambda spec: gp.deploy_planner(spec, "plc", tmp_path)):
-        with pytest.raises(gp.SpecError, match=r"path: .* knows no stacks"):
+        with pytest.raises(gp.SpecError, match=r"path: .* does not consider stacks"):
             refused(quay())
 
 

@@ -78,13 +78,15 @@ def refuse_stacks(spec: Spec, what: str) -> None:
     SpecError
     """
     if spec.path is not None:
-        raise SpecError("path: {what} knows no stacks; remove [path], or see docs/over-stacks.md.", what=what)
+        raise SpecError(
+            "path: {what} does not consider stacks; remove [path], or see docs/over-stacks.md.", what=what
+        )
 
 
 def _methods(spec: Spec) -> Iterator[Fault]:
     """Refuse what does not go together with a path over stacks."""
     if spec.solver.method != "auto":
-        yield "solver.method", "knows no stacks; remove it, or remove [path]"
+        yield "solver.method", "does not consider stacks; remove it, or remove [path]"
     if not spec.move.stops:
         yield "move.final_velocity", "a path over stacks ends at rest; remove it, or remove [path]"
     if spec.move.free:
@@ -96,9 +98,12 @@ def _methods(spec: Spec) -> Iterator[Fault]:
             "as check.path.lag, so that it is judged",
         )
     if spec.robustness.order != 1:
-        yield "robustness.order", "a path over stacks knows first-order sensitivities; remove it"
+        yield (
+            "robustness.order",
+            "a path over stacks is planned with first-order sensitivities only; remove it",
+        )
     if spec.check.foreign is not None:
-        yield "check.fmu", "an external FMU tells no place of the load; remove it, or remove [path]"
+        yield "check.fmu", "an external FMU does not tell where the load is; remove it, or remove [path]"
 
 
 def _in_plan_view(spec: Spec, axes: PathAxes) -> Iterator[Fault]:

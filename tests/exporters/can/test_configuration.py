@@ -212,7 +212,7 @@ def test_a_general_error_tells_of_an_object_that_is_not_there(index, fits):
         if fits:
             assert bench.run().phase is Phase.DONE
         else:
-            refused(bench, r"refuses to tell 6007h:00")
+            refused(bench, r"refuses to give 6007h:00")
 
 
 @pytest.mark.parametrize(("kind", "fits"), [(254, True), (1, False)])
@@ -232,7 +232,7 @@ def test_the_transmission_type_of_a_controlword_may_be_either_that_is_event_driv
 def test_an_object_that_may_not_be_read():
     with Bench() as bench:
         bench.drive.local.object_dictionary[0x6502].access_type = "wo"
-        refused(bench, r"refuses to tell 6502h:00")
+        refused(bench, r"refuses to give 6502h:00")
 
 
 def test_a_mode_that_is_not_taken():
@@ -317,7 +317,7 @@ def test_pdos_that_are_off_already_are_left_alone():
 def test_a_statusword_that_no_state_matches():
     with Bench() as bench:
         bench.drive.store(0x6041, 0, 0x0001)
-        refused(bench, "tells the statusword 0001h, which is no state of CiA 402")
+        refused(bench, "reports the statusword 0001h, which is no state of CiA 402")
 
 
 class TestAfterAStreamThatWasKilled:

@@ -264,7 +264,7 @@ def test_of_two_axes_each_has_arrows_and_places():
     keys = Keys((BlockAxis(name="x"), BlockAxis(name="y")), [2.0, 1.0])
     commands = [(one.command, one.values) for one in keys.take(b"\x1b[C\x1b[B3,1.5\r7\r")]
     assert commands == [("velocity", (0.2, 0.0)), ("velocity", (0.2, -0.1)), ("position", (3.0, 1.5))]
-    assert keys.shown == "7: a position for each of 2 axes, please"
+    assert keys.shown == "7: enter a position for each of 2 axes"
 
 
 @pytest.fixture

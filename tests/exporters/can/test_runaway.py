@@ -137,7 +137,7 @@ class TestWidth:
 
 
 def test_what_was_told_once_counts_once_when_an_axis_settles():
-    """The drive falls silent at the target, and the time-out is long."""
+    """The drive stops answering at the target, and the time-out is long."""
     with Bench(profile=MOVE, timeout=0.5, step=MS) as bench:
         bench.drive_end.sending = lambda message: (
             message.arbitration_id != 0x181 or "hold" not in bench.phases

@@ -217,7 +217,7 @@ def _setpoints(pending: Mapping[int, tuple[int, ...]], layout: Iterable[Setpoint
 
 def _require_complete(pending: Container[int], expected: Iterable[int], sync: Frame) -> None:
     if sync.data:
-        raise altered(sync.line, "SYNC with data, which this format has not")
+        raise altered(sync.line, "SYNC with data, which this format does not have")
     missing = [cob_id for cob_id in expected if cob_id not in pending]
     if missing:
         raise ExportError(

@@ -242,7 +242,7 @@ def _require_rest(node: Node) -> None:
     state = state_of(word := node.read(0x6041, bits=16))
     if state is State.UNKNOWN:
         raise node.unfit(
-            f"the drive tells the statusword {word:04X}h, which is no state of CiA 402; "
+            f"the drive reports the statusword {word:04X}h, which is no state of CiA 402; "
             "find out in its manual what it means."
         )
     if state in FAULTS:

@@ -37,7 +37,7 @@ class Node:
         except SdoAbortedError as error:
             if error.code in (NOT_GIVEN if optional else NOT_THERE):
                 return None
-            raise self.unfit(f"the drive refuses to tell {index:04X}h:{sub:02X} ({error}).") from error
+            raise self.unfit(f"the drive refuses to give {index:04X}h:{sub:02X} ({error}).") from error
         except (SdoError, struct.error) as error:
             raise self.silent(error) from error
         return data[: bits // 8]

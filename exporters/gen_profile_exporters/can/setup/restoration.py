@@ -68,7 +68,7 @@ class Restoration:
             except SdoAbortedError:
                 yield f"Node {node} does not take back what it held in {index:04X}h:{sub:02X}."
             except SILENCE:
-                yield f"Node {node} fell silent; its settings stay those of the motion, in part."
+                yield f"Node {node} stopped answering; its settings stay those of the motion, in part."
                 return
 
 

@@ -154,7 +154,7 @@ class SimulatedDrive:
             self._fresh |= index in SETPOINTS
 
     def watch(self, now: int) -> None:
-        """Look for a master that fell silent, and change to the mode that was asked for."""
+        """Look for a master that stopped sending, and change to the mode that was asked for."""
         if self._recounts:
             self._recounts = False
             self._pack_feedback()

@@ -317,9 +317,9 @@ class Streamer:
         steps = [velocity * self._pacer.period / NANOSECONDS for velocity in greatest]
         if skipped > 1 or any(far > step + 0.5 for far, step in zip(apart, steps, strict=True)):
             raise StreamAborted(
-                f"This machine was {skipped * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve "
-                "it, permit real-time priority, or choose a longer can.sync_period (the self-test measures "
-                "it)."
+                f"This machine was {skipped * self._pacer.period / 1e6:g} ms late at cycle {cycle}; run "
+                "less on it, permit real-time priority, or choose a longer can.sync_period (the self-test "
+                "measures it)."
             )
 
     def _record(self, phase: Phase, reason: str) -> Record:

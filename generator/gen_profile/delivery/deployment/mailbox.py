@@ -138,7 +138,7 @@ class Mailbox:
             if status.trial != TRIED and status.checked != UNCHECKED:
                 return status
             self._pause(POLL_INTERVAL)
-        raise DeploymentError("The block does not work out its table's checksum; look after its task.")
+        raise DeploymentError("The block does not work out its table's checksum; check its task.")
 
     def read(self, buffer: int, length: int) -> Array:
         """Read a buffer's first values."""
@@ -213,7 +213,7 @@ class Mailbox:
                     self._link.reopen()
         raise DeploymentError(
             "The block does not answer, as if it were not called in any task, or another client wrote to it "
-            "all the time; look after the task, and run this again."
+            "all the time; check the task, and run this again."
         )
 
     def _answered(self, request: Array) -> Array | None:

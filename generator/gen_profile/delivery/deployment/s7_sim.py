@@ -41,7 +41,7 @@ class SimulatedS7Controller(SimulatedController):
         try:
             self.server.start_to(LOOPBACK, self.port)
         except (S7Error, OSError) as error:
-            raise OutputError(f"port {self.port}: cannot be had; name another one.") from error
+            raise OutputError(f"port {self.port}: is not available; name another one.") from error
         try:
             yield f"s7://{LOOPBACK}:{self.port}/0/1"
         finally:

@@ -101,7 +101,7 @@ class SimulatedController(ABC):
         Raises
         ------
         OutputError
-            The port cannot be had.
+            The port is not available.
         """
         with self._served() as address:
             ready(address)

@@ -88,7 +88,7 @@ class Keys:
             self.shown = f"{text} is no number{number_meant(text)}"
             return None
         if len(values) != len(self._axes):
-            self.shown = f"{text}: a position for each of {len(self._axes)} axes, please"
+            self.shown = f"{text}: enter a position for each of {len(self._axes)} axes"
             return None
         return self._given("position", values, f"to {in_units(values, self._axes, '{:g}')}")
 

@@ -223,7 +223,7 @@ def self_test(source: Source) -> Lateness:
         raise StreamAborted(
             f"This machine cannot hold a cycle of {period / 1e6:g} ms: it was late by up to "
             f"{lateness.percentile(100) / 1e3:.3g} ms (half a cycle is allowed). {' '.join(refused)} "
-            "Choose a longer can.sync_period, or relieve the machine."
+            "Choose a longer can.sync_period, or run less on the machine."
         )
     return lateness
 
