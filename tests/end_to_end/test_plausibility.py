@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from itertools import cycle
 
 import attrs
 import numpy as np
@@ -149,8 +150,9 @@ def test_a_smooth_move_is_in_no_doubt_however_few_its_setpoints_are(distance, cy
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("cycle_time", [0.002, 0.004, 0.01, 0.02])
+@pytest.mark.parametrize(
+    ("form", "cycle_time"), [*zip(FORMS, cycle((0.002, 0.004, 0.01, 0.02)), strict=False)]
+)
 def test_one_setpoint_moved_by_a_millimetre_lies_off_the_others(paper, form, cycle_time):
     spec = for_controller(paper[0], form, cycle_time, 1e6)
     setpoints = played(spec, paper[1], form)
@@ -169,8 +171,7 @@ def bare(setpoints, position, cycle_time=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("factor", [0.98, 1.02])
-@pytest.mark.parametrize("overrides", [(), ("move.final_velocity=0.1",)])
+@pytest.mark.parametrize(("factor", "overrides"), [(0.98, ()), (1.02, ("move.final_velocity=0.1",))])
 def test_a_motion_scaled_in_time_arrives_at_another_time(form, factor, overrides):
     spec, command = planned("paper", *overrides)
     spec = for_controller(spec, form, 0.01, 1e6)
