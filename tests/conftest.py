@@ -79,10 +79,16 @@ def keep(config: pytest.Config, items: list[pytest.Item], kept: Set[pytest.Item]
     items[:] = [item for item in items if item in kept]
 
 
+def file_of(item: pytest.Item) -> str:
+    """Name the page that a test runs, or else its own file."""
+    page = item.get_closest_marker("page")
+    return str(page.args[0] if page else item.nodeid.partition("::")[0])
+
+
 def take_turns(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the slow tests whose turn it is not, and note how many for the last lines."""
     turn, changed = config.getoption("--turn") % TURNS, set(config.getoption("--changed").split())
-    slow = {item: item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
+    slow = {item: file_of(item) for item in items if item.get_closest_marker("slow")}
     tests = Counter(slow.values())
     why = near(
         tests, {file: rooms_of(file, (config.rootpath / file).read_text("utf-8")) for file in tests}, changed

@@ -21,6 +21,7 @@ FILES = {
     "tests/generator/test_minimum_time.py": "import gen_profile",
     "tests/end_to_end/test_documentation.py": "from documentation import blocks",
 }
+PAGE = {"docs/planner.md": "import pages"}
 SPARE = {
     f"tests/{folder}/test_other_{number}.py": "import gen_profile, gen_profile_exporters"
     for folder in ("exporters", "generator")
@@ -43,7 +44,8 @@ SPARE = {
         ("generator/gen_profile/spec/read_spec.py", "read_spec", ["test_planner_text"]),
         ("tests/exporters/st_programs.py", "st_programs", ["test_planner_far"]),
         ("tests/fmu/test_cache.py", "test_cache", ["test_cache"]),
-        ("docs/planner.md", "documentation", ["test_documentation"]),
+        ("docs/planner.md", "planner.md", ["planner"]),
+        ("tests/documentation.py", "documentation", ["planner", "test_documentation"]),
         ("tests/exporters/planner/helper.py", None, []),
         ("generator/gen_profile/units.py", None, []),
     ],
@@ -55,7 +57,7 @@ def test_a_file_is_near_to_the_rooms_that_it_names_or_imports(changed, room, fil
 
 
 def near_to(changed):
-    sources = FILES | SPARE
+    sources = FILES | PAGE | SPARE
     rooms = {file: rooms_of(file, source) for file, source in sources.items()}
     return near(dict.fromkeys(sources, 30), rooms, changed)
 

@@ -21,7 +21,7 @@ def changed_rooms(changed: Set[str]) -> set[str]:
     rooms: set[str] = set()
     for path in map(PurePosixPath, changed):
         if path.suffix == ".md":
-            rooms.add("documentation")  # whose test runs every page
+            rooms.add(path.name)
         elif path.parts[0] == "tests":
             rooms.add(path.stem)
         else:
@@ -30,8 +30,13 @@ def changed_rooms(changed: Set[str]) -> set[str]:
 
 
 def rooms_of(test: str, source: str) -> set[str]:
-    """Name the rooms that a test's file is of: its own name, all parts of it, its folder, and its imports."""
+    """Name the rooms that a test's file is of: its own name, all parts of it, its folder, and its imports.
+
+    A page whose commands are run is one of those files; its room is itself, beside what runs it.
+    """
     path = PurePosixPath(test)
+    if path.suffix == ".md":
+        return {path.name, "documentation", "test_documentation"}
     words = path.stem.removeprefix("test_").split("_")
     ends = range(1, len(words) + 1)
     parts = {"_".join(words[begin:end]) for end in ends for begin in range(end)}

@@ -28,8 +28,13 @@ def test_the_first_blocks_install_and_test():
     assert "pip install" in test.text and "pytest" in test.text
 
 
+def with_its_turn(page):
+    """Run a page when it has changed and else in its own turn, not with all others."""
+    return pytest.param(page, marks=pytest.mark.page(page.relative_to(ROOT).as_posix()), id=page.stem)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in PAGES if tour(page)], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [with_its_turn(page) for page in PAGES if tour(page)])
 def test_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(prove, "HISTORIES", 8)  # what the pages' commands do is the same
