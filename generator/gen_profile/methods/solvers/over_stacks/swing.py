@@ -30,7 +30,9 @@ class Swing:
     states, lines : int
         The trolley has three states along every line.
     rate : Function
-        Of (state, hoist's place, velocity and acceleration, parameters): [ż, ∂ż/∂z] without the jerks' part.
+        Of (state, hoist's place, velocity and acceleration, parameters): ż without the jerks' part.
+    slope : Function
+        Of the same: [ż, ∂ż/∂z].
     seen : Function
         Of the same: [y, ∂y/∂z], y being every body's places along the lines and the end load's sways.
     """
@@ -38,6 +40,7 @@ class Swing:
     states: int
     lines: int
     rate: Function
+    slope: Function
     seen: Function
 
     @property
@@ -122,7 +125,8 @@ def swing_of(
     return Swing(
         states=state.shape[0],
         lines=len(lines),
-        rate=Function("rate", inputs, sym.beside(rates, sym.jacobian(rates, state))),
+        rate=Function("rate", inputs, rates),
+        slope=Function("slope", inputs, sym.beside(rates, sym.jacobian(rates, state))),
         seen=Function("seen", inputs, sym.beside(seen, sym.jacobian(seen, state))),
     )
 
@@ -163,6 +167,9 @@ def followed(
 ) -> FollowedMachines:
     """Integrate by the classical method of Runge and Kutta, with the derivatives.
 
+    Derivatives of rates cost most: those in the middle of a step are taken once, those at its end again at the
+    next one's begin.
+
     Parameters
     ----------
     swing : Swing
@@ -177,7 +184,7 @@ def followed(
         s.
     """
     machines, intervals, n = nodes.shape
-    spend(EVALUATION * machines * intervals * 2.0 * (hoist.shape[1] - 1) * n * (n + 1))
+    spend(EVALUATION * machines * intervals * hoist.shape[1] * n * (n + 1))
     lines = swing.lines
     pushed = np.zeros((n, lines))
     pushed[CARRIED * np.arange(lines) + CARRIED - 1, np.arange(lines)] = 1.0
@@ -185,20 +192,32 @@ def followed(
     states, alongs = [z], [along]
     parameters = p[:, None]
 
-    def slope(z: Array, along: Array, half: int) -> tuple[Array, Array]:
-        both = swing.rate(z, hoist[:, half], parameters)
-        rates = both[..., 0] + jerks @ pushed.T
-        change = both[..., 1:] @ along
-        change[..., n:] += pushed
-        return rates, change
+    pushes = jerks @ pushed.T
 
-    for number in range((hoist.shape[1] - 1) // 2):
-        k1 = slope(z, along, 2 * number)
-        k2 = slope(z + step / 2.0 * k1[0], along + step / 2.0 * k1[1], 2 * number + 1)
-        k3 = slope(z + step / 2.0 * k2[0], along + step / 2.0 * k2[1], 2 * number + 1)
-        k4 = slope(z + step * k3[0], along + step * k3[1], 2 * number + 2)
-        z = z + step / 6.0 * (k1[0] + 2.0 * k2[0] + 2.0 * k3[0] + k4[0])
-        along = along + step / 6.0 * (k1[1] + 2.0 * k2[1] + 2.0 * k3[1] + k4[1])
+    def rate(z: Array, half: int) -> Array:
+        return swing.rate(z, hoist[:, half], parameters)[..., 0] + pushes
+
+    def slope(z: Array, half: int) -> tuple[Array, Array]:
+        both = swing.slope(z, hoist[:, half], parameters)
+        return both[..., 0] + pushes, both[..., 1:]
+
+    def change(by_state: Array, along: Array) -> Array:
+        changed = by_state @ along
+        changed[..., n:] += pushed
+        return changed
+
+    k1, begin = slope(z, 0)
+    for half in range(0, hoist.shape[1] - 1, 2):
+        k2 = rate(z + step / 2.0 * k1, half + 1)
+        k3, middle = slope(z + step / 2.0 * k2, half + 1)
+        k4 = rate(z + step * k3, half + 2)
+        z = z + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        k1, end = slope(z, half + 2)
+        d1 = change(begin, along)
+        d2 = change(middle, along + step / 2.0 * d1)
+        d3 = change(middle, along + step / 2.0 * d2)
+        d4 = change(end, along + step * d3)
+        along, begin = along + step / 6.0 * (d1 + 2.0 * d2 + 2.0 * d3 + d4), end
         states.append(z)
         alongs.append(along)
     whole, whole_along = np.stack(states, axis=2), np.stack(alongs, axis=2)
