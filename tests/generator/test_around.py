@@ -13,6 +13,7 @@ from gen_profile.methods.solvers.over_stacks.guide import blocks, guide_along, p
 from gen_profile.methods.solvers.over_stacks.plan import sketched
 from gen_profile.methods.solvers.over_stacks.program import resting
 from gen_profile.methods.solvers.over_stacks.searches import StackSearch
+from gen_profile.methods.solvers.over_stacks.swing import followed as swing
 from gen_profile.presentation.charts.side_view import gone_around, path_figure
 from gen_profile.presentation.studio.curves_json import side_json
 from gen_profile.spec.plan_view import Area
@@ -177,6 +178,34 @@ class TestMotion:
         assert jerks[0] < 0.5 * jerks[1]
 
 
+def test_derivatives_of_what_machines_do_are_those_of_differences():
+    """But for a hundredth, as those in the middle of a step are taken once."""
+    bay, random = way_of(past_a_wall()), np.random.default_rng(2)
+    up = bay.lifted(20.0, bay.top)
+    hoist = np.array([6.0, 0.0, 0.0]) - up.at(np.linspace(8.0, 8.4, 17))[:, :3]
+    node = np.concatenate([random.normal(size=6), random.normal(size=bay.nominal.states - 6) * 0.05])
+    jerk, size = random.normal(size=2), 1e-5
+
+    def end(change):
+        moved = change[: len(node)] + node, change[len(node) :] + jerk
+        return swing(
+            bay.nominal,
+            moved[0][None, None],
+            bay.machines[:1],
+            jerks=moved[1][None],
+            hoist=hoist[None],
+            step=0.05,
+        )
+
+    slopes = end(np.zeros(len(node) + 2))
+    columns = np.eye(len(node) + 2) * size
+    for known, along in (("states", slopes.along), ("seen", slopes.seen_along)):
+        both = [[getattr(end(sign * one), known)[0, 0, -1] for sign in (1.0, -1.0)] for one in columns]
+        differences = np.array([(more - less) / (2.0 * size) for more, less in both]).T
+        scale = 1.0 + np.abs(differences).max(axis=1, keepdims=True)
+        assert (np.abs(along[0, 0, -1] - differences) <= 1e-2 * scale).all()
+
+
 def test_lines_that_turned_with_a_worse_course_turn_back(monkeypatch):
     search = StackSearch(bay=way_of(past_a_wall()))
     bay = search.bay
@@ -192,10 +221,33 @@ class TestRefusals:
             gp.plan(past_a_wall(path={"stacks": [[12.0, 14.0, 0.0, 15.0, 11.0]]}))
 
     @pytest.mark.slow
-    def test_too_short_names_the_wall_and_a_time_that_does(self, plan):
-        duration = 0.9 * plan.motion.duration
-        move = {"start": [2.0, 4.0, 6.0], "target": [26.0, 5.0, 5.0], "duration": duration}
-        with pytest.raises(gp.InfeasibleProblem) as refusal:
+    @pytest.mark.parametrize("share", [0.5, 0.9])
+    def test_too_short_names_the_wall_and_a_time_that_does(self, plan, share):
+        move = {**plan.spec.to_dict()["move"], "duration": share * plan.motion.duration}
+        with pytest.raises(
+            gp.InfeasibleProblem, match=r"the stack from 12 to 14 m in x and 0 to 8 m"
+        ) as refusal:
             gp.plan(past_a_wall(move=move))
         (suggestion,) = refusal.value.suggestions
         assert suggestion.values["move.duration"] == pytest.approx(plan.motion.duration, abs=0.3)
+
+    @pytest.mark.slow
+    def test_too_short_through_a_slot_with_all_machines_names_a_time_that_does(self):
+        """It has the time to try it, and all heights of the hoist before."""
+        slot = [[8.17, 10.29, 0.0, 4.92, 11.0], [8.17, 10.29, 8.67, 15.0, 11.0]]
+        boxes = [[12.59, 14.89, 6.02, 9.71, 4.48], [18.79, 21.84, 3.52, 6.27, 2.9]]
+        move = {"start": [29.2, 10.01, 3.75], "target": [2.25, 10.96, 4.28], "duration": 24.99}
+        with pytest.raises(gp.InfeasibleProblem, match=r"around the stack from 8\.17 to") as refusal:
+            gp.plan(hall(path={"stacks": [*slot, *boxes]}, move=move))
+        (suggestion,) = refusal.value.suggestions
+        assert suggestion.values["move.duration"] == pytest.approx(26.35, abs=0.15)
+
+    def test_too_short_where_nothing_is_in_the_way_says_so(self):
+        with pytest.raises(gp.InfeasibleProblem, match=r"stays 1\d\.\d m away from its target\. It can"):
+            gp.plan(
+                hall(
+                    path={"stacks": [[4.0, 6.0, 12.0, 14.0, 3.0]]},
+                    move={"duration": 13.0},
+                    robustness=NO_RANGES,
+                )
+            )

@@ -10,7 +10,7 @@ from gen_profile.dynamics.evaluation.scenarios import scenarios
 from gen_profile.dynamics.problem.dynamics import parameter_rows
 from gen_profile.dynamics.problem.initial_state import initial_state
 from gen_profile.dynamics.problem.linearization import linearize
-from gen_profile.methods.solvers.over_stacks.guide import Guide, Numbers
+from gen_profile.methods.solvers.over_stacks.guide import Guide, Numbers, blocks
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces, Rates, highest, least_time
 from gen_profile.methods.solvers.over_stacks.swing import CARRIED, Swing, swing_of, swings_along
 from gen_profile.methods.solvers.search import Search, least
@@ -171,6 +171,12 @@ class Bay:
         assert self.guide is not None
         lift = zone.top - float(self.hang[:, zone.body].min())
         return zone.overhead or lift > self.highest
+
+    def goes_around(self, zone: StackZone) -> bool:
+        """Whether a body leaves the straight way to its target for it."""
+        if self.guide is None or not self.is_wall(zone):
+            return False
+        return blocks(zone.area, self.guide.route[0], self.guide.route[-1])
 
     def guided_by(self, places: Array, window: float) -> "Bay":
         """Let lines turn as bodies go at even times, (times, bodies, 2)."""

@@ -250,15 +250,23 @@ def _refusal(planner: StackSearch) -> InfeasibleProblem:
     course = None if up is None else planner.solved(resting(bay, up))
     sentence = Phrase("move.duration: the hoist alone takes longer than {asked:g} s.", asked=asked)
     if course is not None:
-        zone, missing = _in_the_way(bay, course)
-        template = "move.duration: in {asked:g} s the {body} is {missing:.3g} m too near to {obstacle}."
-        body, path = bay.plant.bodies[zone.body], bay.spec.path
+        (zone, missing), path = _in_the_way(bay, course), bay.spec.path
+        wall = next(filter(bay.goes_around, bay.zones), None)
         assert path is not None
-        obstacle = path.named(zone.obstacle)
-        sentence = Phrase(template, asked=asked, body=body, missing=missing, obstacle=obstacle)
-        if course.miss > max(missing, ENOUGH):
+        if zone is None or course.miss > max(missing, ENOUGH):
             template = "move.duration: in {asked:g} s the trolley stays {miss:.3g} m away from its target."
             sentence = Phrase(template, asked=asked, miss=course.miss)
+            if wall is not None:
+                template = (
+                    "move.duration: in {asked:g} s the trolley stays {miss:.3g} m away from its target, on "
+                    "its way around {obstacle}."
+                )
+                around = path.named(wall.obstacle)
+                sentence = Phrase(template, asked=asked, miss=course.miss, obstacle=around)
+        else:
+            template = "move.duration: in {asked:g} s the {body} is {missing:.3g} m too near to {obstacle}."
+            body, obstacle = bay.plant.bodies[zone.body], path.named(zone.obstacle)
+            sentence = Phrase(template, asked=asked, body=body, missing=missing, obstacle=obstacle)
     needed = rounded_up(planner.shortest().up.duration)
     values = {"move.duration": needed}
     return InfeasibleProblem(
@@ -276,8 +284,8 @@ def _tried(spec: Spec, values: Mapping[str, Any]) -> tuple[Suggestion, ...]:
         return ()
 
 
-def _in_the_way(bay: Bay, course: Course) -> tuple[StackZone, float]:
-    """Find the stack that a course comes too near to, and by how much in m."""
+def _in_the_way(bay: Bay, course: Course) -> tuple[StackZone | None, float]:
+    """Find the stack that a course comes too near to, and by how much in m; none if nothing is there."""
     places = Program(bay=bay, about=course).places
     times = np.linspace(0.0, course.up.duration, len(places))[1:]
 
@@ -286,4 +294,5 @@ def _in_the_way(bay: Bay, course: Course) -> tuple[StackZone, float]:
         at = places[1:][rows, zone.body]
         return float(((normals * at).sum(axis=1) - most).max(initial=-math.inf))
 
-    return max(((zone, missing(zone)) for zone in bay.zones), key=lambda pair: pair[1])
+    each = ((zone, missing(zone)) for zone in bay.zones)
+    return max(each, key=lambda pair: pair[1], default=(None, 0.0))

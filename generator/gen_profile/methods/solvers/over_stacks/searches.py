@@ -38,6 +38,8 @@ SETTLED = 1e-7  # m, rad and their rates, by which a machine may be elsewhere af
 NEARLY = (
     0.3  # m that may be missing where machines are linear about rest: as they swing, they have more or less
 )
+NEARER = 0.05  # likewise where they are linear about how the nominal one swings
+STILL_LACKING = 0.9  # of what a course lacked, from which on turning lines past corners is no help any more
 SHORTER, LEAST_SHORTER = 0.12, 4e-3  # of the duration, by which a way around something is shortened at once
 MORE, LESS = 1.3, 0.4  # times as much next, where it has room or has not
 LENGTHENED = 1.005  # times as long, where asking for more clearance gives none
@@ -156,8 +158,7 @@ class StackSearch:
         if rough.up.duration > bay.quickest_lift(bay.needed) + DECIDED_BY_HOIST:
             rough, lifted = alone.otherwise_lifted(rough, lifted, bay.needed)
         self.programs += alone.programs
-        if len(bay.machines) > 1:
-            rough = with_others(bay, rough)
+        rough = with_others(bay, rough)
         near = self.solved(rough) or rough
         if len(bay.machines) > 1:
             start = max(bay.quickest_pass(), near.up.duration)
@@ -187,7 +188,7 @@ class StackSearch:
                 break
             before, self.bay = self.bay, self.guided(course, LEAST_WINDOW / course.up.duration)
             again = self.solved(course, FEW_STEPS)
-            if again is None or lacking(again) >= lacking(course):
+            if again is None or lacking(again) > STILL_LACKING * lacking(course):
                 self.bay = before
                 break
             course = again
@@ -225,15 +226,18 @@ class StackSearch:
         """Find the smoothest course of a duration that lifts little; none where it is too short."""
         bay = self.bay
         for top in (*(bay.needed + share * (bay.top - bay.needed) for share in LOWER), bay.top):
-            up = bay.lifted(duration, top)
-            course = None if up is None else self.solved(resting(bay, up))
+            up, alone = bay.lifted(duration, top), StackSearch(bay=bay.alone())
+            course = None if up is None else alone.solved(resting(alone.bay, up), FEW_STEPS)
             if course is not None and bay.guide is not None:
-                course = self.in_turns(course)
+                course = alone.in_turns(course)
+            self.programs += alone.programs
             if course is not None and -course.room < NEARLY and course.miss < NEARLY:
-                settled = self.settled(self.solved(course) or course)
+                self.bay = attrs.evolve(bay, guide=alone.bay.guide)
+                course = self.solved(with_others(self.bay, course))
+                settled = None if course is None or course.room < -NEARER else self.settled(course)
                 if settled is not None:
                     return settled
-            self.bay = bay  # lines that turned with a course which is none would mislead the next one
+                self.bay = bay  # lines that turned with a course which is none would mislead the next one
         quickest, lifted = self.chosen = self.chosen or self.linear()
         up = lifted(duration) if quickest.up.duration <= duration else None
         return None if up is None else self.settled(stretched(quickest, up))
@@ -261,7 +265,7 @@ def has_room(course: Course) -> bool:
 
 def lacking(course: Course) -> float:
     """Weigh what a course lacks as programs do: room to stacks, and its way to the target, which is dear."""
-    return MISSING * course.miss - course.room
+    return MISSING * max(course.miss, 0.0) + max(-course.room, 0.0)
 
 
 def with_others(bay: Bay, course: Course) -> Course:
@@ -289,9 +293,13 @@ def _there(bay: Bay, course: Course | None) -> Course:
 
 def none_found(bay: Bay) -> SolverDiverged:
     """Say that no motion was found: the likeliest cause is an end beside which loads swing on too far."""
-    sentence = Phrase(
-        "move.duration: no duration was found in which the load passes the stacks; widen the limits."
-    )
+    template = "move.duration: no duration was found in which the load passes the stacks; widen the limits."
+    if not bay.spec.move.shortest:
+        template = (
+            "move.duration: no motion of {asked:g} s was found in which the load passes the stacks; allow "
+            "more time, or widen the limits."
+        )
+    sentence = Phrase(template, asked=bay.spec.move.duration)
     zone, room = bay.tightest
     path, allowed = bay.spec.path, max(bay.spec.check.residual_sway.values())
     if len(bay.machines) > 1 and zone is not None and room < allowed:

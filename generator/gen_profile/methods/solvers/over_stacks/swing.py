@@ -167,8 +167,8 @@ def followed(
 ) -> FollowedMachines:
     """Integrate by the classical method of Runge and Kutta, with the derivatives.
 
-    Derivatives of rates cost most: those in the middle of a step are taken once, those at its end again at the
-    next one's begin.
+    Derivatives of rates cost most: those in the middle of a step are taken once, and those at its end again
+    at the next one's begin.
 
     Parameters
     ----------
