@@ -59,6 +59,14 @@ def paper(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def brief(tmp_path_factory):
+    """The same without other methods, which take seconds to draw."""
+    path = tmp_path_factory.mktemp("report") / "brief.html"
+    assert run_here("report", "--preset", "paper", "--no-compare", "--out", path).code == 0
+    return path
+
+
 @pytest.fixture
 def shown(browser, paper):
     """The page as it was loaded, for tests that change nothing in it: to draw it takes seconds."""
@@ -149,8 +157,8 @@ def test_it_is_accessible(browser, paper, width, scheme, rules):
         browser.visit("about:blank")  # or all would be drawn again in the other colours
 
 
-def test_the_animation_plays_in_real_time(browser, paper):
-    browser.open(paper)
+def test_the_animation_plays_in_real_time(browser, brief):
+    browser.open(brief)
     before = browser.run(LOADS)
     browser.find(".play").click()
     clock = np.array(
@@ -175,9 +183,9 @@ def test_the_animation_plays_in_real_time(browser, paper):
     assert browser.run("return document.querySelector('.time').value") == still
 
 
-def test_the_slider_sets_the_time_and_larger_sway_is_drawn_larger(browser, paper):
+def test_the_slider_sets_the_time_and_larger_sway_is_drawn_larger(browser, brief):
     """The nominal load leaves the plumb line by its sway, on the scale of the way that its trolley goes."""
-    browser.open(paper)
+    browser.open(brief)
 
     def places():
         return browser.run(
@@ -280,7 +288,7 @@ def test_on_a_phone_every_cell_of_a_table_is_on_the_screen(browser, paper):
     assert browser.run(cut) == []
 
 
-def test_in_the_dark_words_and_curves_stand_out_and_paper_stays_white(browser, paper):
+def test_in_the_dark_words_and_curves_stand_out_and_paper_stays_white(browser, brief):
     def shades():
         return browser.run(
             """
@@ -290,7 +298,7 @@ def test_in_the_dark_words_and_curves_stand_out_and_paper_stays_white(browser, p
 
     dark = ["rgb(20, 25, 30)", "#14191e", "#e3e8ed"]
     with browser.emulated("dark"):
-        browser.open(paper)
+        browser.open(brief)
         assert shades() == dark
         browser.run("dispatchEvent(new Event('beforeprint'))")
         browser.wait("return document.querySelector('.plot')._fullLayout.paper_bgcolor === '#fff'")
@@ -397,7 +405,7 @@ def test_a_hostile_text_is_a_text_wherever_it_stands(browser, tmp_path):
 
 def test_even_what_escapes_its_place_is_not_run(browser, tmp_path):
     """The policy in the page's head refuses what the page did not bring itself."""
-    content = render(page("harmless")).replace(
+    content = render(page(["harmless"])).replace(
         b"<main>", b"<main><script>window.bitten=1</script><img src=x onerror=window.bitten=2>"
     )
     (tmp_path / "broken.html").write_bytes(content)
