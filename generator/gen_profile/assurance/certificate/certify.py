@@ -23,6 +23,7 @@ from gen_profile.support.errors import CertificateError
 FEW = 16  # boxes, up to which `CertificateOptions.radians_per_box` holds
 FEWEST_TERMS = 4  # of series in parameters
 LEAST_POWER, WIDEST = 1e-6, 0.5  # what they leave out where motions change little; how wide a range counts as
+POINT = 40  # halvings, after which a range is one machine
 PLACES = 17  # along a range, at which phases are looked at
 SLACK = 1e-3  # relative, by which a bound is stated higher than found, as other rounding could break it
 NEAR = 1e-5  # of what is allowed: a smooth motion that is as near to the axes' is near enough
@@ -90,6 +91,8 @@ class Attempt:
         Greatest sway that was met, in m, and by how much nearer than the clearance.
     fraction : float
         Of the whole box, of which a bound is proved.
+    reached : bool
+        Whether a bound was found of any machine, be it by itself.
     """
 
     theorem: Theorem
@@ -99,6 +102,7 @@ class Attempt:
     bounds: Array
     largest_met: Array
     fraction: float
+    reached: bool = True
 
 
 def attempt(
@@ -132,6 +136,7 @@ def attempt(
     limits = theorem.allowed
     done, tried = dict[DyadicBox, _Proof](), 0
     largest_met, fruitless, before = np.zeros(len(limits)), 0, np.inf
+    middle = tuple((POINT, 2 ** (POINT - 1)) for _ in theorem.ranges.names)
     while waiting:
         prove = partial(_prove, theorem, _wanted(theorem, largest_met, options))
         for batch, proofs, here in in_order(prove, _integrated(theorem, waiting)):
@@ -147,6 +152,10 @@ def attempt(
         worst = float(above.max()) if proved.all() else np.inf
         nearer = worst < options.worth_halving * before if proved.all() else bool(proved.any())
         fruitless, before = 0 if nearer else fruitless + 1, min(before, worst)
+        if tried == len(done) and not proved.any():  # at first
+            _, (alone,), _ = prove(next(_integrated(theorem, [middle])))
+            if not np.isfinite(alone.bound).all():
+                return _attempt(theorem, {}, largest_met, reached=False)
         if tried + 2 * len(coarse) > most or fruitless == options.max_fruitless:
             break
         waiting = [part for box in coarse for part in halves(box, int(np.argmax(done[box].tails)))]
@@ -254,7 +263,9 @@ def _prove(
     return batch, proofs, np.nanmax(bounds.largest_met, axis=0, initial=0.0)
 
 
-def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array) -> Attempt:
+def _attempt(
+    theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array, *, reached: bool = True
+) -> Attempt:
     """Keep the boxes with a bound."""
     proved = {box: proof for box, proof in done.items() if np.isfinite(proof.bound).all()}
     return Attempt(
@@ -265,6 +276,7 @@ def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array
         bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(largest_met)),
         largest_met=largest_met,
         fraction=float(volume(proved)),
+        reached=reached,
     )
 
 

@@ -57,6 +57,8 @@ class Certificate(Summarised):
         Likewise.
     clearance : ProvedClearance or None
         Of what stands in the way, where the spec states it.
+    reached : bool
+        Whether a bound was found of any machine, be it by itself.
     rounded : bool
         Whether setpoints are rounded to counts, for the reasons where nothing is proved.
     not_rechecked : tuple of str
@@ -79,6 +81,7 @@ class Certificate(Summarised):
     motions: tuple[Motions, ...]
     scales: Array
     clearance: ProvedClearance | None = None
+    reached: bool = True
     rounded: bool = False
     not_rechecked: tuple[str, ...] = ()
     unproved: tuple[str, ...] = ()
@@ -102,16 +105,23 @@ class Certificate(Summarised):
     def reasons(self) -> tuple[str, ...]:
         """Say what is not proved, a sentence each."""
         if self.fraction < 1.0:
-            coarse, others = "", "swing too far, or differ too much"
+            coarse, cause = "", ""
             if self.rounded:
+                cause = ", or positions are rounded to counts that are too coarse for a bound"
                 coarse = (
-                    ", or count positions more finely (axis.counts_per_metre), "
-                    "or issue them in a longer cycle (export.cycle_time)"
+                    "count positions more finely (axis.counts_per_metre), or issue them in a longer cycle "
+                    "(export.cycle_time)"
                 )
-                others += ", or positions are rounded to counts that are too coarse for a bound"
+            if not self.reached:
+                return (
+                    "No bound was found, not even of one machine in the middle of the ranges by itself: what "
+                    "a proof adds up grows too much over this motion, as with a hook block on a rope that is "
+                    f"hoisted{cause}. Narrower ranges are no help{coarse and f'; {coarse}'}.",
+                )
             return (
-                f"Bounds are proved for {100.0 * self.fraction:.3g} % of the machines; others {others}: "
-                f"narrow the ranges (check.uncertain), or take more time{coarse}.",
+                f"Bounds are proved for {100.0 * self.fraction:.3g} % of the machines; others swing too far, "
+                f"or differ too much{cause}: narrow the ranges (check.uncertain), or take more time"
+                f"{coarse and f', or {coarse}'}.",
             )
         reasons = [sway.reason for sway in self.sways]
         if self.clearance is not None:

@@ -176,6 +176,7 @@ def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certific
         terms=theorem.terms,
         motions=result.motions,
         scales=result.scales,
+        reached=result.reached,
         rounded=bool(artefact.setpoints.resolution.any()),
         not_rechecked=not_covered(artefact.path, artefact.spec),
         unproved=unproved(artefact.spec),
