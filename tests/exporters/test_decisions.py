@@ -259,6 +259,15 @@ def test_a_target_that_creeps_is_led_to_by_what_failed_for_the_one_before(blocks
     assert table.ask(CHOOSE, **committed)["fRamp"] > 0.0
 
 
+def test_a_target_to_which_the_axis_is_led_already_is_taken_while_another_one_is_sought(blocks):
+    """It went away from there, to a target that had been given for 40 ms."""
+    for end, taken in ((30.0, 1.0), (12.0, 0.0)):
+        table = Table(blocks)
+        table.command(TARGET, 20.0, fEnd=end)
+        found = table.command(TARGET, 30.0, bSeeks=1.0)
+        assert found["bChange"] == taken and found["fAim"] == (30.0 if taken else 20.0)
+
+
 def test_from_rest_what_swings_is_left_where_it_cannot_be_calmed(blocks):
     table = Table(blocks)
     table.command(SPEED, 0.5, fPlace=20.0, bStands=1.0)

@@ -59,9 +59,9 @@ def test_speeds_are_those_of_the_kind(bounds):
         (THERE, -1.0, 0.05, {"fToward": -3.0}),
         (RAMP, 0.38, 0.82, moves | {"fRamp": 1.6}),
         (RAMP, -0.52, 0.42, moves | {"fRamp": -1.0}),
-        (RAMP, 0.25, 0.95, moves | {"fRamp": 1.6, "nSlots": 21}),  # more than a period also calms what swings
-        (RAMP, -0.02, 0.95, moves | {"fStart": 0.1, "fBefore": 0.1, "fRamp": 1.6, "nSlots": 21}),
-        (RAMP, -0.95, 0.02, {"fStart": -0.1, "fBefore": -0.1, "fRamp": -1.6, "nSlots": 21}),
+        (RAMP, 0.31, 0.89, moves | {"fRamp": 1.6, "nSlots": 21}),  # more than a period also calms what swings
+        (RAMP, -0.02, 0.89, moves | {"fStart": 0.05, "fBefore": 0.05, "fRamp": 1.6, "nSlots": 21}),
+        (RAMP, -0.89, 0.02, {"fStart": -0.05, "fBefore": -0.05, "fRamp": -1.6, "nSlots": 21}),
         # led to 0.7 by the change of now
         (RAMP, 0.28, 0.72, {"fStart": 0.5, "fBefore": 0.4, "fRamp": 0.6, "nSlots": 20}),
         (DECLINE, -0.16, 0.82, {"fRamp": 1.6}),

@@ -10,6 +10,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, SLOT = 0.004, 0.272  # s, that of a rope of 6 m
+PERIOD = 4.6504  # s, of a gantry's rope of 5.3747 m
 MOMENTS = np.linspace(3.0, 10.0, 9)  # s, on the way
 
 
@@ -83,6 +84,31 @@ def test_ends_of_a_stop_go_no_farther_beyond_the_committed_motion_than_a_load_sw
         sways = 2.0 * acceleration * rope / 9.81
         assert out[f"fVelocity_{axis}"][-1] < 0.0
         assert 0.0 < out[f"fStopHigh_{axis}"][-1] - 60.0 * (axis == "x") - 12.0 * (axis == "y") < 1.05 * sways
+
+
+@pytest.mark.slow
+def test_a_plan_that_would_begin_as_a_stick_is_let_go_is_dropped(slow_gantry):
+    """The target was 0 as the stick is, and so the axis moved by 2 cm."""
+    stick = {"bExecute": 0.0, "bVelocity": 1.0, "fVelocityCommand_x": -2.0}
+
+    def issued(cycles):  # to 0 m, before the stick
+        block = CountedBlock(slow_gantry, fActPosition_x=60.0, fActPosition_y=12.0, fL=5.0)
+        block.hold(50)
+        return block.hold(cycles, bExecute=1.0), block.hold(200, **stick)
+
+    begins = int(np.flatnonzero(issued(200)[0]["fVelocity_y"])[0])
+    assert (issued(begins)[1]["fPosition_y"] == 12.0).all()
+
+
+@pytest.mark.slow
+def test_a_stick_from_rest_leads_no_farther_than_a_stop_from_full_speed_may(slow_gantry):
+    """Ramps of 88 slots, and declines of as many, stated ends of a stop 34 m away at 0.1 m/s."""
+    block = CountedBlock(slow_gantry, fActPosition_x=113.14, fActPosition_y=12.0, fL=5.3747)
+    block.hold(5)
+    block.hold(50, bVelocity=1.0, fVelocityCommand_x=-2.0, fVelocityCommand_y=-0.32926)
+    out = block.hold(400, fVelocityCommand_x=2.0, fVelocityCommand_y=0.35831)
+    brakes = np.abs(out["fVelocity_x"]) / 0.15 + 0.5 * PERIOD + 0.15 / 0.2  # s, once a stop is found
+    assert (out["fStopDistance_x"] < 2.0 * (0.5 * PERIOD + 1.5 * (PERIOD + brakes))).all()
 
 
 @pytest.mark.slow

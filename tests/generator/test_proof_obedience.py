@@ -277,10 +277,34 @@ def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginn
 @pytest.mark.parametrize(("left", "found"), [(0.02, True), (0.03, False)])
 def test_a_stop_that_errors_left_half_of_the_sway_for_may_use_it(left, found):
     """Axes went on to their target, as no stop without any sway was to be found."""
+    for stop in (order(700, CYCLES, STOP), order(700, CYCLES, VELOCITY, 0.0)):
+        stopping = attrs.evolve(
+            FAULTS["swings"], received=as_told(REST, attrs.evolve(MOVE, end=700), stop)
+        )
+        stopping.issued["fSwayLeft"] = np.full(CYCLES, left)
+        assert (kind_of(WORDS["swings"]) in kinds(stopping)) == found
+
+
+@pytest.mark.parametrize(("room", "found"), [(40.0, True), (0.5, False)])
+def test_a_stop_just_before_the_end_of_the_travel_may_leave_the_load_swinging(room, found):
+    """In half a metre no motion from 1 m/s leaves nothing."""
     orders = (REST, attrs.evolve(MOVE, end=700), order(700, CYCLES, STOP))
     stopping = attrs.evolve(FAULTS["swings"], received=as_told(*orders))
-    stopping.issued["fSwayLeft"] = np.full(CYCLES, left)
+    stopping.issued["fSwayLeft"] = np.full(CYCLES, 0.02)
+    end = float(stopping.position[0, 699]) + room
+    stopping = attrs.evolve(stopping, limits=[attrs.evolve(LIMITS, targets=(-100.0, end))])
     assert (kind_of(WORDS["swings"]) in kinds(stopping)) == found
+
+
+def test_the_time_to_go_may_change_as_a_stop_is_to_be_another_one():
+    """A quiet stop took the place of a prompt one 4 s before the end, and was 2 s quicker."""
+    moving = with_orders(REST, attrs.evolve(MOVE, end=700), order(700, CYCLES, STOP))
+    rests = int(np.flatnonzero(~moving.stands[700:])[-1]) + 701
+    moving.issued["fTimeToGo"][700 : rests - 100] += 3.0
+    told = kind_of(WORDS["time"])
+    assert told in kinds(moving)
+    prompt = np.arange(CYCLES) < rests - 100
+    assert told not in kinds(attrs.evolve(moving, prompt=prompt))
 
 
 def test_a_block_that_is_disabled_and_taken_over_has_no_fault():

@@ -197,14 +197,27 @@ class Followed:
 
     @cached_property
     def stopped_from(self) -> int:
-        """Cycle from which on a stop may have left the machine as given swinging.
+        """Cycle from which on a stop may have left the machine as given swinging; a stick at 0 is one of its axis.
 
-        A prompt one, or one for which errors had left less than half of the allowed sway, as it may use that.
+        A prompt one; one for which errors had left less than half of the allowed sway, as it may use that; or one
+        nearer to the travel's end than a stop leads that slows down evenly and leaves nothing.
         """
         left = self.issued.get("fSwayLeft", np.zeros(self.cycles))
-        stops = (order.begin for order in self.orders if order.kind == STOP)
-        crowded = (begin for begin in stops if left[max(begin - 1, 0)] > 0.5 * self.sway_limit)
+        stops = (
+            max(one.begin - 1, 0)
+            for one in self.orders
+            if one.kind == STOP or (one.kind == VELOCITY and not all(one.values))
+        )
+        crowded = (at for at in stops if left[at] > 0.5 * self.sway_limit or self._is_near_an_end(at))
         return min(int(np.argmax(np.append(self.prompt_stops.any(axis=0), True))), next(crowded, self.cycles))
+
+    def _is_near_an_end(self, cycle: int) -> bool:
+        takes = bounded(self, to_speeds(self, self.velocity[:, cycle]))
+        ways = 0.5 * takes * self.velocity[:, cycle]
+        return any(
+            way != 0.0 and float(self.room(k, np.array([place]), np.array([way]))[0]) < abs(way)
+            for k, (place, way) in enumerate(zip(self.position[:, cycle].tolist(), ways.tolist(), strict=True))
+        )
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""

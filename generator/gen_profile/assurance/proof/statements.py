@@ -103,11 +103,13 @@ def numbers(run: Followed) -> Iterator[Allowance]:
         if rests + 1 >= order.end or not _is_end(run, order, rests):  # another may begin in that cycle
             continue
         takes = run.reaction + 2.0 * SLOT * run.period  # a plan takes over with a slot
-        planned = order.begin + run.after(takes)  # before, it tells of the former motion
+        changes = np.flatnonzero(np.diff(run.prompt[order.begin : rests])) + 1  # of how a stop is to be
+        told = order.begin + int(changes.max(initial=0))
+        planned = told + run.after(takes)  # before, it tells of the former motion
         first = min(rests, max(planned, rests - run.after(0.5 * run.period)))
         error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * run.cycle)
         yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
-        begun = order.begin + run.after(run.reaction + run.period)
+        begun = told + run.after(run.reaction + run.period)
         if begun < rests and run.slowest == inf:
             left = (rests - np.arange(begun, rests)) * run.cycle
             over = time[begun:rests] - left
@@ -388,7 +390,8 @@ def _swings_on(run: Followed) -> Iterator[Allowance]:
         return
     own = slice(min(starts) - 1, after + 1)
     reported = any(own.start < at <= after for at in run.rest_reports)
-    if not (run.stands & run.guided)[own].all() or reported or own.start >= run.unknown_from:
+    withdrawn = reported or (run.issued["nPromise"][own] == UNKNOWN).any()
+    if not (run.stands & run.guided)[own].all() or withdrawn or own.start >= run.unknown_from:
         return
     before, now = ([0, *one.ends] for one in (run.modes, run.last_modes))
     rates = run.modes.modes.poles[before].imag / run.last_modes.modes.poles[now].imag
