@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from gen_profile.planner.design import planner_constants
 from gen_profile.planner.execution import BlockInstance
@@ -11,6 +12,7 @@ from gen_profile.planner.machine import frequencies, left_by_errors, live_modes
 from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.planner.blocks.sizes import Sizes
 from gen_profile_exporters.planner.blocks.texts import planner
+from gen_profile_exporters.playback.structured_text import literal
 
 SLOTS = 64  # of the longest programme
 SIZES = Sizes(watched=(-1.0, -0.5, 0.5, 1.0))
@@ -31,7 +33,7 @@ def spec():
 def modes(spec):
     """What the block of modes gives at live parameters: cycles of a slot, and turns, fades and gains."""
     arrays = ("aTurnRe", "aTurnIm", "aFade", "aGain", "aTickRe", "aTickIm")
-    own = "\n".join(f"{name} : ARRAY [0..{SWINGS - 1}] OF LREAL;" for name in arrays)
+    own = "\n".join(f"{name} : ARRAY [0..{SWINGS}] OF LREAL;" for name in arrays)
     block = BlockInstance(f"""{blocks_before_planner(spec)}
 FUNCTION_BLOCK Called
 VAR_INPUT fL1 : LREAL; fm2 : LREAL; bStart : BOOL; END_VAR
@@ -46,9 +48,11 @@ END_FUNCTION_BLOCK
 """)
 
     def given(rope, load):
-        issued = block.call(np.array([[rope, load, start] for start in [1.0] + SWINGS * [0.0]]))
+        issued = block.call(np.array([[rope, load, start] for start in [1.0] + (SWINGS + 1) * [0.0]]))
         assert issued[-2, 0] == 1.0 and issued[-1, 0] == 0.0
-        return int(issued[-1, 1]), *issued[-1, 2:].reshape(6, SWINGS)
+        arrays = issued[-1, 2:].reshape(6, SWINGS + 1)
+        assert (arrays[:, -1] == arrays[:, 0]).all()  # for what great swings add, that of the machine as given
+        return int(issued[-1, 1]), *arrays[:, :-1]
 
     return given
 
@@ -91,12 +95,13 @@ ROWS, PLAN = 13, 2 * SLOTS + 4
 TAKEN = ("aTurnRe", "aTurnIm", "aTickRe", "aTickIm", "aFade", "aGain")
 
 
-def knowing(text, machine, cycles):
+def knowing(text, machine, cycles, slot):
     """Put a machine that is given in place of the block of modes."""
     arrays = dict(zip(TAKEN, machine, strict=True))
-    own = "".join(f"{name} : ARRAY [0..{SWINGS - 1}] OF LREAL; " for name in TAKEN)
+    own = "".join(f"{name} : ARRAY [0..{SWINGS}] OF LREAL; " for name in TAKEN)
     known = "".join(
-        f"c{n} : ARRAY [0..{SWINGS - 1}] OF LREAL := {list(map(float, v))}; " for n, v in arrays.items()
+        f"c{n} : ARRAY [0..{SWINGS}] OF LREAL := [{', '.join(map(literal, [*map(float, v), float(v[0])]))}]; "
+        for n, v in arrays.items()
     )
     copied = "".join(f"{name}[i] := c{name}[i]; " for name in TAKEN)
     stand_in = f"""FUNCTION_BLOCK bay_crane_modes
@@ -105,8 +110,9 @@ VAR_IN_OUT aLive : ARRAY [0..1] OF LREAL; {own} END_VAR
 VAR_OUTPUT bBusy : BOOL; nSlot : DINT; fSlot : LREAL; nSpent : DINT; END_VAR
 VAR i : DINT; END_VAR
 VAR CONSTANT {known} END_VAR
-FOR i := 0 TO {SWINGS - 1} DO {copied} END_FOR;
+FOR i := 0 TO {SWINGS} DO {copied} END_FOR;
 nSlot := {cycles};
+fSlot := {slot};
 bBusy := bStart;
 END_FUNCTION_BLOCK
 """
@@ -115,14 +121,21 @@ END_FUNCTION_BLOCK
 
 
 class Account:
-    """An account of ten swings of a machine that is given, called with an order and a trial."""
+    """An account of ten swings of a machine that is given, called with an order and a trial.
 
-    def __init__(self, spec, machine, cycles):
+    Where a slot is given, in s, swings may be great.
+    """
+
+    def __init__(self, spec, machine, cycles, slot=None):
+        text = knowing(blocks_before_planner(spec), machine, cycles, slot or 1.0)
+        if slot is None:
+            text, count = re.subn(r"(cTilt : LREAL := )[^;]*", r"\g<1>1.0E-9", text)
+            assert count == 1
         orders = "\n".join(f"{name} : {type_};" for name, type_ in ORDERS.items())
         handed = ", ".join(
             f"{name} := {name}" for name in (*ORDERS, "aLive", "aTrial", "aRow", "aValue", "aRadius")
         )
-        self.block = BlockInstance(f"""{knowing(blocks_before_planner(spec), machine, cycles)}
+        self.block = BlockInstance(f"""{text}
 FUNCTION_BLOCK Called
 VAR_INPUT {orders} gTrial : ARRAY [0..{PLAN - 1}] OF LREAL; END_VAR
 VAR_OUTPUT
@@ -223,6 +236,41 @@ def test_the_account_sums_up_what_was_taken_and_what_is_planned(account, swings)
     account.call(8, fPart=0.5)
     account.call(4)
     assert account.call(12)[0] == pytest.approx(_most(gains, half) / most, rel=1e-10)
+
+
+@pytest.mark.parametrize(("speed", "within"), [(0.4, 0.03), (0.8, 0.03), (0.2, 0.05)])
+def test_what_great_swings_add_is_that_of_a_pendulum(spec, speed, within):
+    """Reversals in time with the swing, beside the nonlinear equation."""
+    length, cycles = 3.0, 10
+    rate = np.sqrt(9.81 / length)
+    slot = 2.0 * np.pi / rate / 20.0
+    rhythm = speed * np.sign(np.sin(np.pi * (np.arange(200) + 0.5) / 14.0))
+    taken = np.r_[np.convolve(rhythm, np.ones(6) / 6.0), 0.0, 0.0]
+    gain = slot * (np.sin(np.pi / 20.0) / (np.pi / 20.0)) ** 3
+    waves = [np.full(SWINGS, f(part * rate * slot)) for part in (1.0, 1.0 / cycles) for f in (np.cos, np.sin)]
+    gains = np.tile([gain, 1e-9], SWINGS // 2)
+    account = Account(spec, [*waves, np.ones(SWINGS), gains], cycles, slot)
+    account.call(11)
+    account.call(5)
+    for coefficient in taken:
+        _, left, *_ = account.call(1, fTaken=coefficient)
+
+    def apart(great):
+        knots = np.r_[0.0, 0.0, taken, 0.0, 0.0]
+
+        def slope(time, state):
+            k = min(int(time / slot), len(taken) + 1)
+            p = time / slot - k
+            push = ((1.0 - p) * (knots[k + 1] - knots[k]) + p * (knots[k + 2] - knots[k + 1])) / slot
+            back, share = (np.sin(state[0]), np.cos(state[0])) if great else (state[0], 1.0)
+            return [state[1], -(9.81 * back + push * share) / length]
+
+        end = (len(taken) + 1) * slot
+        found = solve_ivp(slope, (0.0, end), [0.0, 0.0], rtol=1e-9, atol=1e-11, max_step=slot / 2.0).y[:, -1]
+        return length * (found[0] + 1j * found[1] / rate)
+
+    swings, linear = apart(True), apart(False)
+    assert left == pytest.approx(abs(swings - linear), rel=within)  # all that was taken was committed
 
 
 def _most(gains, sums):

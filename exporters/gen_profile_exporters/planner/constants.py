@@ -51,6 +51,8 @@ class PlannerConstants:
         How fast some may change on the way, per s.
     rope_length_gain : mapping of str to float
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
+    tilt : float
+        s²/m: the inverse of gravity, where it brings loads back; where springs do, next to nothing.
     sway_limit : float
         m, that the loads may sway after a motion.
     events : bool
@@ -99,6 +101,7 @@ class PlannerConstants:
     drift: tuple[float, ...]
     rates: Mapping[str, float]
     rope_length_gain: Mapping[str, float]
+    tilt: float
     sway_limit: float
     events: bool
     zones: bool

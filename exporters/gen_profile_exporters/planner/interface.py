@@ -22,7 +22,7 @@ def interface(constants: PlannerConstants) -> str:
         "followed": bool(constants.rates),
         "zones": constants.zones,
         "events": constants.events,
-        "varied": constants.stated_error > 0.0 and not constants.rates,
+        "stays": not constants.rates,
         "measured": constants.sensor is not None,
         "prompt": may_stop_promptly(constants),
     }

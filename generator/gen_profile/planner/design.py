@@ -34,6 +34,7 @@ from gen_profile_exporters.planner.interface import SLOTS_PER_PERIOD
 
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
+SPRINGS = 1e-9  # s²/m: they bend as little as if gravity were so great
 # A cycle may spend so many at least, and so many for each ms, if the spec states none; the more where the
 # slowest mode swings faster than once in LEISURELY s, as it waits for plans.
 OPERATIONS, ZONED_OPERATIONS = 3000, 5000
@@ -123,6 +124,7 @@ def planner_constants(spec: Spec) -> tuple[LiveModes, PlannerConstants]:
         periods=tuple(
             2.0 * np.pi / _rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live)
         ),
+        tilt=1.0 / gravity if (gravity := spec.plant.parameters.get("g")) else SPRINGS,
         sway_limit=min(spec.check.residual_sway.values()),
         stated_error=float(frequency_errors(spec).max(initial=0.0)),
         prompt=spec.planner.stop == "prompt",

@@ -28,7 +28,6 @@ OVERSTATED = 0.08  # of what stated errors leave: by so much more it may be stat
 MOST_TERMS = 60
 SAME = 1e-9  # relative difference
 NEGLIGIBLE_COEFFICIENT = 1e-7  # coefficient, relative to the largest of its function
-REVERSALS = 3.0  # times the tilt by the greatest acceleration: what reversals in time with a swing make of it
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -217,7 +216,7 @@ def frequencies(invariants: Array) -> Array:
 
 
 def frequency_errors(spec: Spec) -> Array:
-    """By which share stated errors, or large swings, change each mode's frequency at most, at the live ranges' corners."""
+    """By which share the stated errors change each mode's frequency at most, at the live ranges' corners."""
     errors = [_frequency_errors(spec, point) for point in corners(spec.planner.live)]
     return np.asarray(np.max(errors, axis=0))
 
@@ -269,34 +268,11 @@ def corners(live: Collection[str]) -> list[Sequence[float]]:
 
 
 def _frequency_errors(spec: Spec, point: Sequence[float]) -> Array:
-    linear = linearized(spec, point)
-    errors = np.zeros_like(linear.distinct_frequencies)
+    frequencies = linearized(spec, point).distinct_frequencies
+    errors = np.zeros_like(frequencies)
     for wrong in _machines_of_errors(spec, point):
-        found = [np.abs(one.distinct_frequencies / linear.distinct_frequencies - 1.0) for one in wrong]
-        errors += np.max(found, axis=0)
-    return np.maximum(errors, 0.0 if spec.planner.live_rate else _by_large_swings(spec, linear))
-
-
-def _by_large_swings(spec: Spec, linear: Linearization) -> float:
-    """By which share the greatest swings of loads on ropes are slower than small ones.
-
-    The share is θ²/16 of a pendulum's amplitude θ (the first term of its elliptic integral). An axis swings
-    the loads by what it tilts them in the mean, and no more than when its velocity changes at once.
-    """
-    if not spec.plant.parameters.get("g"):
-        return 0.0
-    try:
-        _sway_matrix(linear)
-    except ValueError:
-        return 0.0
-    tilt = np.abs(np.linalg.solve(linear.stiffness, linear.input)).max(axis=0)  # rad by 1 m/s²
-    most = 0.0
-    for number in planned_axes(spec):
-        own = spec.limits.of(number)
-        assert own.velocity and own.acceleration
-        sudden = 2.0 * own.velocity * float(linear.distinct_frequencies[-1])
-        most = max(most, float(tilt[number]) * min(REVERSALS * own.acceleration, sudden))
-    return most**2 / 16.0
+        errors += np.max([np.abs(one.distinct_frequencies / frequencies - 1.0) for one in wrong], axis=0)
+    return errors
 
 
 def _machines_of_errors(spec: Spec, point: Sequence[float]) -> Iterator[list[Linearization]]:

@@ -48,6 +48,8 @@ class Sizes:
         """Give the machines that are watched."""
         if self.watched is not None:
             return self.watched
+        if not constants.stated_error:
+            return ENDS
         most, slots = operations(constants), longest(constants)
         number = next((k for k in range(MACHINES, 2, -1) if _work(constants, k, slots) <= most), 2)
         return tuple(np.linspace(-1.0, 1.0, number).tolist())

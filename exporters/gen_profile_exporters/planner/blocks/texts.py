@@ -109,6 +109,7 @@ def planner(constants: PlannerConstants, sizes: Sizes, account: str | None = Non
         "rowed": len(shown),
         "shown": initialiser([str(v) for v in shown]),
         "slots": slots,
+        "tilt": literal(constants.tilt),
         "polygon": literal(float(np.cos(np.pi / SIDES))),
         "bounds": initialiser([literal(float(v)) for v in _share(constants) * _shares(constants)]),
         "allowed": literal(constants.sway_limit / (len(constants.axes) * _share(constants))),
@@ -195,8 +196,11 @@ def _model_at(c: PlannerConstants, bent: Array) -> Array:
 def known_for(c: PlannerConstants) -> float:
     """Give the time in s for which machines between those that are watched are known to swing as these.
 
-    In it, neighbours come apart by `APART` in the slowest mode, where damping does not end it before.
+    In it, neighbours come apart by `APART` in the slowest mode, where damping does not end it before. A sensor
+    shows what swings for any time.
     """
+    if not c.stated_error or c.sensor:
+        return FOREVER
     times, steps = [FOREVER], len(Sizes().of(c)) - 1
     for period, end in zip(c.periods, product((-1.0, 1.0), repeat=len(c.live)), strict=True):
         time = APART * steps * period / (4.0 * np.pi * c.stated_error)
@@ -218,7 +222,7 @@ def _of_modes(c: PlannerConstants, watched: Sequence[float]) -> dict[str, object
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cCycle": c.cycle,
         "cLeastDecay": c.least_decay,
-        "cWatched": list(watched),
+        "cWatched": [*watched, 0.0],
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveBend": [float(v) for v in c.curvatures or (0.0, 0.0)],

@@ -64,10 +64,8 @@ def _renamed(text: str, name: str, own: str) -> str:
 
 
 def _shell(c: PlannerConstants, values: Mapping[str, str]) -> str:
-    varied = c.stated_error > 0.0 and not c.rates
-    stated = {"zones": c.zones, "events": c.events, "varied": varied, "followed": bool(c.rates)}
-    stated |= {"exact": not varied and not c.rates, "measured": c.sensor is not None, "stays": not c.rates}
-    stated["several"] = len(c.axes) > 1
+    stated = {"zones": c.zones, "events": c.events, "followed": bool(c.rates), "stays": not c.rates}
+    stated |= {"measured": c.sensor is not None, "several": len(c.axes) > 1}
     stated["prompt"] = may_stop_promptly(c)
     body = (FOLDER / "shell.st").read_text("ascii")
     words = c.sensor.words if c.sensor else {}
@@ -124,8 +122,8 @@ def _constants(c: PlannerConstants) -> dict[str, object]:
             "cRoused": c.sensor.roused,
             "cKnown": c.sensor.end,
         }
-    if c.stated_error > 0.0 and not c.rates:
-        common["cKnownFor"] = known_for(c) if c.sensor is None else FOREVER  # which shows what swings
+    if not c.rates:
+        common["cKnownFor"] = known_for(c)
     if c.rates:
         common["cLiveStep"] = [(1.0 + ROUNDING) * c.rates.get(name, 0.0) * c.cycle for name in c.live]
     for axis in c.axes:

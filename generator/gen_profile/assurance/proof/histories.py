@@ -151,11 +151,6 @@ class History:
         return lost or any(map(self._has, ("bEnable", *(f"f{name}" for name in self.live))))
 
     @property
-    def prompt(self) -> bool:
-        """Whether stops may leave more sway than other motions."""
-        return self.stops == "prompt" or self._has("bPromptStop")
-
-    @property
     def moved(self) -> bool:
         """Whether axes are moved by hand."""
         return self._has("fActVelocity")

@@ -42,6 +42,8 @@ class WatchedRun:
         Whether a sensor had at the end not yet shown a motion of its axis, so that nothing may be promised.
     braked : bool
         Whether axes were braked as an interval came nearer than it was stated that they stop.
+    hurried : bool
+        Whether one stopped in less time, or on a shorter way, than a stop takes that leaves nothing.
     """
 
     run: BlockRun
@@ -52,6 +54,7 @@ class WatchedRun:
     exercised: Pairs = attrs.field(factory=dict)
     unproven: bool = False
     braked: bool = False
+    hurried: bool = False
 
 
 def judge_run(
@@ -129,7 +132,7 @@ def _faults(
         yield from _axis_faults(history, named, axis, limits, ROUNDING + braked)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    unknown = history.brakes or history.disturbed or history.prompt or watched.unproven or watched.braked
+    unknown = history.brakes or history.disturbed or watched.hurried or watched.unproven or watched.braked
     if not run.promise and not (unknown or lasts):
         yield TAKEN_BACK
 

@@ -175,6 +175,7 @@ class BlockWatch:
             obeyed=obeyed(followed),
             exercised=tried,
             braked=bool(followed.brakings),
+            hurried=followed.stopped_from < followed.cycles,
         )
 
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
