@@ -179,7 +179,7 @@ def test_a_hand_in_time_with_the_swing_breaks_no_promise(text):
 def test_a_report_that_the_load_hangs_still_begins_anew(text):
     crane = Crane(text, 3.0, 100.0).works(np.random.default_rng(1), 500.0, 3.0)
     crane.hold(60.0, bVelocity=0.0)
-    assert crane.outputs["fSwayLeft"][-1] > 0.5 * LIMIT
+    assert crane.outputs["fSwayLeft"][-1] > 0.4 * LIMIT
     crane.hold(1.0, bLoadAtRest=1.0)
     begin = len(crane.outputs["bPromise"])
     assert crane.outputs["fSwayLeft"][-1] == 0.0
