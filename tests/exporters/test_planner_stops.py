@@ -101,6 +101,22 @@ def test_a_plan_that_would_begin_as_a_stick_is_let_go_is_dropped(slow_gantry):
 
 
 @pytest.mark.slow
+def test_a_stop_stays_within_the_ends_that_a_tap_before_it_stated(slow_gantry):
+    """It stated wider ones, as its own, and left those of the tap by a millimetre."""
+    for moves in range(10, 100, 6):
+        block = CountedBlock(slow_gantry, fActPosition_x=60.0, fActPosition_y=12.0, fL=11.0)
+        block.hold(20)
+        block.hold(2, bVelocity=1.0, fVelocityCommand_x=0.5, fVelocityCommand_y=-0.46)
+        tapped = block.hold(moves, fVelocityCommand_x=0.0, fVelocityCommand_y=0.0)
+        stops = block.hold(500, bVelocity=0.0, bStop=1.0)
+        for axis in "xy":
+            low, high = (tapped[f"fStop{end}_{axis}"][-1] for end in ("Low", "High"))
+            if tapped[f"fVelocity_{axis}"][-1]:
+                assert low - 1e-9 <= stops[f"fPosition_{axis}"].min()
+                assert stops[f"fPosition_{axis}"].max() <= high + 1e-9
+
+
+@pytest.mark.slow
 def test_a_stick_from_rest_leads_no_farther_than_a_stop_from_full_speed_may(slow_gantry):
     """Ramps of 88 slots, and declines of as many, stated ends of a stop 34 m away at 0.1 m/s."""
     block = CountedBlock(slow_gantry, fActPosition_x=113.14, fActPosition_y=12.0, fL=5.3747)

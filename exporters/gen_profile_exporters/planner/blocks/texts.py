@@ -137,13 +137,15 @@ def _following(constants: PlannerConstants, account: str | None) -> dict[str, st
     """Fill what depends on whether an account follows the machine, and on whether the load is measured."""
     several = len(constants.axes) > 1
     straight = several or constants.sensor is not None
+    still = " AND NOT bUncalm" if constants.sensor else " AND (fSwayLeft <= cSwayLimit)"
     left = f"damping.nLittle < {LITTLE}" if constants.sensor else "table.bCalms AND (table.nPartly > 0)"
     return {
         "follows": int(account is not None),
         "is_measured": int(constants.sensor is not None),
         "left": f"bLeft := {left}," if account else "",
         "uncalm": "bUncalm := bUncalm AND bCalms AND NOT bPlanned," if account else "",
-        "still": " AND (fSwayLeft <= cSwayLimit)" if account else "",
+        "still": still if account else "",
+        "wide": "0.15" if constants.rates else "0.09",  # a rope that changes needs more to be calmed
         "unmeasured": "bUncalm" if constants.rates else "FALSE",
         "calm_slots": LITTLE,
         "room": ROOM.format("cCalmRoom" if constants.sensor else "fPart") if straight else "",
