@@ -51,7 +51,9 @@ END_FUNCTION_BLOCK
         issued = block.call(np.array([[rope, load, start] for start in [1.0] + (SWINGS + 1) * [0.0]]))
         assert issued[-2, 0] == 1.0 and issued[-1, 0] == 0.0
         arrays = issued[-1, 2:].reshape(6, SWINGS + 1)
-        assert (arrays[:, -1] == arrays[:, 0]).all()  # for what great swings add, that of the machine as given
+        assert (
+            arrays[:, -1] == arrays[:, 0]
+        ).all()  # for what great swings add, that of the machine as given
         return int(issued[-1, 1]), *arrays[:, :-1]
 
     return given

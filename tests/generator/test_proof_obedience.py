@@ -278,9 +278,7 @@ def test_what_is_planned_for_another_rope_is_not_held_against_that_of_the_beginn
 def test_a_stop_that_errors_left_half_of_the_sway_for_may_use_it(left, found):
     """Axes went on to their target, as no stop without any sway was to be found."""
     for stop in (order(700, CYCLES, STOP), order(700, CYCLES, VELOCITY, 0.0)):
-        stopping = attrs.evolve(
-            FAULTS["swings"], received=as_told(REST, attrs.evolve(MOVE, end=700), stop)
-        )
+        stopping = attrs.evolve(FAULTS["swings"], received=as_told(REST, attrs.evolve(MOVE, end=700), stop))
         stopping.issued["fSwayLeft"] = np.full(CYCLES, left)
         assert (kind_of(WORDS["swings"]) in kinds(stopping)) == found
 

@@ -216,7 +216,9 @@ class Followed:
         ways = 0.5 * takes * self.velocity[:, cycle]
         return any(
             way != 0.0 and float(self.room(k, np.array([place]), np.array([way]))[0]) < abs(way)
-            for k, (place, way) in enumerate(zip(self.position[:, cycle].tolist(), ways.tolist(), strict=True))
+            for k, (place, way) in enumerate(
+                zip(self.position[:, cycle].tolist(), ways.tolist(), strict=True)
+            )
         )
 
     def moved(self, begin: int, end: int) -> float:
