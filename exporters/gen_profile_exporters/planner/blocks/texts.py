@@ -198,8 +198,8 @@ def _model_at(c: PlannerConstants, bent: Array) -> Array:
 def known_for(c: PlannerConstants) -> float:
     """Give the time in s for which machines between those that are watched are known to swing as these.
 
-    In it, neighbours come apart by `APART` in the slowest mode, where damping does not end it before. A sensor
-    shows what swings for any time.
+    In it, neighbours come apart by `APART` in the slowest mode, where damping does not end it before. A
+    sensor shows what swings for any time.
     """
     if not c.stated_error or c.sensor:
         return FOREVER

@@ -9,7 +9,6 @@ from gen_profile_exporters.planner.blocks.measured import observer
 from gen_profile_exporters.planner.blocks.sizes import Sizes, operations, shell_work
 from gen_profile_exporters.planner.blocks.texts import (
     FOLDER,
-    FOREVER,
     constant_lines,
     filled,
     known_for,

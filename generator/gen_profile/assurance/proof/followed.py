@@ -197,10 +197,11 @@ class Followed:
 
     @cached_property
     def stopped_from(self) -> int:
-        """Cycle from which on a stop may have left the machine as given swinging; a stick at 0 is one of its axis.
+        """Cycle from which on a stop may have left the machine as given swinging.
 
-        A prompt one; one for which errors had left less than half of the allowed sway, as it may use that; or one
-        nearer to the travel's end than a stop leads that slows down evenly and leaves nothing.
+        A prompt one; one for which errors had left less than half of the allowed sway, as it may use that; or
+        one nearer to the travel's end than a stop leads that slows down evenly and leaves nothing. A stick at
+        0 is a stop of its axis.
         """
         left = self.issued.get("fSwayLeft", np.zeros(self.cycles))
         stops = (
