@@ -10,6 +10,7 @@ from gen_profile.methods.solvers.indirect.linear_response import linear_response
 N = 5
 MESH = np.array([0.0, 0.2, 0.35, 0.6, 0.8, 1.0])
 EVEN = np.linspace(0.0, 1.0, 6)
+HALVED = np.array([0.0, 0.25, 0.375, 0.5, 0.75, 1.0])
 
 
 def turning(t):
@@ -27,9 +28,10 @@ def response_of(matrix, mesh, scheme=LONG_GAUSS):
     return linear_response(A, scheme, np.diff(mesh))
 
 
-@pytest.fixture(params=["varying", "constant"])
+@pytest.fixture(params=["varying", "constant", "constant on some lengths"])
 def case(request):
-    return (turning, MESH) if request.param == "varying" else (lambda t: turning(0.0), EVEN)
+    meshes = {"varying": MESH, "constant": EVEN, "constant on some lengths": HALVED}
+    return turning if request.param == "varying" else (lambda t: turning(0.0)), meshes[request.param]
 
 
 def force(t):
@@ -114,3 +116,13 @@ def test_one_interval_stands_for_all_only_where_all_are_alike():
     assert len(still.slopes) == 1
     assert len(response_of(lambda t: turning(0.0), MESH).slopes) == 5
     assert len(response_of(turning, EVEN).slopes) == 5
+
+
+def test_intervals_of_one_length_are_eliminated_once(monkeypatch):
+    inverse, inverted = np.linalg.inv, []
+    monkeypatch.setattr(
+        np.linalg, "inv", lambda matrices: inverted.append(len(matrices)) or inverse(matrices)
+    )
+    response_of(lambda t: turning(0.0), HALVED)
+    response_of(turning, HALVED)
+    assert inverted == [2, 5]

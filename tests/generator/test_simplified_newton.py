@@ -115,3 +115,10 @@ def test_converges_the_faster_the_less_it_swings():
     ]
     assert counts == sorted(counts)
     assert counts[0] <= 2
+
+
+def test_a_machine_is_linearised_anew_only_while_its_motion_still_changes_much(monkeypatch):
+    model, made = simplified_newton._model, []
+    monkeypatch.setattr(simplified_newton, "_model", lambda *given: made.append(given) or model(*given))
+    iterations = indirect.solve(PROBLEMS["hoist"]).iterations
+    assert 0 < len(made) < 0.7 * iterations

@@ -73,7 +73,7 @@ def least_cost(
         reached = sway + outputs[:, :sways]
         pull, (slopes, stiffness[:, :sways, :sways]) = outputs.copy(), cost.derivatives(reached)
         pull[:, :sways] = slopes - before
-        pulled = ((weights[..., None] * stiffness)[..., None] * machine.gain[:, None]).sum(axis=2)
+        pulled = (weights[..., None] * stiffness) @ machine.gain
         hessian = gain.T @ pulled.reshape(gain.shape)
         hessian.flat[:: size + 1] += machine.effort
         change, multipliers = _newton_step(

@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.methods.solvers.collocation import IntArray, Scheme
 from gen_profile.motion.profile import Array
 
-EQUAL_LENGTHS = 1e-12  # of interval lengths, relative to the whole, within which they are equal
+EQUAL_DIGITS = 12  # of interval lengths, relative to the whole, in which equal ones agree
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -139,14 +139,16 @@ def linear_response(A: Array, scheme: Scheme, lengths: Array) -> LinearResponse:
     numpy.linalg.LinAlgError
         When the equations of an interval are singular.
     """
-    lengths = lengths[:, None, None]
-    if (A[0, 0] == A).all() and np.ptp(lengths) < EQUAL_LENGTHS:
-        A = A[:1]
-    count, stages, n, _ = A.shape
-    inner = -np.einsum("kij,kiab->kiajb", lengths[:count] * scheme.A, A).reshape(count, stages * n, -1)
+    alike = each = np.arange(len(A))  # intervals that stand for all like them
+    if (A[0, 0] == A).all():
+        _, alike, each = np.unique(lengths.round(EQUAL_DIGITS), return_index=True, return_inverse=True)
+        A = A[:1] if len(alike) == 1 else A
+    lengths, (count, stages, n, _) = lengths[:, None, None], A.shape
+    inner = -np.einsum("kij,kiab->kiajb", lengths[alike] * scheme.A, A[alike])
+    inner = inner.reshape(len(alike), stages * n, -1)
     diagonal = np.arange(stages * n)
     inner[:, diagonal, diagonal] += 1.0
-    slopes = np.linalg.inv(inner)
+    slopes = np.linalg.inv(inner)[each[:count]]
     by_node = slopes @ A.reshape(count, stages * n, n)
     across = lengths[:count] * (scheme.b @ by_node.reshape(count, stages, n * n))[:, None]
     return LinearResponse(

@@ -31,6 +31,9 @@ from gen_profile.support.work import spend
 
 BELIEVED_RATE = 0.01  # least quotient of steps that is taken for the rate of convergence
 SLOW_SIMPLIFIED = 0.5  # fraction of the step before beyond which another method is the better one
+# step from which on a machine that changes on the way is linearised anew; the later models change convergence
+# no more, for what they lack is the curvature of the equations
+MODELLED = 0.03
 CONTROLS_WORK = 1e-7  # s of work for the square of the number of controls
 MOST_CONTROLS = 1200  # up to which to solve for all of them at once; above 1500 the full method is as quick
 
@@ -101,7 +104,7 @@ def solve_simplified(problem: BoundaryValueProblem, start: Trajectory) -> Newton
             return NewtonOutcome(solution=current.trajectory, iterations=iteration, residual=step)
         if not shrinkage < 1.0:
             break
-        if not model.is_uniform:
+        if not model.is_uniform and step > MODELLED:
             model = _model(problem, current.trajectory, current.trajectory.points)
     return NewtonOutcome(solution=None, iterations=iteration, residual=step)
 
