@@ -16,6 +16,7 @@ import pytest
 from hypothesis import settings
 from turns import TURNS, near, rooms_of, turns
 
+from gen_profile.support.remembered import forget
 from gen_profile.support.same_bits import choose_common_kernels
 
 choose_common_kernels()  # before NumPy is loaded, too: bytes are compared with those of the program
@@ -132,6 +133,12 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Halve the intervals of limited motions: what is refused, named and found to work is so on any mesh."""
     set_up = "gen_profile.methods.solvers.direct.set_up"
     monkeypatch.setattr(f"{set_up}.USUAL", import_module(set_up).DirectOptions(intervals=20))
+
+
+@pytest.fixture(autouse=True)
+def nothing_remembered() -> None:
+    """Let no test find what another one has computed, perhaps by other methods."""
+    forget()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,6 +20,7 @@ from gen_profile.methods.solvers.direct.set_up import DirectOptions
 from gen_profile.methods.solvers.indirect import solver as indirect
 from gen_profile.methods.solvers.indirect.boundary_value_problem import IndirectOptions, canonical_problem
 from gen_profile.plants.registry import find_plant
+from gen_profile.support.remembered import forget
 
 JERK_AT_START = 25.867416  # m/s³, β = 50
 REPEATS = 15
@@ -116,6 +117,7 @@ def test_beside_general_tools():
 
     def cold():
         optimality_system.cache_clear()
+        forget()
         indirect.solve(problem)
 
     anew = best(cold)
@@ -135,9 +137,11 @@ def test_growth_with_intervals(intervals):
         options = kind(intervals=intervals, max_intervals=max(480, intervals))
         module.solve(problem, options=options)
         tracemalloc.start()
+        forget()
         module.solve(problem, options=options)
         memory = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
+        forget()
         began = time.perf_counter()
         solution = module.solve(problem, options=options)
         spent = time.perf_counter() - began
@@ -165,6 +169,7 @@ def test_growth_with_states(masses):
     )
     for module in (indirect, direct):
         module.solve(problem)
+        forget()
         began = time.perf_counter()
         solution = module.solve(problem)
         spent = time.perf_counter() - began
@@ -176,6 +181,7 @@ def test_growth_with_uncertain_parameters(names):
     problem = crane_problem(desensitized=names)
     for module in (indirect, direct):
         module.solve(problem)
+        forget()
         began = time.perf_counter()
         solution = module.solve(problem)
         spent = time.perf_counter() - began

@@ -123,6 +123,18 @@ class Problem:
         past = None if self.limits.overshoot is None else share * self.limits.overshoot
         return attrs.evolve(self, limits=LimitsSpec(sway=self.limits.sway, overshoot=past, axis=axis))
 
+    def without_limits(self) -> Problem:
+        """Leave out limits, the machines for which they hold, and that the worst machine counts."""
+        return attrs.evolve(
+            self,
+            limits=LimitsSpec(),
+            targets=(),
+            overshoot_margin=0.0,
+            sway_spread=1.0,
+            worst_case=None,
+            ranges={},
+        )
+
     @property
     def nominal_sway(self) -> float | None:
         """What the limit of sway on the way leaves to the nominal machine, in m; None without a limit."""

@@ -22,7 +22,7 @@ from gen_profile.methods.solvers.draft import Plan, drafted, suggested
 from gen_profile.methods.solvers.indirect.extremal import METHOD as INDIRECT
 from gen_profile.methods.solvers.search import Search, least
 from gen_profile.methods.solvers.solution import LONGER, Solution, Status
-from gen_profile.spec.model import LimitsSpec, Spec
+from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion, rounded_up
 from gen_profile.support.phrase import Phrase
@@ -347,7 +347,7 @@ def _smoother(spec: Spec, options: SuggestionOptions, *, in_time: bool = False) 
     """
     asked = spec
     for _ in range(SMOOTH_TRIES):
-        free = attrs.evolve(problem_of(asked), limits=LimitsSpec(), worst_case=None)
+        free = problem_of(asked).without_limits()
         draft = drafted(asked, choice.attempt(free, "indirect"))
         if draft.found is None:
             return None

@@ -25,6 +25,8 @@ from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.values import SolverName
 from gen_profile.support.progress import Progress, no_progress
+from gen_profile.support.remembered import remembered
+from gen_profile.support.work import left
 
 ACCEPTED = 1.005  # times the limit that the worst machine may sway
 NEARLY_ACCEPTED = 1.008  # likewise where solving again takes long
@@ -63,6 +65,7 @@ def attempt(
     return kept_by_all(problem, spec.solver.solver, progress)
 
 
+@remembered(lambda problem, method, progress=None, *, coarse=False: (problem, method, coarse, left()))
 def kept_by_all(
     problem: Problem, method: SolverName, progress: Progress = no_progress, *, coarse: bool = False
 ) -> Solution:

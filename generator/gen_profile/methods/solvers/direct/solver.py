@@ -35,8 +35,8 @@ from gen_profile.methods.solvers.direct.transcription import Iterate
 from gen_profile.methods.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.methods.solvers.solution import HORIZONTAL, LATER, LONGER, WIDER, Optimum, Solution, Status
 from gen_profile.motion.profile import Array
-from gen_profile.spec.model import LimitsSpec
 from gen_profile.support.one_thread import one_thread
+from gen_profile.support.remembered import remembered
 from gen_profile.support.work import OutOfWork, afford, left
 
 METHOD = "direct"
@@ -220,7 +220,7 @@ def solve(
         Never raises for a problem that has none: the status says why.
     """
     setup, redundant = set_up(problem, options=options)
-    sway_cost, iterations = resolve_sway_cost(setup.problem, near)
+    sway_cost, iterations = resolve_sway_cost(setup.problem)
     setup, start = begun_at(setup, near)
 
     def attempt(sway_limit: float | None) -> Solution:
@@ -245,7 +245,7 @@ def mirrored(problem: Problem) -> ProgramSequence:
     From rest the programs come to motions that swing little, if there are any; where swings are so great that
     their periods grow, others that swing farther may cost less, and these are found from there.
     """
-    setup, _ = set_up(attrs.evolve(problem, limits=LimitsSpec(), worst_case=None))
+    setup, _ = set_up(problem.without_limits())
     goal = Goal(setup=setup, sway_limit=None)
     linear = sequence(setup.transcription.rest(), goal, np.inf)
     return attrs.evolve(linear, iterate=linear.iterate.of_flat(-linear.iterate.flat()))
@@ -270,18 +270,29 @@ def begun_at(setup: Setup, near: ProgramSequence | None) -> tuple[Setup, Iterate
     return setup, setup.transcription.rest()
 
 
-def resolve_sway_cost(problem: Problem, near: ProgramSequence | None = None) -> tuple[SwayCost, int]:
+def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     """Give β and γ their values, and count the iterations that it took."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
         return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
-    unweighted = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
-    solution = solve(unweighted, near)
-    sway = 0.0 if solution.optimum is None else sway_on_the_way(solution)
-    if solution.optimum is None or not 0.0 < sway < np.inf:  # a hoist alone swings nothing
-        return UNWEIGHTED, solution.iterations
-    effort = solution.optimum.cost / problem.duration
+    sway, effort, iterations = _unweighted(problem)
+    if not 0.0 < sway < np.inf:  # a hoist alone swings nothing
+        return UNWEIGHTED, iterations
     beta = problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2
-    return SwayCost(beta=beta, gamma=AUTO_SWAY / sway), solution.iterations
+    return SwayCost(beta=beta, gamma=AUTO_SWAY / sway), iterations
+
+
+def without_cost(problem: Problem) -> Problem:
+    """Leave out limits and the cost of the sway."""
+    return attrs.evolve(problem.without_limits(), sway_weight=0.0, sway_scale=1.0)
+
+
+@remembered(without_cost)
+def _unweighted(problem: Problem) -> tuple[float, float, int]:
+    """Find the sway in m of the motion of least effort, its mean effort, and the iterations that it took."""
+    solution = solve(without_cost(problem))
+    if solution.optimum is None:
+        return 0.0, 0.0, solution.iterations
+    return sway_on_the_way(solution), solution.optimum.cost / problem.duration, solution.iterations
 
 
 def refined(start: Iterate, goal: Goal) -> ProgramSequence:

@@ -35,6 +35,7 @@ from gen_profile.methods.solvers.indirect.refinement import refine
 from gen_profile.methods.solvers.indirect.simplified_newton import solve_simplified
 from gen_profile.methods.solvers.solution import HORIZONTAL, LATER, LONGER, Solution, Status
 from gen_profile.support.one_thread import one_thread
+from gen_profile.support.remembered import remembered
 
 INTERVALS = 30  # at least
 RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
@@ -81,7 +82,6 @@ def solve_fully(problem: Problem, unweighted: BoundaryValueProblem) -> Solution:
     return judged(problem, weighted, refined.solution, iterations, refined.residual or costed.residual)
 
 
-@one_thread
 def solve(problem: Problem, options: IndirectOptions = USUAL, *, simply: bool = False) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
@@ -102,12 +102,17 @@ def solve(problem: Problem, options: IndirectOptions = USUAL, *, simply: bool = 
     InfeasibleProblem
         The machine does not hang at rest, so that it has no natural frequencies.
     """
+    return attrs.evolve(_solved(problem.without_limits(), options, simply=simply), problem=problem)
+
+
+@remembered(lambda problem, options, *, simply: (problem, options, simply))
+@one_thread
+def _solved(problem: Problem, options: IndirectOptions, *, simply: bool) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     unweighted = canonical_problem(problem, system)
     asked, redundant = independence(unweighted)
     if redundant:
-        solution = solve(without(problem, redundant), options, simply=simply)
-        return attrs.evolve(solution, problem=problem, redundant=redundant)
+        return attrs.evolve(_solved(without(problem, redundant), options, simply=simply), redundant=redundant)
     final = np.where(asked, unweighted.final, np.nan)
     unweighted = attrs.evolve(unweighted, final=final, options=options)
     with suppress(np.linalg.LinAlgError):
@@ -137,7 +142,7 @@ def _solve_simply(problem: Problem, unweighted: BoundaryValueProblem) -> Solutio
     intervals = max(options.intervals, math.ceil(unweighted.phase / options.radians_per_interval))
     start, iterations = quintic(unweighted, np.linspace(0.0, 1.0, intervals + 1), LONG_GAUSS), 0
     if problem.sway_weight > 0.0 and problem.sway_scale is None:  # the scale is measured on this motion
-        measured = _refined(unweighted, start)
+        measured = _unweighted(problem, unweighted, start)
         if measured.solution is None:
             return None
         start, iterations = measured.solution, measured.iterations
@@ -147,6 +152,12 @@ def _solve_simply(problem: Problem, unweighted: BoundaryValueProblem) -> Solutio
         return None
     solution = judged(problem, weighted, result.solution, iterations + result.iterations, result.residual)
     return solution if solution.optimum is None or solution.optimum.angle < MODERATE_ANGLE else None
+
+
+@remembered(lambda problem, unweighted, start: (attrs.evolve(problem, sway_weight=0.0), unweighted.options))
+def _unweighted(problem: Problem, unweighted: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
+    """Solve a problem without its cost of the sway, whatever that is."""
+    return _refined(unweighted, start)
 
 
 def _refined(problem: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
