@@ -66,3 +66,10 @@ def test_answers_are_the_same_to_the_last_bit_whatever_was_asked_before():
     forget()
     assert [given(settings) for settings in asked] == alone
     assert [given(settings) for settings in reversed(asked)] == alone[::-1]
+
+
+def test_what_is_remembered_cannot_be_changed_by_whom_it_was_given_to():
+    optimum = plan(preset_spec("paper")).solution.optimum
+    for name in ("knots", "states", "costates", "hamiltonian", "top_derivative", "sway"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(optimum, name)[:] = 0.0

@@ -7,7 +7,7 @@ from enum import Enum
 import attrs
 
 from gen_profile.dynamics.problem.problem import Problem
-from gen_profile.motion.profile import Array
+from gen_profile.motion.profile import Array, read_only
 from gen_profile.support.errors import Code, InfeasibleProblem, NoMotion, Reason, SolverDiverged, Suggestion
 from gen_profile.support.summary import Summarised
 
@@ -64,13 +64,13 @@ class Optimum(Summarised):
         Greatest relative change of H along the nodes; zero for the exact solution.
     """
 
-    knots: Array
-    states: Array
-    costates: Array
-    hamiltonian: Array | None
-    top_derivative: Array
+    knots: Array = attrs.field(converter=read_only)
+    states: Array = attrs.field(converter=read_only)
+    costates: Array = attrs.field(converter=read_only)
+    hamiltonian: Array | None = attrs.field(converter=attrs.converters.optional(read_only))
+    top_derivative: Array = attrs.field(converter=read_only)
     top_order: int
-    sway: Array
+    sway: Array = attrs.field(converter=read_only)
     angle: float
     cost: float
     sway_weight: float
