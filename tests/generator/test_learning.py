@@ -1,6 +1,7 @@
 """Ranges that runs of a motion narrow, against pendulums that are integrated here."""
 
 import re
+import shutil
 
 import attrs
 import numpy as np
@@ -212,23 +213,29 @@ def test_what_teaches_nothing_is_refused():
         parse_reading("30 mm", "seen")
 
 
-@pytest.fixture
-def site(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
     """A spec, a file that was played, and a log of it."""
-    monkeypatch.chdir(tmp_path)
+    folder = tmp_path_factory.mktemp("site")
     text = preset_text("single-pendulum-crane").replace("L0 = 3.0 ", "L0 = 3.4 ")
     text = text.replace("c = 200.0", "c = 0.0").replace("L0 = 0.1", "L0 = 0.3").replace("0.03 ", "0.3 ")
     text = text.replace("[0.0, 7.0]", "[0.0, 1.0]").replace("[12.0, 1.0]", "[6.0, 1.0]")
-    (tmp_path / "crane.toml").write_text(text, "utf-8")
+    (folder / "crane.toml").write_text(text, "utf-8")
     assert parse_spec(text).robustness.uncertain == {"L0": 0.3}
     knots = np.linspace(0.0, LASTS, 400)
     way = CubicSpline(knots, np.column_stack([quintic(knots), np.ones_like(knots)]), bc_type="clamped")
     (file,) = find_exporter("csv").encode(Profile.from_ppoly(way), target_of(parse_spec(text)))
-    (tmp_path / "played.csv").write_bytes(file.content)
+    (folder / "played.csv").write_bytes(file.content)
     log = log_of()
     rows = np.column_stack([log.times, np.degrees(log.values)])
-    np.savetxt("run.csv", rows, "%.5f", ",", header="t (s),rate (deg/s)", comments="")
-    return tmp_path
+    np.savetxt(folder / "run.csv", rows, "%.5f", ",", header="t (s),rate (deg/s)", comments="")
+    return folder
+
+
+@pytest.fixture
+def site(written, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return shutil.copytree(written, tmp_path, dirs_exist_ok=True)
 
 
 def learned_here(*arguments):
