@@ -36,7 +36,6 @@ def refused(bench, reason):
             {"make": DriveVariant(following_error=0xFFFF_FFFF)},
             r"does not watch its following error \(6065h is 4294967295 \(FFFFFFFFh\)",
         ),
-        ({"make": DriveVariant(following_error=0)}, r"does not watch its following error"),
         (
             {"make": DriveVariant(following_error=0x7FFF_FFFF)},
             r"window of 2\.15e\+03 \(6065h is 2147483647 \(7FFFFFFFh\)\) is wider than .* "
@@ -47,29 +46,14 @@ def refused(bench, reason):
             r"node 1 is another drive: its vendor is 000002E5h, and can\.vendor asks for 00000001h",
         ),
         ({"product": 1}, r"another drive: its product"),
-        ({"make": DriveVariant(modes=1)}, r"does not know the mode csp \(6502h\)"),
-        (
-            {"make": DriveVariant(fixed_period=(2, -3))},
-            r"60C2h:01 \(interpolation period: digits\) must hold 4 \(4h\), .* keeps 2 \(2h\)",
-        ),
     ],
-    ids=[
-        "position",
-        "monitoring off",
-        "monitoring none",
-        "monitoring wide",
-        "vendor",
-        "product",
-        "mode",
-        "fixed period",
-    ],
+    ids=["position", "monitoring off", "monitoring wide", "vendor", "product"],
 )
 @pytest.mark.parametrize("other", [False, True], ids=["usual", "other"])
 def test_unfit_drives(options, reason, other):
     make = options.get("make", DriveVariant())
     if other:
-        period = make.fixed_period or OTHER_MAKE.fixed_period
-        make = attrs.evolve(make, own_mapping=True, miss="hold", fixed_period=period)
+        make = attrs.evolve(make, own_mapping=True, miss="hold", fixed_period=OTHER_MAKE.fixed_period)
     with Bench(**{**options, "make": make}) as bench:
         refused(bench, reason)
 
