@@ -73,6 +73,7 @@ def test_files_of_stacks_and_of_profiles(tmp_path, text, stacks):
             "place,height\n0,0\n20000,10400\n30000,0\n",
             "path.stacks: reach 10400 m, far above path.rail of 36 m",
         ),
+        ("from,to,height\n8000,10500,6\n", "path.stacks: are all 7964 m or more from start and target"),
     ],
 )
 def test_no_row_of_a_file_is_left_out_or_misread(tmp_path, text, sentence):
@@ -83,6 +84,14 @@ def test_no_row_of_a_file_is_left_out_or_misread(tmp_path, text, sentence):
     with pytest.raises(gp.SpecError) as refusal:
         spec_from_dict(document, tmp_path)
     assert [fault.startswith(sentence) for fault in refusal.value.faults] == [True], refusal.value.faults
+
+
+def test_a_rail_in_mm_is_told():
+    """Nothing would be in the way of loads that hang far above."""
+    with pytest.raises(
+        gp.SpecError, match=r"path\.rail: is 35981\.8 m above the highest stack; state it in m"
+    ):
+        quay(path={"rail": 36000.0})
 
 
 def test_a_profile_counts_the_higher_end_of_every_piece():

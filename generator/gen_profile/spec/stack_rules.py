@@ -20,7 +20,7 @@ from gen_profile.support.errors import SpecError
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
 
-TALLEST = 1000.0  # m above the rail, from which on heights are taken to be in mm
+FARTHEST = 1000.0  # m from the rail, or from start and target, from which on lengths are taken to be in mm
 
 Fault = tuple[str, ...]
 
@@ -58,12 +58,22 @@ def stack_faults(spec: Spec, plant: Plant) -> Iterator[Fault]:
         )
         return
     highest = max((row[-1] for row in path.stacks), default=path.rail)
-    if highest - path.rail > TALLEST:
+    if highest - path.rail > FARTHEST:
         template = (
             "reach {height:g} m, far above path.rail of {rail:g} m; state places and heights in m, not mm"
         )
         yield "path.stacks", Phrase(template, height=highest, rail=path.rail), "path.file", "path.profile"
         return
+    if path.rail - highest > FARTHEST:
+        template = (
+            "is {above:g} m above the highest stack; state it in m, not mm, from the level of their heights"
+        )
+        yield "path.rail", Phrase(template, above=path.rail - highest)
+    ends = [end[axes.along[0]] for end in (spec.move.start, spec.move.target)]
+    away = min((max(row[0] - max(ends), min(ends) - row[1]) for row in path.stacks), default=0.0)
+    if away > FARTHEST:
+        template = "are all {away:g} m or more from start and target; state places in m, not mm"
+        yield "path.stacks", Phrase(template, away=away), "path.file", "path.profile"
     yield from _methods(spec)
     yield from _in_plan_view(spec, axes)
     yield from _rates(spec, plant, axes.hoist)
