@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from generator.hall import BOXES, MACHINE, hall
 from generator.quay import ROPE, SIDEWAYS, quay
 from playing import checked, column, play, start
 
@@ -39,3 +40,25 @@ def test_an_abort_of_the_playback_block_stays_on_the_way_and_clear(rope):
             bodies = body_places(plant, response.q_u, response.position, parameter_rows(plant, [values]))
             assert nearest(plan.spec, response.times, bodies).room >= -LESS
             assert nearest(bare, response.times, bodies).room >= 0.5 * SIDEWAYS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("height", "seconds", "most"), [(BOXES[1][4], 5.0, 0.11), (9.0, 15.2, 0.43)])
+def test_an_abort_of_a_hall_crane_stays_on_the_way_and_swings_as_the_docs_say(height, seconds, most):
+    stacks = [BOXES[0], [*BOXES[1][:4], height], BOXES[2]]
+    plan = gp.plan(hall(path={"stacks": stacks}, export={"cycle_time": 0.05}))
+    plant, found = plan.spec.machine(), []
+    (block, *_) = find_exporter("plc").encode(plan.command, target_of(plan.spec))
+    way = plan.motion.derivative(np.linspace(0.0, plan.motion.duration, 20001), 0)
+    fb = checked(block.content.decode("utf-8"))
+    rows = [start(fb), *(fb.call() for _ in range(round(seconds / 0.05) - 1))]
+    position = column([*rows, *play(fb, fb.call(bAbort=True))], "position")
+    assert max(np.abs(way - at).sum(axis=1).min() for at in position) < 0.01
+    with PlantCosimulation(plant) as fmu:
+        for rope in (0.9, 1.1):
+            values = {**plan.spec.plant.parameters, "L0": rope * MACHINE["L0"]}
+            setpoints = gp.SampledProfile(cycle_time=0.05, position=position)
+            response = fmu.run(setpoints, values, max_step=1e-3, settle=15.0)
+            bodies = body_places(plant, response.q_u, response.position, parameter_rows(plant, [values]))
+            found.append(nearest(plan.spec, response.times, bodies).room)
+    assert -most <= min(found) <= 0.02 - most
