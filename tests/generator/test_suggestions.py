@@ -255,6 +255,13 @@ def test_where_a_hoist_without_limits_misleads_programs_what_smooth_motions_need
         assert works("single-pendulum-crane", f"limits.sway={limit}", change)
 
 
+def test_no_duration_is_tried_that_a_spec_cannot_state():
+    """So little sway would take the smooth motion 685,000 s."""
+    with pytest.raises(NoMotion) as refusal:
+        plan(preset_spec("tower-crane", ["limits.sway=1e-9"]))
+    assert [list(one.values) for one in refusal.value.suggestions] == [["limits.sway"]]
+
+
 def test_values_are_skipped_that_leave_no_room_for_the_sway_of_the_worst_machine(monkeypatch):
     spec, asked = preset_spec("paper", ["limits.sway=0.01"]), []
 

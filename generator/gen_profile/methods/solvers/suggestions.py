@@ -24,6 +24,7 @@ from gen_profile.methods.solvers.search import Search, least
 from gen_profile.methods.solvers.solution import LONGER, Solution, Status
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
+from gen_profile.spec.values import LONGEST_MOVE
 from gen_profile.support.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion, rounded_up
 from gen_profile.support.phrase import Phrase
 from gen_profile.support.units import RATES
@@ -362,6 +363,8 @@ def _smoother(spec: Spec, options: SuggestionOptions, *, in_time: bool = False) 
         shares = zip(draft.broken, filter(None, orders), strict=True)
         longer = max((broken.found / broken.allowed) ** (1.0 / order) for broken, order in shares)
         duration = rounded_up(options.first * longer * asked.move.duration)
+        if duration > LONGEST_MOVE:
+            return None
         asked = asked.changed({"move.duration": duration})
     return None
 
