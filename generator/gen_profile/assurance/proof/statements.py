@@ -351,7 +351,8 @@ def remains(run: Followed) -> Iterator[Allowance]:
         above = stated[ends] / np.maximum(
             apart, NOTHING * limit
         )  # which is safe, and gives promises up early
-        yield Allowance(OVERSTATED, ends[int(np.argmax(above))], float(above.max()), inf)
+        if np.ptp(run.modes.modes.poles, axis=0).any():  # else no error is stated
+            yield Allowance(OVERSTATED, ends[int(np.argmax(above))], float(above.max()), inf)
         promised = run.issued["bPromise"][ends] != 0.0
         yield Allowance(LEFT, ends[-1], float((at_most * promised).max()), inf)
         below = at_most - [stated[begin:end].min() for begin, end in rests]  # as nothing decays
