@@ -12,7 +12,7 @@ from gen_profile.methods.solvers.over_stacks.around import route_around, way_of
 from gen_profile.methods.solvers.over_stacks.guide import blocks, guide_along, parting
 from gen_profile.methods.solvers.over_stacks.plan import sketched
 from gen_profile.methods.solvers.over_stacks.program import resting
-from gen_profile.methods.solvers.over_stacks.searches import StackSearch
+from gen_profile.methods.solvers.over_stacks.searches import StackSearch, stretched, with_others
 from gen_profile.methods.solvers.over_stacks.swing import followed as swing
 from gen_profile.presentation.charts.side_view import gone_around, path_figure
 from gen_profile.presentation.studio.curves_json import side_json
@@ -213,6 +213,15 @@ def test_lines_that_turned_with_a_worse_course_turn_back(monkeypatch):
     monkeypatch.setattr(StackSearch, "solved", lambda *_: attrs.evolve(course, room=-0.5, miss=3.0))
     assert search.in_turns(course) is course
     assert search.bay is bay
+
+
+@pytest.mark.parametrize("uncertain", [{}, {"L0": 0.1}])
+def test_machines_follow_a_course_that_was_shortened_at_the_same_instants(uncertain):
+    method = "sensitivity" if uncertain else None
+    bay = way_of(past_a_wall(robustness={"method": method, "uncertain": uncertain or None}))
+    shortened = stretched(resting(bay.alone(), bay.lifted(60.0, bay.top)), bay.lifted(20.0, bay.top))
+    nominal, others = with_others(bay, shortened).nodes
+    assert others.shape == (len(bay.machines) - 1, len(nominal), bay.others.states)
 
 
 class TestRefusals:

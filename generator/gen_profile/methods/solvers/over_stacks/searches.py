@@ -270,7 +270,8 @@ def lacking(course: Course) -> float:
 
 def with_others(bay: Bay, course: Course) -> Course:
     """Let all machines be linear about hanging below the trolley of a course of the nominal one."""
-    nominal, (_, others) = course.nodes[0], resting(bay, course.up).nodes
+    nominal = course.nodes[0]
+    others = np.tile(bay.begin[: bay.others.states], (len(bay.machines) - 1, len(nominal), 1))
     others[..., : bay.others.carried] = nominal[:, : bay.others.carried]
     return attrs.evolve(course, nodes=(nominal, others))
 
