@@ -5,7 +5,7 @@ from itertools import pairwise
 import attrs
 import numpy as np
 import pytest
-from generator.hall import BOXES, MACHINE, hall, shortage, two_masses
+from generator.hall import BOXES, LIMITS, MACHINE, hall, shortage, two_masses
 
 import gen_profile as gp
 from gen_profile.methods.solvers.over_stacks.around import route_around, way_of
@@ -250,6 +250,16 @@ class TestRefusals:
             gp.plan(hall(path={"stacks": [*slot, *boxes]}, move=move))
         (suggestion,) = refusal.value.suggestions
         assert suggestion.values["move.duration"] == pytest.approx(26.35, abs=0.15)
+
+    @pytest.mark.slow
+    def test_too_short_for_a_slow_hoist_names_a_time_that_does(self):
+        axes = LIMITS["axis"]
+        limits = {"sway": 0.6, "axis": {**axes, "hoist": {**axes["hoist"], "velocity": 0.05}}}
+        move = {"start": [2.0, 4.0, 6.0], "target": [26.0, 5.0, 5.0], "duration": 44.3}
+        with pytest.raises(gp.InfeasibleProblem, match="the stack from 20 to 22 m") as refusal:
+            gp.plan(past_a_wall(limits=limits, move=move))
+        (suggestion,) = refusal.value.suggestions
+        assert suggestion.values["move.duration"] == pytest.approx(63.4, abs=0.3)
 
     def test_too_short_where_nothing_is_in_the_way_says_so(self):
         with pytest.raises(gp.InfeasibleProblem, match=r"stays 1\d\.\d m away from its target\. It can"):

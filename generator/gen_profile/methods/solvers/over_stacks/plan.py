@@ -31,6 +31,7 @@ from gen_profile.methods.solvers.over_stacks.searches import (
     FIRST,
     OPTIONS,
     ROUGH,
+    Chosen,
     StackSearch,
     none_found,
 )
@@ -58,8 +59,15 @@ CLOSE = 1e-9  # s, between knots that are one
 OVERALL = 1e-3  # m of clearance that is asked for beyond what another machine of the ranges lacked
 
 
-def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
+def over_stacks(spec: Spec, progress: Progress = no_progress, chosen: Chosen | None = None) -> Plan:
     """Find the motion of trolley and hoist over what stands there.
+
+    Parameters
+    ----------
+    spec : Spec
+    progress : callable
+    chosen : Chosen, optional
+        Of the same move in another duration, where that was found already.
 
     Raises
     ------
@@ -68,7 +76,7 @@ def over_stacks(spec: Spec, progress: Progress = no_progress) -> Plan:
     """
     began, reserve, before = time.perf_counter(), RESERVE, -math.inf
     progress("solving")
-    planner = StackSearch(bay=way_of(spec, reserve))
+    planner = StackSearch(bay=way_of(spec, reserve), chosen=chosen)
     _require_height(planner.bay)
     for _ in range(OPTIONS.rounds):
         try:
@@ -272,14 +280,14 @@ def _refusal(planner: StackSearch) -> InfeasibleProblem:
     return InfeasibleProblem(
         sentence,
         reasons=[Reason(code=Code.TOO_SHORT, place="move.duration", found=asked, allowed=needed)],
-        suggestions=_tried(bay.spec, values),
+        suggestions=_tried(bay.spec, values, planner.chosen),
     )
 
 
-def _tried(spec: Spec, values: Mapping[str, Any]) -> tuple[Suggestion, ...]:
+def _tried(spec: Spec, values: Mapping[str, Any], chosen: Chosen | None = None) -> tuple[Suggestion, ...]:
     """Suggest values where they give a motion."""
     try:
-        return (suggested(values, over_stacks(spec.changed(values))),)
+        return (suggested(values, over_stacks(spec.changed(values), chosen=chosen)),)
     except NoMotion:
         return ()
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from gen_profile.methods.solvers.draft import in_cycles
 from gen_profile.methods.solvers.over_stacks.bay import Bay
+from gen_profile.methods.solvers.over_stacks.guide import Guide
 from gen_profile.methods.solvers.over_stacks.hoist import Pieces
 from gen_profile.methods.solvers.over_stacks.program import (
     FEW_STEPS,
@@ -48,6 +49,10 @@ LEAST_WINDOW = 0.4  # s, by which loads may pass corners early or late
 Lifted = Callable[[float], Pieces | None]  # from a duration in s to the hoist's motion
 
 
+# course of the least duration, with a little less clearance, and the way around something it was found on
+Chosen = tuple[Course, Lifted, Guide | None]
+
+
 @attrs.frozen(kw_only=True)
 class StackOptions:
     """How long a motion over stacks is looked for; see docs/solvers.md for the evidence.
@@ -83,7 +88,7 @@ class StackSearch:
     bay: Bay
     options: StackOptions = OPTIONS
     programs: int = 0
-    chosen: tuple[Course, Lifted] | None = None  # of the least duration, with a little less clearance
+    chosen: Chosen | None = None
 
     def solved(self, about: Course, steps: int = STEPS) -> Course | None:
         """Solve a program about a course, for the most room."""
@@ -126,8 +131,8 @@ class StackSearch:
 
     def shortest(self) -> Course:
         """Find the quickest course that machines themselves follow with room; it ends on a cycle."""
+        course, lifted = self.choose()
         bay = self.bay
-        course, lifted = self.chosen = self.chosen or self.linear()
         duration, longer = course.up.duration, self.options.longer
         for _ in range(self.options.tries):
             up = lifted(in_cycles(bay.spec, duration))
@@ -141,9 +146,17 @@ class StackSearch:
     def lengthen(self) -> None:
         """Take more time than the least that was found: its machines lack what no greater clearance gives."""
         if self.chosen is not None:
-            course, lifted = self.chosen
+            course, lifted, guide = self.chosen
             up = lifted(LENGTHENED * course.up.duration)
-            self.chosen = course if up is None else stretched(course, up), lifted
+            self.chosen = course if up is None else stretched(course, up), lifted, guide
+
+    def choose(self) -> tuple[Course, Lifted]:
+        """Find what `linear` does, once."""
+        if self.chosen is None:
+            self.chosen = (*self.linear(), self.bay.guide)
+        course, lifted, guide = self.chosen
+        self.bay = attrs.evolve(self.bay, guide=guide)
+        return course, lifted
 
     def linear(self) -> tuple[Course, Lifted]:
         """Find how the hoist lifts, and the quickest course of machines that are linear about another."""
@@ -238,7 +251,7 @@ class StackSearch:
                 if settled is not None:
                     return settled
                 self.bay = bay  # lines that turned with a course which is none would mislead the next one
-        quickest, lifted = self.chosen = self.chosen or self.linear()
+        quickest, lifted = self.choose()
         up = lifted(duration) if quickest.up.duration <= duration else None
         return None if up is None else self.settled(stretched(quickest, up))
 
