@@ -8,7 +8,8 @@ from generator.quay import STACKS, quay
 from scipy.interpolate import CubicSpline
 
 import gen_profile as gp
-from gen_profile.dynamics.evaluation.clearance import nearest
+from gen_profile.dynamics.evaluation.clearance import Nearest, nearest
+from gen_profile.methods.solvers.draft import Passage
 from gen_profile.methods.solvers.over_stacks.hoist import Rates, highest, least_time, rest_to_rest
 from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.spec.stacks import PathAxes, path_axes
@@ -92,6 +93,13 @@ def test_a_rail_in_mm_is_told():
         gp.SpecError, match=r"path\.rail: is 35981\.8 m above the highest stack; state it in m"
     ):
         quay(path={"rail": 36000.0})
+
+
+def test_what_takes_longer_than_one_axis_after_the_other_is_not_said_to_take_less():
+    near = Nearest(room=0.0, time=0.0, body="load", obstacle=0)
+    passage = Passage(lift=1.0, one_by_one=40.0, nearest=near, programs=1)
+    assert passage.gained(30.0) == "30 s, 25 % less than one axis after the other (40 s)"
+    assert passage.gained(100.0) == "100 s, longer than one axis after the other (40 s)"
 
 
 def test_a_profile_counts_the_higher_end_of_every_piece():

@@ -59,6 +59,8 @@ class Passage:
         if self.one_by_one is None:
             return f"{duration:.4g} s"
         saved = 100.0 * (1.0 - duration / self.one_by_one)
+        if saved < 0.0:
+            return f"{duration:.4g} s, longer than one axis after the other ({self.one_by_one:.4g} s)"
         return f"{duration:.4g} s, {saved:.3g} % less than one axis after the other ({self.one_by_one:.4g} s)"
 
 

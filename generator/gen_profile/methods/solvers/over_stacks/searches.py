@@ -310,8 +310,8 @@ def none_found(bay: Bay) -> SolverDiverged:
     template = "move.duration: no duration was found in which the load passes the stacks; widen the limits."
     if not bay.spec.move.shortest:
         template = (
-            "move.duration: no motion of {asked:g} s was found in which the load passes the stacks; allow "
-            "more time, or widen the limits."
+            "move.duration: no motion of {asked:g} s was found in which the load passes the stacks; try "
+            "another duration, or widen the limits."
         )
     sentence = Phrase(template, asked=bay.spec.move.duration)
     zone, room = bay.tightest
