@@ -10,7 +10,7 @@ from gen_profile_exporters.playback.structured_text import block_name, literal
 
 HOLD = 0.2  # s, in which an input that is out of range is held
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
-REACTION = 8.0  # slots, in which a new command is obeyed, also from rest
+REACTION = 4.0  # slots, in which a new command is obeyed, also from rest
 GIVES_UP = 4.0  # slow periods in which no motion is found for a command
 WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
 TEXT = Path(__file__).parent / "blocks/interface.st"

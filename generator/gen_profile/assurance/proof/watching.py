@@ -294,13 +294,18 @@ class BlockWatch:
                     )
 
     def _drifts(self, script: Script, now: NDArray[np.int64], share: float, cycles: int) -> Flags:
-        """Tell where a live parameter is other than at first, by a share of what counts, for longer."""
+        """Tell where a live parameter is other than at first, by a share of what counts, for longer.
+
+        In place of one out of its range, the last good one counts.
+        """
         drifts = np.zeros(len(now), dtype=bool)
         for name, (low, high) in self.known.live.items():
             if name in self.spec.planner.live_rate:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")][now]
-            apart = (np.abs(value - value[0]) > share * LEAST_RATE * high) & (value >= low) & (value <= high)
+            good = (value >= low) & (value <= high)
+            held = value[np.maximum.accumulate(np.where(good, np.arange(len(now)), 0))]
+            apart = (np.abs(held - held[0]) > share * LEAST_RATE * high) & (held >= low) & (held <= high)
             apart[1:-1] |= apart[:-2] & apart[2:]  # of three in a row, the one between counts
             for begin, end in runs_of(apart):
                 drifts[begin + cycles : end] |= end - begin > cycles
