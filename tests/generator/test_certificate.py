@@ -366,7 +366,7 @@ def test_a_hook_block_on_a_rope_that_is_hoisted_is_told_at_once_that_narrower_ra
     tried = []
     found = attempt(spec, setpoints, lambda done, _: tried.append(done))
     assert not found.reached and found.fraction == 0.0
-    assert max(tried) <= 4  # boxes: none is halved in vain
+    assert max(tried) <= 4  # boxes: none is halved without an end
 
 
 def test_a_load_that_does_not_swing_has_no_tails():

@@ -103,7 +103,7 @@ def numbers(run: Followed) -> Iterator[Allowance]:
         if rests + 1 >= order.end or not _is_end(run, order, rests):  # another may begin in that cycle
             continue
         takes = run.reaction + 2.0 * SLOT * run.period  # a plan takes over with a slot
-        changes = np.flatnonzero(np.diff(run.prompt[order.begin : rests])) + 1  # of how a stop is to be
+        changes = np.flatnonzero(np.diff(run.prompt[order.begin : rests])) + 1  # of how it is to stop
         told = order.begin + int(changes.max(initial=0))
         planned = told + run.after(takes)  # before, it tells of the former motion
         first = min(rests, max(planned, rests - run.after(0.5 * run.period)))
