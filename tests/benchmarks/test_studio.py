@@ -64,9 +64,9 @@ def test_the_step_of_a_knob_beside_a_solve_of_which_nothing_is_remembered(preset
     solved(still)  # derives the machine's equations
     forget()
     every = knobs(spec, question.document(), question.beginning())
-    turned = [knob for knob in every if knob.kind == "number" and knob.index is None and knob.value]
+    numbers = [knob for knob in every if knob.kind == "number" and knob.index is None and knob.value]
     cold, found = solved(still), dict[str, float]()
-    for knob in turned:
+    for knob in numbers:
         edits = {knob.path: knob.value + 1 if knob.whole else 1.01 * knob.value}
         with suppress(SpecError):
             found[knob.path] = solved(StudioState(preset=preset, edits=edits)) / cold

@@ -96,8 +96,8 @@ def test_a_plan_that_would_begin_as_a_stick_is_let_go_is_dropped(slow_gantry):
         block.hold(50)
         return block.hold(cycles, bExecute=1.0), block.hold(200, **stick)
 
-    begins = int(np.flatnonzero(issued(200)[0]["fVelocity_y"])[0])
-    assert (issued(begins)[1]["fPosition_y"] == 12.0).all()
+    first = int(np.flatnonzero(issued(200)[0]["fVelocity_y"])[0])
+    assert (issued(first)[1]["fPosition_y"] == 12.0).all()
 
 
 @pytest.mark.slow

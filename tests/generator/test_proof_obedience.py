@@ -299,10 +299,10 @@ def test_the_time_to_go_may_change_as_a_stop_is_to_be_another_one():
     moving = with_orders(REST, attrs.evolve(MOVE, end=700), order(700, CYCLES, STOP))
     rests = int(np.flatnonzero(~moving.stands[700:])[-1]) + 701
     moving.issued["fTimeToGo"][700 : rests - 100] += 3.0
-    told = kind_of(WORDS["time"])
-    assert told in kinds(moving)
+    wrong_time = kind_of(WORDS["time"])
+    assert wrong_time in kinds(moving)
     prompt = np.arange(CYCLES) < rests - 100
-    assert told not in kinds(attrs.evolve(moving, prompt=prompt))
+    assert wrong_time not in kinds(attrs.evolve(moving, prompt=prompt))
 
 
 def test_a_block_that_is_disabled_and_taken_over_has_no_fault():

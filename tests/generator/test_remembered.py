@@ -32,7 +32,7 @@ def test_what_is_found_again_counts_as_much_work_as_before():
 
 
 @pytest.mark.parametrize(
-    ("preset", "begun", "turned"),
+    ("preset", "begun", "change"),
     [
         ("paper", [], "check.residual_sway=0.004"),
         ("paper", [], "export.cycle_time=0.002"),
@@ -41,10 +41,10 @@ def test_what_is_found_again_counts_as_much_work_as_before():
         ("gantry-crane", ["limits.velocity=9"], "limits.velocity=8"),
     ],
 )
-def test_a_knob_that_does_not_change_the_problem_costs_no_solve(monkeypatch, preset, begun, turned):
+def test_a_knob_that_does_not_change_the_problem_costs_no_solve(monkeypatch, preset, begun, change):
     plan(preset_spec(preset, begun))
     monkeypatch.setattr(indirect, "_refined", lambda *_: pytest.fail("solved again"))
-    plan(preset_spec(preset, [*begun, turned]))
+    plan(preset_spec(preset, [*begun, change]))
 
 
 def test_answers_are_the_same_to_the_last_bit_whatever_was_asked_before():

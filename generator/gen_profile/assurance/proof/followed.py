@@ -214,12 +214,10 @@ class Followed:
 
     def _is_near_an_end(self, cycle: int) -> bool:
         takes = bounded(self, to_speeds(self, self.velocity[:, cycle]))
-        ways = 0.5 * takes * self.velocity[:, cycle]
+        ends = self.position[:, cycle] + 0.5 * takes * self.velocity[:, cycle]
+        own = zip(ends.tolist(), self.velocity[:, cycle].tolist(), self.limits, strict=True)
         return any(
-            way != 0.0 and float(self.room(k, np.array([place]), np.array([way]))[0]) < abs(way)
-            for k, (place, way) in enumerate(
-                zip(self.position[:, cycle].tolist(), ways.tolist(), strict=True)
-            )
+            speed != 0.0 and not limits.targets[0] <= end <= limits.targets[1] for end, speed, limits in own
         )
 
     def moved(self, begin: int, end: int) -> float:

@@ -104,12 +104,12 @@ def numbers(run: Followed) -> Iterator[Allowance]:
             continue
         takes = run.reaction + 2.0 * SLOT * run.period  # a plan takes over with a slot
         changes = np.flatnonzero(np.diff(run.prompt[order.begin : rests])) + 1  # of how it is to stop
-        told = order.begin + int(changes.max(initial=0))
-        planned = told + run.after(takes)  # before, it tells of the former motion
+        since = order.begin + int(changes.max(initial=0))
+        planned = since + run.after(takes)  # before, it tells of the former motion
         first = min(rests, max(planned, rests - run.after(0.5 * run.period)))
         error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * run.cycle)
         yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
-        begun = told + run.after(run.reaction + run.period)
+        begun = since + run.after(run.reaction + run.period)
         if begun < rests and run.slowest == inf:
             left = (rests - np.arange(begun, rests)) * run.cycle
             over = time[begun:rests] - left
