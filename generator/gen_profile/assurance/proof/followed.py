@@ -213,12 +213,9 @@ class Followed:
         return min(int(np.argmax(np.append(self.prompt_stops.any(axis=0), True))), next(crowded, self.cycles))
 
     def _is_near_an_end(self, cycle: int) -> bool:
-        takes = bounded(self, to_speeds(self, self.velocity[:, cycle]))
-        ends = self.position[:, cycle] + 0.5 * takes * self.velocity[:, cycle]
-        own = zip(ends.tolist(), self.velocity[:, cycle].tolist(), self.limits, strict=True)
-        return any(
-            speed != 0.0 and not limits.targets[0] <= end <= limits.targets[1] for end, speed, limits in own
-        )
+        speeds, (low, high) = self.velocity[:, cycle], np.transpose([own.targets for own in self.limits])
+        ends = self.position[:, cycle] + 0.5 * bounded(self, to_speeds(self, speeds)) * speeds
+        return bool(((speeds != 0.0) & ((ends < low) | (ends > high))).any())
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""

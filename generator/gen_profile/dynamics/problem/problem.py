@@ -135,6 +135,10 @@ class Problem:
             ranges={},
         )
 
+    def of_least_effort(self) -> Problem:
+        """Leave out limits and the cost of the sway."""
+        return attrs.evolve(self.without_limits(), sway_weight=0.0, sway_scale=1.0)
+
     @property
     def nominal_sway(self) -> float | None:
         """What the limit of sway on the way leaves to the nominal machine, in m; None without a limit."""

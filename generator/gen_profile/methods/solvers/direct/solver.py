@@ -145,16 +145,14 @@ class Goal:
         """
         after = solutions[-1].x
         if self.effort_price is not None:
-            last, before = float(after[-1]), float("inf")
-            if len(solutions) > 1:
-                before = float(solutions[-2].x[-1])
+            last = float(after[-1])
+            before = float(solutions[-2].x[-1]) if len(solutions) > 1 else math.inf
             noticed = WORTHWHILE * max(abs(last), LEAST_FRACTION)
             if self.widened:
                 noticed = max(CHANGE * abs(last), FAR_FROM_ONE * abs(last - 1.0), TINY)
             return self.setup.options.step_tolerance * abs(last - before) / noticed
-        columns = slice(0, start.local.size)
+        columns, effort = slice(0, start.local.size), self.setup.effort
         moved = solutions[-2].x[columns] if len(solutions) > 1 else start.local.ravel()
-        effort = self.setup.effort
         return float(np.sqrt(effort(after[columns] - moved) / effort(after[columns])))
 
     def approach(self, before: Iterate, after: Iterate) -> Iterate:
@@ -253,8 +251,7 @@ def mirrored(problem: Problem) -> ProgramSequence:
 
 def without_limits(problem: Problem) -> ProgramSequence | None:
     """Find the better of the optima without limits that rest and `mirrored` lead to, if there is one."""
-    cost, _ = resolve_sway_cost(problem)
-    begun = mirrored(problem)
+    (cost, _), begun = resolve_sway_cost(problem), mirrored(problem)
     goal = attrs.evolve(begun.goal, sway_cost=cost)
     ends = [sequence(start, goal) for start in (begun.setup.transcription.rest(), begun.iterate)]
     solved = [end for end in ends if end.verdict is ConicStatus.SOLVED]
@@ -281,18 +278,13 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     return SwayCost(beta=beta, gamma=AUTO_SWAY / sway), iterations
 
 
-def without_cost(problem: Problem) -> Problem:
-    """Leave out limits and the cost of the sway."""
-    return attrs.evolve(problem.without_limits(), sway_weight=0.0, sway_scale=1.0)
-
-
-@remembered(without_cost)
+@remembered(Problem.of_least_effort)
 def _unweighted(problem: Problem) -> tuple[float, float, int]:
     """Find the sway in m of the motion of least effort, its mean effort, and the iterations that it took."""
-    solution = solve(without_cost(problem))
-    if solution.optimum is None:
+    solution = solve(problem.of_least_effort())
+    if (found := solution.optimum) is None:
         return 0.0, 0.0, solution.iterations
-    return sway_on_the_way(solution), solution.optimum.cost / problem.duration, solution.iterations
+    return sway_on_the_way(solution), found.cost / problem.duration, solution.iterations
 
 
 def refined(start: Iterate, goal: Goal) -> ProgramSequence:
