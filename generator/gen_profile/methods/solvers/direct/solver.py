@@ -271,17 +271,17 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     """Give β and γ their values, and count the iterations that it took."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
         return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
-    sway, effort, iterations = _unweighted(problem)
+    sway, effort, iterations = _unweighted(problem.of_least_effort())
     if not 0.0 < sway < np.inf:  # a hoist alone swings nothing
         return UNWEIGHTED, iterations
     beta = problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2
     return SwayCost(beta=beta, gamma=AUTO_SWAY / sway), iterations
 
 
-@remembered(Problem.of_least_effort)
+@remembered(lambda problem: problem)
 def _unweighted(problem: Problem) -> tuple[float, float, int]:
-    """Find the sway in m of the motion of least effort, its mean effort, and the iterations that it took."""
-    solution = solve(problem.of_least_effort())
+    """Find the sway in m of a motion of least effort, its mean effort, and the iterations that it took."""
+    solution = solve(problem)
     if (found := solution.optimum) is None:
         return 0.0, 0.0, solution.iterations
     return sway_on_the_way(solution), found.cost / problem.duration, solution.iterations
